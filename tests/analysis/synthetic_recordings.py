@@ -116,7 +116,11 @@ def response_of(motion, delay_samples=0, specimen=None):
     return np.roll(path.states[:, 3], delay_samples), path.impacts.times_s
 
 
-def header(measurement, samples, delay_s, started_utc):
+VELOCITY = ("m0_velocity", "velocity", "m s-1", 0.1)
+"""Role, quantity, unit and unit per volt of the response."""
+
+
+def header(measurement, samples, delay_s, started_utc, response=VELOCITY):
     def channel(role, quantity, unit, per_volt, **more):
         return ChannelHeader(
             role=role,
@@ -136,7 +140,7 @@ def header(measurement, samples, delay_s, started_utc):
         channels=(
             channel("drive_voltage", "voltage", "V", 1.0),
             channel("base_acceleration", "acceleration", "m s-2", 10.0),
-            channel("m0_velocity", "velocity", "m s-1", 0.1, delay_s=delay_s),
+            channel(*response, delay_s=delay_s),
         ),
         sample_rate_hz=RATE,
         expected_samples=samples,
@@ -164,8 +168,12 @@ def write_recording(
     delay_s=0.0,
     started_utc=PROVENANCE.started_utc,
     overloads=(),
+    response=VELOCITY,
 ):
-    """Write a recording; ``hole`` is a range of samples that were lost, ``samples`` cuts the end off."""
+    """Write a recording; ``hole`` is a range of lost samples, ``samples`` cuts the end off.
+
+    ``velocity`` is what ``response`` shows.
+    """
     writer = begun_recording(
         folder,
         excitation,
@@ -178,6 +186,7 @@ def write_recording(
         delay_s=delay_s,
         started_utc=started_utc,
         overloads=overloads,
+        response=response,
     )
     return writer.finish(state, reason)
 
@@ -195,13 +204,14 @@ def begun_recording(
     delay_s=0.0,
     started_utc=PROVENANCE.started_utc,
     overloads=(),
+    response=VELOCITY,
 ):
     """Begin a recording and hand over its samples; it can still grow."""
     planned = velocity.size
     kept = planned if samples is None else samples
     measurement = Measurement(name=name, excitation=excitation)
     drive = VOLTS_PER_METRE * motion.displacement_m
-    volts = np.stack((drive, motion.acceleration / 10.0, velocity / 0.1))
+    volts = np.stack((drive, motion.acceleration / 10.0, velocity / response[3]))
     edges = {0, kept}
     for each in parts:
         edges |= {min(round(each.start_s * RATE), kept), min(round(each.stop_s * RATE), kept)}
@@ -209,7 +219,9 @@ def begun_recording(
         edges |= set(hole)
     starts = {round(each.start_s * RATE): each for each in parts}
     stops = {round(each.stop_s * RATE) for each in parts}
-    writer = create_recording(folder / f"{name}.h5", header(measurement, planned, delay_s, started_utc))
+    writer = create_recording(
+        folder / f"{name}.h5", header(measurement, planned, delay_s, started_utc, response)
+    )
     ordered = sorted(edges)
     for begin, end in zip(ordered, [*ordered[1:], kept], strict=True):
         if begin in stops:

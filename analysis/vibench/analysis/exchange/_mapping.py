@@ -10,13 +10,16 @@ from vibench.acquisition.recording import ROLE_PATTERN, Origin
 from vibench.acquisition.rig import volts_per_unit
 from vibench.sim import FrozenModel, SpecimenTable
 
-from ..recordings.channels import BASE, DRIVE, RESPONSE
+from ..recordings.channels import BASE, DRIVE
+from ..recordings.response import ACCELERATION, DISPLACEMENT, VELOCITY
 
 KNOWN_ROLES = {
     DRIVE: ("voltage", "V"),
     "amplifier_voltage": ("voltage", "V"),
     BASE: ("acceleration", "m s-2"),
-    RESPONSE: ("velocity", "m s-1"),
+    VELOCITY: ("velocity", "m s-1"),
+    ACCELERATION: ("acceleration", "m s-2"),
+    DISPLACEMENT: ("displacement", "m"),
 }
 """Quantity and unit that the analysis takes these channels to have."""
 
@@ -27,10 +30,11 @@ class ChannelMapping(FrozenModel):
     source: str = Field(min_length=1)
     """Its name in the file, as `vibench import FILE` lists it."""
     role: str = Field(pattern=f"^{ROLE_PATTERN.pattern}$")
-    """Its name in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``, or any other."""
+    """Its name in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``,
+    ``m0_acceleration``, ``m0_displacement``, or any other."""
     quantity: str = ""
     unit: str = ""
-    """UDUNITS text of the value; known for the three channels that an analysis needs."""
+    """UDUNITS text of the value; known for the channels that an analysis needs."""
     scale: float | str = 1.0
     """Unit per number in the file; of a file in volts, or the sensor's sensitivity: ``"100 mV/g"``."""
     offset: float = 0.0

@@ -47,7 +47,8 @@ class DrivenRig:
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
     """Return what the recorded voltage was played into.
 
-    Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with.
+    Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with, or does
+    not hold the velocity of m0.
 
     Parameters
     ----------
@@ -59,6 +60,11 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         Its numbers, as fitted; by default those of the bench configuration.
 
     """
+    if RESPONSE not in recording.roles:
+        raise UnusableData(
+            f"simulated draws add the noise of a velocity, and the recording has no channel {RESPONSE}; its "
+            "other results need none"
+        )
     rig = _configured(recording)
     if AMPLIFIER in recording.roles:
         amplifier, driven, role = Amplifier(), Driven.AMPLIFIER, AMPLIFIER

@@ -14,7 +14,8 @@ from vibench.acquisition.recording import ChannelHeader, Recording
 from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Integers, Reals
 from ..signals.envelope import DEFAULT_BINS, Envelope
-from .channels import BASE, DRIVE, RESPONSE, OnRead, ignore_reading
+from .channels import BASE, DRIVE, OnRead, ignore_reading
+from .response import RESPONSE_ROLES
 
 _BLOCK_S = 2.0
 _AT_FULL_SCALE = 0.999
@@ -171,9 +172,8 @@ def require_moving_channels(levels: Sequence[ChannelLevel]) -> None:
         One sentence that names every such channel and what to look at.
 
     """
-    faults = [
-        each for level in levels if level.header.role in (DRIVE, BASE, RESPONSE) for each in _faults(level)
-    ]
+    used = (DRIVE, BASE, *RESPONSE_ROLES)
+    faults = [each for level in levels if level.header.role in used for each in _faults(level)]
     if faults:
         raise UnusableData("; ".join(faults))
 

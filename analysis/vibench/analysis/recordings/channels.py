@@ -8,7 +8,6 @@ import numpy as np
 
 from vibench.acquisition.recording import (
     REJECTED,
-    BridgedChannel,
     ChannelHeader,
     Recording,
     SegmentLabel,
@@ -17,6 +16,7 @@ from vibench.acquisition.recording import (
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Reals
+from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 ACCELEROMETER_DAMPING_RATIO = 0.02
 """Of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
@@ -32,7 +32,10 @@ def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: 
     delay_s = channel.delay_s
     gain: Complexes = np.ones(frequency_hz.size, dtype=np.complex128)
     match channel.quantity:
-        case "acceleration" if (resonance_hz := _number(bench, "accelerometer", "resonance_hz")) is not None:
+        case "acceleration" if (
+            channel.role == BASE
+            and (resonance_hz := _number(bench, "accelerometer", "resonance_hz")) is not None
+        ):
             part = frequency_hz / resonance_hz
             gain = np.asarray(1 / (1 - part**2 + 2j * ACCELEROMETER_DAMPING_RATIO * part))
         case "velocity" if (bandwidth_hz := _number(bench, "vibrometer", "bandwidth_hz")) is not None:
@@ -60,7 +63,7 @@ def ignore_reading(samples: int, of: int) -> None:
     """Watch nothing."""
 
 
-DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
+DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", VELOCITY
 
 
 @dataclass(frozen=True)
@@ -113,20 +116,21 @@ class Channels(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RecordedChannels:
-    """The channels of a recording; lost samples read as NaN, and the vibrometer's drop-outs are bridged."""
+    """The channels of a recording; lost samples read as NaN, and a vibrometer's drop-outs are bridged."""
 
     recording: Recording
     on_read: OnRead = ignore_reading
-    _response: BridgedChannel = field(init=False)
+    _response: ResponseChannel = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_response", BridgedChannel(self.recording, RESPONSE))
-        missing = [role for role in (DRIVE, BASE, RESPONSE) if role not in self.recording.roles]
+        missing = [role for role in (DRIVE, BASE) if role not in self.recording.roles]
         if missing:
             raise UnusableData(
                 f"there is no channel {', '.join(missing)}; the recording has "
-                f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and {RESPONSE}"
+                f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and one of "
+                f"{', '.join(RESPONSE_ROLES)}"
             )
+        object.__setattr__(self, "_response", ResponseChannel(self.recording))
 
     @property
     def sample_rate_hz(self) -> float:
@@ -141,13 +145,13 @@ class RecordedChannels:
     @property
     def response_delay_s(self) -> float:
         """By how much the response channel lags the base channel."""
-        return self.recording.channel(RESPONSE).delay_s - self.recording.channel(BASE).delay_s
+        return self.recording.channel(self._response.role).delay_s - self.recording.channel(BASE).delay_s
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
         """Gain of the response's sensor over that of the base's, couplings included and delays left out."""
         response, base = (
             coupled_gain(self.recording.bench, self.recording.channel(role), frequency_hz)
-            for role in (RESPONSE, BASE)
+            for role in (self._response.role, BASE)
         )
         delay = np.exp(2j * np.pi * frequency_hz * self.response_delay_s)
         return np.asarray(response / base * delay)
@@ -176,16 +180,16 @@ class RecordedChannels:
         """Return at which samples one of the channels was near its full scale, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
-            if each.channel in (DRIVE, BASE, RESPONSE):
+            if each.channel in (DRIVE, BASE, self._response.role):
                 marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
-        for dropout in self._response.between(start, stop):
+        for dropout in self._response.dropouts(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = False
         return marks
 
     def bridged(self, start: int, stop: int) -> Flags:
         """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
-        for dropout in self._response.between(start, stop):
+        for dropout in self._response.dropouts(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = True
         return marks
 

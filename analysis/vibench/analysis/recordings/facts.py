@@ -8,7 +8,6 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, Val
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
-    BridgedChannel,
     Dropout,
     EventKind,
     FeedbackNote,
@@ -25,6 +24,7 @@ from vibench.sim import Specimen, SpecimenTable, fault_in_words
 from ..errors import UnusableData
 from .channel_levels import ChannelLevel, channel_levels
 from .channels import RESPONSE, OnRead, ignore_reading
+from .response import ACCELERATION, LOWEST_INTEGRATED_HZ, ResponseChannel, response_role
 
 MOST_BYTES = 1e9
 """Of memory, for what need not be checked against the file's size."""
@@ -128,6 +128,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     require_measured_size(recording)
     seal = require_intact(recording)
     measurement = plan_of(recording)
+    _require_band(recording, measurement)
     _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
@@ -164,10 +165,19 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     )
 
 
+def _require_band(recording: Recording, measurement: Measurement) -> None:
+    low_hz = measurement.excitation.band_hz[0]
+    if response_role(recording) == ACCELERATION and low_hz < LOWEST_INTEGRATED_HZ:
+        raise UnusableData(
+            f"{recording.path.name}: the plan reaches down to {low_hz:g} Hz, and the acceleration of m0 is "
+            f"integrated from {LOWEST_INTEGRATED_HZ:g} Hz on; measure the velocity or displacement of m0"
+        )
+
+
 def _dropouts(recording: Recording) -> tuple[Dropout, ...]:
-    if RESPONSE not in recording.roles:
+    if response_role(recording) is None:
         return ()
-    return BridgedChannel(recording, RESPONSE).between(0, recording.samples)
+    return ResponseChannel(recording).dropouts(0, recording.samples)
 
 
 def plan_of(recording: Recording) -> Measurement:

@@ -1,0 +1,144 @@
+"""The velocity of m0, whichever sensor shows its motion: vibrometer, accelerometer or displacement probe."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from scipy.signal import fftconvolve
+from scipy.special import sici
+
+from vibench.acquisition.recording import BridgedChannel, Dropout, Recording
+
+from ..errors import UnusableData
+from ..signals.arrays import Reals
+
+VELOCITY, ACCELERATION, DISPLACEMENT = RESPONSE_ROLES = ("m0_velocity", "m0_acceleration", "m0_displacement")
+"""Channels that show the motion of m0, the one that is used first."""
+LOWEST_INTEGRATED_HZ = 5.0
+"""An acceleration is integrated exactly above it; below it, the velocity fades to nothing."""
+_HELD_S, _REACH_S = 0.2, 1.0
+_TAPER = 12.0
+"""Kaiser's beta: what the ends of the integral leave is below 1e-5 at 5 Hz and falls from there."""
+_DERIVATIVE_REACH, _DERIVATIVE_TAPER = 64, 8.0
+"""Samples and Kaiser's beta: exact to 1e-5 below 0.45 of the sample rate."""
+_BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
+"""Kernels and samples of a block, which is read with half a kernel more on either side."""
+
+
+def integral_kernel(rate_hz: float) -> Reals:
+    """Weights that integrate samples with zero phase, shape (2 L + 1,) [s].
+
+    The integral of a band-limited signal has the weights Si(pi n) / pi (the integral of sinc). They are
+    multiplied by 1 up to 0.2 s, and fade to 0 at 1 s along the integral of a Kaiser window. Being odd, they
+    remove a constant.
+    """
+    reach, held = round(_REACH_S * rate_hz), round(_HELD_S * rate_hz)
+    places = np.arange(1, reach + 1)
+    fall = np.cumsum(np.kaiser(reach - held, _TAPER))
+    weights = np.concatenate((np.ones(held), 1 - fall / fall[-1]))
+    half = sici(np.pi * places)[0] / np.pi * weights / rate_hz
+    return np.concatenate((-half[::-1], [0.0], half))
+
+
+def derivative_kernel(rate_hz: float) -> Reals:
+    """Weights of a band-limited derivative with zero phase, shape (2 L + 1,) [1/s]."""
+    places = np.arange(1, _DERIVATIVE_REACH + 1)
+    window = np.kaiser(2 * _DERIVATIVE_REACH + 1, _DERIVATIVE_TAPER)[_DERIVATIVE_REACH + 1 :]
+    half = (-1.0) ** places / places * window * rate_hz
+    return np.concatenate((-half[::-1], [0.0], half))
+
+
+@dataclass(frozen=True)
+class _Conversion:
+    """How samples of one quantity become velocities."""
+
+    kernel: Callable[[float], Reals]
+    about: float
+    """Samples beyond an end are ``about`` times the last one, minus the mirrored ones."""
+
+
+_CONVERSIONS: MappingProxyType[str, _Conversion] = MappingProxyType(
+    {
+        # Mirrored with the opposite sign, the velocity goes on as it was, backwards in time.
+        ACCELERATION: _Conversion(integral_kernel, 0.0),
+        DISPLACEMENT: _Conversion(derivative_kernel, 2.0),
+    }
+)
+
+
+@dataclass(eq=False)
+class ResponseChannel:
+    """Velocity of m0 from the first of `RESPONSE_ROLES` that a recording has.
+
+    An acceleration is integrated, which makes its noise grow towards low frequencies; a displacement is
+    differentiated, which makes it grow towards high ones. Both happen with zero phase.
+
+    Raises UnusableData when the recording has none of them.
+    """
+
+    recording: Recording
+    role: str = field(init=False)
+    _conversion: _Conversion | None = field(init=False, default=None)
+    _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
+    _block: tuple[int, Reals] | None = field(init=False, default=None)
+    """Number and velocities of the block that was made last: estimators read one after the other."""
+
+    def __post_init__(self) -> None:
+        found = response_role(self.recording)
+        if found is None:
+            raise UnusableData(
+                f"no channel shows the motion of m0: the recording has {', '.join(self.recording.roles)}; "
+                f"an analysis needs one of {', '.join(RESPONSE_ROLES)}"
+            )
+        self.role = found
+        self._conversion = _CONVERSIONS.get(found)
+        if self._conversion is not None:
+            self._kernel = self._conversion.kernel(self.recording.sample_rate_hz)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give velocities [m/s], shape (samples,); lost samples are NaN, a vibrometer's drop-outs bridged."""
+        if self._conversion is None:
+            return BridgedChannel(self.recording, self.role).read(start, stop)
+        size = max(_BLOCK_REACHES * self._kernel.size, _LEAST_BLOCK)
+        parts = [np.empty(0)]
+        for number in range(start // size, -(-stop // size)):
+            first = number * size
+            block = self._velocities(self._conversion, number, size)
+            parts.append(block[max(start - first, 0) : stop - first])
+        return np.concatenate(parts)
+
+    def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
+        """Give the drop-outs that reach into these samples; only light drops out."""
+        if self._conversion is not None:
+            return ()
+        return BridgedChannel(self.recording, self.role).between(start, stop)
+
+    def _velocities(self, conversion: _Conversion, number: int, size: int) -> Reals:
+        if self._block is None or self._block[0] != number:
+            reach, samples = self._kernel.size // 2, self.recording.samples
+            start, stop = number * size, min((number + 1) * size, samples)
+            first, last = max(start - reach, 0), min(stop + reach, samples)
+            given = self.recording.read(self.role, first, last)
+            lost = np.isnan(given)
+            given = np.where(lost, 0.0, given - (0.0 if lost.all() else np.nanmean(given)))
+            before, behind = first - (start - reach), (stop + reach) - last
+            near = [_mirrored(given[::-1], behind, conversion.about)]
+            given = np.concatenate((_mirrored(given, before, conversion.about)[::-1], given, *near))
+            found = fftconvolve(given, self._kernel, mode="valid")
+            if lost.any():
+                marks = np.pad(lost.astype(np.float64), (before, behind))
+                found[fftconvolve(marks, np.ones(self._kernel.size), mode="valid") > 0.5] = np.nan
+            self._block = (number, found)
+        return self._block[1]
+
+
+def _mirrored(samples: Reals, count: int, about: float) -> Reals:
+    """Give samples before the first one, the nearest first; zeros where a recording is too short."""
+    found = about * samples[:1] - samples[1 : count + 1]
+    return np.pad(found, (0, count - found.size))
+
+
+def response_role(recording: Recording) -> str | None:
+    """Name the channel that shows the motion of m0; None where there is none."""
+    return next((each for each in RESPONSE_ROLES if each in recording.roles), None)

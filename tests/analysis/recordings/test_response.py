@@ -1,0 +1,96 @@
+"""m0's motion by an accelerometer or a displacement probe: the same results as by a vibrometer."""
+
+import numpy as np
+import pytest
+
+from tests.analysis.conftest import A0_STRONG, DWELL_PART, NOISE, dwell_plan, synthetic
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import WhiteNoise
+from vibench.analysis import Simulation, analyse_files
+from vibench.analysis.recordings.response import ResponseChannel
+
+RATE = synthetic.RATE
+ACCELERATION = ("m0_acceleration", "acceleration", "m s-2", 100.0)
+DISPLACEMENT = ("m0_displacement", "displacement", "m", 1e-4)
+
+
+def accelerations(velocity):
+    """Differentiate by the FFT; mirrored, the velocity has no jump at its ends."""
+    whole = np.concatenate((velocity, velocity[::-1]))
+    lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
+    return np.fft.irfft(lines * np.fft.rfft(whole), whole.size)[: velocity.size]
+
+
+def displacements(velocity):
+    """Integrate by the FFT; the mean velocity is no motion of a specimen on a table."""
+    whole = np.concatenate((velocity, velocity[::-1]))
+    lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
+    lines[0] = np.inf
+    return np.fft.irfft(np.fft.rfft(whole) / lines, whole.size)[: velocity.size]
+
+
+def analysed(path):
+    return analyse_files([path], "response", Simulation.LEFT_OUT).results[0].analysis
+
+
+SENSORS = pytest.mark.parametrize(
+    ("response", "made"), [(ACCELERATION, accelerations), (DISPLACEMENT, displacements)]
+)
+
+
+@SENSORS
+@pytest.mark.parametrize("level", ["weak", "strong"])
+def test_a_dwell_has_the_same_responses(dwell_file, dwell_motions, tmp_path, level, response, made):
+    motion, velocity, _ = dwell_motions[level]
+    plan = dwell_plan({"weak": 0.5e-6, "strong": A0_STRONG}[level])
+    path = synthetic.write_recording(
+        tmp_path, plan, motion, made(velocity), [DWELL_PART], delay_s=1 / RATE, response=response
+    )
+    expected = analysed(dwell_file(level))
+    found = analysed(path)
+    assert found.response.response_i == pytest.approx(expected.response.response_i, rel=1e-4)
+    assert found.response.response_ii == pytest.approx(expected.response.response_ii, rel=1e-4)
+    assert found.motion.verdict.kind is expected.motion.verdict.kind
+
+
+@SENSORS
+def test_noise_has_the_same_resonances(noise_file, noise_motion, tmp_path, response, made):
+    base, velocity, parts = noise_motion
+    plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
+    path = synthetic.write_recording(tmp_path, plan, base, made(velocity), parts, response=response)
+    expected, found = (analysed(each).response for each in (noise_file(), path))
+    np.testing.assert_allclose(
+        found.frequency_response.value, expected.frequency_response.value, rtol=1e-3, atol=1e-3
+    )
+    for one, other in zip(found.resonances, expected.resonances, strict=True):
+        assert one.frequency_hz == pytest.approx(other.frequency_hz, rel=5e-5)
+
+
+@SENSORS
+def test_what_is_read_does_not_depend_on_where_it_begins(dwell_motions, tmp_path, response, made):
+    motion, velocity, _ = dwell_motions["strong"]
+    path = synthetic.write_recording(
+        tmp_path, dwell_plan(A0_STRONG), motion, made(velocity), [DWELL_PART], response=response
+    )
+    with open_recording(path) as recording:
+        whole = ResponseChannel(recording).read(0, recording.samples)
+        part = ResponseChannel(recording).read(10_001, 23_456)
+    np.testing.assert_array_equal(part, whole[10_001:23_456])
+    # In the first second the transient moves slower than 5 Hz, too.
+    assert np.abs(whole - velocity)[round(RATE) : -64].max() < 2e-3 * np.abs(velocity).max()
+
+
+def test_samples_near_a_hole_are_not_told(dwell_motions, tmp_path):
+    motion, velocity, _ = dwell_motions["weak"]
+    path = synthetic.write_recording(
+        tmp_path,
+        dwell_plan(0.5e-6),
+        motion,
+        accelerations(velocity),
+        [DWELL_PART],
+        response=ACCELERATION,
+        hole=(16_000, 16_010),
+    )
+    with open_recording(path) as recording:
+        lost = np.isnan(ResponseChannel(recording).read(0, recording.samples))
+    assert np.flatnonzero(lost)[[0, -1]].tolist() == [16_000 - RATE, 16_009 + RATE]
