@@ -97,7 +97,7 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
     if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
         return None
     extremes = [group.get(role + suffix) for suffix in (LOW_SUFFIX, HIGH_SUFFIX)]
-    # How many bins so many samples fill, the last perhaps in part.
+    # How many bins the samples fill, the last perhaps in part.
     if any(
         not isinstance(each, h5py.Dataset)
         or each.shape != (-(-samples // BIN_SAMPLES),)

@@ -300,7 +300,7 @@ class Run(ClosedOnLeaving):
                 if self._measurement.until is not None:
                     self._until = UntilWatch(self._measurement, self._measurement.until, self._path)
                     refused.callback(self._until.close)
-                    self._until.wait_until_ready(self._switch)
+                    self._until.wait_until_ready(self.switch)
                 header = run_header(self._bench, self._measurement, self._total_s)
                 sink = self._create(self._path, header)
                 refused.pop_all()

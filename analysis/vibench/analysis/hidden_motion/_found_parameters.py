@@ -159,7 +159,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
         start = first_look.tracked
     found = _refined(described, motion, start, near)
     for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
-        # Move both gaps by so many standard deviations: without a contact model they err together.
+        # Move both gaps by the same number of standard deviations: without a contact model they err together.
         gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
         moved = with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
         looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
