@@ -166,3 +166,41 @@ def test_a_budget_that_is_no_number_is_refused_in_a_sentence(vibench_here, tmp_p
         ran = vibench_here("predict", *FORGETFUL, f"--budget={given}", cwd=tmp_path)
         assert ran.returncode != 0
         assert said in ran.stderr
+
+
+def test_a_requested_error_is_reached_and_said(vibench_here, tmp_path):
+    asked = ("predict", "--amplitude", 20e-6, "--frequency", 130, "--error", "1 %", "--time", "20 s")
+    ran = vibench_here(*asked, "--json", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    (point,) = json.loads(ran.stdout)["points"]
+    assert point["error_estimate"] < 1e-6
+    assert point["target"]["is_met"]
+    assert point["target"]["wanted_error"] == 0.01
+    assert " % reached in " in vibench_here(*asked, cwd=tmp_path).stdout
+
+
+def test_every_point_of_a_curve_reaches_the_requested_error(vibench_here, tmp_path):
+    asked = ("predict", "--amplitude", 20e-6, "--frequency", "128:132:2", "--error", "0.01")
+    ran = vibench_here(*asked, cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "3 of 3 points reached an error of 1 %" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--error", "1%", "--duration", 30), "--error was given with --duration"),
+        (("--time", "2s", "--accuracy", "quick"), "--time was given with --accuracy"),
+        (("--error", "1%", "--budget", "1s"), "--error was given with --budget"),
+        (("--error", "200%"), "--error was given as 2.0: it must be 1 or less"),
+        (("--error", "0"), "--error was given as 0.0: it must be above 0"),
+        (("--error", "small"), "give a number, or one with %"),
+        (("--time", "soon"), "give a number, or one with ms or min or h or s"),
+        (("--error", "1%", "--observe", "response,lyapunov"), "A target is not allowed with lyapunov"),
+    ],
+)
+def test_a_target_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
+    ran = vibench_here("predict", "--amplitude", 1e-6, "--frequency", 100, *arguments, "--json", cwd=tmp_path)
+    assert ran.returncode != 0
+    (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
+    assert said in line

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -13,13 +13,22 @@ from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import SpecimenChoice
-from vibench.sim import BUDGET_S, Observable, Outcome, Rest, ScenePlan, ScenePrediction, solve_scene
+from vibench.sim import (
+    BUDGET_S,
+    Observable,
+    Outcome,
+    Rest,
+    Scene,
+    ScenePlan,
+    ScenePrediction,
+    solve_scene,
+)
 from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
 from .found_motions import forgetting_text, motions_table, share_text
 from .interruption import told_to_stop
-from .options import Fields, RequestOptions, option
+from .options import Fields, RequestOptions, option, option_name
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
@@ -37,19 +46,25 @@ _AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_
 def predict(
     amplitude: Annotated[float, option("Of the base displacement.", "M")],
     frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
-    duration: Annotated[str, option("Length of each run, or until it settles.", "S|auto")] = "30",
+    duration: Annotated[
+        str | None, option("Length of each run, or until it settles.  [default: 30]", "S|auto")
+    ] = None,
     observe: Annotated[str, option("response; with it lyapunov, scatter.")] = Observable.RESPONSE.value,
     start: Annotated[
         Start, option("rest, or continued from the next lower (up) or higher (down).")
     ] = Start.REST,
     budget: Annotated[
-        str,
+        str | None,
         option(
             "Processor time a point for other starts, where the start is forgotten, and to see whether "
-            "chaos lasts; 0 looks for neither.",
+            f"chaos lasts; 0 looks for neither.  [default: {BUDGET_S:g}s]",
             "S",
         ),
-    ] = f"{BUDGET_S:g}s",
+    ] = None,
+    error: Annotated[str | None, option("Relative error to reach at each point, as 1%.", "E")] = None,
+    time_limit: Annotated[
+        str | None, option("Time for each point, as 2s: the best answer by then.", "T", name="--time")
+    ] = None,
     workers: Workers = None,
     cluster: Cluster = None,
     out: Annotated[Path | None, option("Keep the answers in a file.", "FILE.h5")] = None,
@@ -63,6 +78,10 @@ def predict(
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, and only a file is gone on with; give both")
+    given = {"duration_s": duration and _duration(duration), "budget_s": budget and _budget(budget)}
+    given |= {"error": error, "time_s": time_limit}
+    typed = {name: value for name, value in given.items() if value is not None}
+    _refuse_beside_target(typed.keys() | options.typed.keys())
     asked = options.request(
         specimen=described(choice.typed.get("specimen")),
         **{axis: (choice.typed[name],) for axis, name in _AXES.items() if name in choice.typed},
@@ -70,8 +89,7 @@ def predict(
         frequencies_hz=frequencies(frequency),
         observe=_observables(observe),
         starts=(start,),
-        duration_s=_duration(duration),
-        budget_s=_budget(budget),
+        **typed,
     )
     print_warnings(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
@@ -83,11 +101,12 @@ def predict(
             # One point needs neither a queue nor a file.
             taken_s, kept, where = [math.nan], 1, asked.coordinates(0)
             try:
-                points = [solve_scene(asked.scene((0,) * len(asked.axes), Rest()))]
+                scene = asked.scene((0,) * len(asked.axes), Rest())
+                points = [solve_scene(scene) if asked.target is None else _refined(scene)]
                 failures = [(where, each.ended) for each in points if each.outcome != Outcome.REACHED_END]
-            except (ValueError, RuntimeError) as error:
-                said = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-                failures = [(where, f"{said}{error}")]
+            except (ValueError, RuntimeError) as fault:
+                said = "" if isinstance(fault, ValueError) else f"{type(fault).__name__}: "
+                failures = [(where, f"{said}{fault}")]
             observer(Progress(1, 1, 0.0, "1 failed" if failures else ""))
         else:
             from vibench.sim.study import ExistingStudy, solve_study
@@ -110,9 +129,31 @@ def predict(
         print_json(document)
     else:
         _tell(points, Observable.LYAPUNOV in asked.observe)
+        _tell_target(points, asked.error)
     if explain:
         (errors if as_json else console).print(paragraph(_explanation(asked, points, taken_s)))
     complain_about_points(asked, failures, kept)
+
+
+def _refuse_beside_target(typed: Collection[str]) -> None:
+    """Refuse what a requested error or time decides by itself."""
+    targets = [name for name in ("error", "time_s") if name in typed]
+    others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
+    if targets and others:
+        raise InvalidRequest(
+            f"--{option_name(targets[0])} was given with --{option_name(others[0])}, which it sets itself; "
+            "leave out one of the two"
+        )
+
+
+def _refined(scene: Scene) -> ScenePrediction:
+    """Solve one scene with a target, and show every better answer as it comes."""
+    from vibench.sim import refine_scene
+
+    for found in refine_scene(scene):
+        if found.target is not None and not found.target.is_met:
+            errors.print(found.target.text)
+    return found
 
 
 def _observables(text: str) -> tuple[Observable, ...]:
@@ -195,3 +236,11 @@ def _tell(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
     motions = motions_table(points)
     if motions is not None:
         print_table(motions)
+
+
+def _tell_target(points: Sequence[ScenePrediction], error: float | None) -> None:
+    if len(points) == 1 and points[0].target is not None:
+        console.print(points[0].target.text)
+    elif error is not None:
+        met = sum(each.error_estimate is not None and each.error_estimate <= error for each in points)
+        console.print(f"{met} of {len(points)} points reached an error of {100.0 * error:g} %")

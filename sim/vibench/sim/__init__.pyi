@@ -106,7 +106,9 @@ from .scene.prediction import (
     MotionKind as MotionKind,
     ScenePrediction as ScenePrediction,
     StartMemory as StartMemory,
+    TargetReport as TargetReport,
 )
+from .scene.refinement import refine_scene as refine_scene
 from .scene.scene import (
     BUDGET_S as BUDGET_S,
     AutomaticDuration as AutomaticDuration,
@@ -115,6 +117,7 @@ from .scene.scene import (
     Observable as Observable,
     Rest as Rest,
     Scene as Scene,
+    Target as Target,
 )
 from .scene.shares import EscapeRate as EscapeRate, Share as Share, wilson_share as wilson_share
 from .scene.solve import (

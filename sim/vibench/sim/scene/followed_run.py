@@ -237,6 +237,16 @@ class FollowedRun:
             growth=self._size() - before,
         )
 
+    def image(self, drive_periods: int) -> tuple[Floats, Floats]:
+        """Return the state after so many drive periods, and its derivative by the state now; NaN if lost."""
+        run, frequency_hz = self._run.apart(), self.drive.frequency_hz
+        until_s = (round(self.time_s * frequency_hz) + drive_periods) / frequency_hz
+        run.carry(np.eye(DIRECTIONS))
+        record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s))
+        if run.advance(until_s, record) is not Outcome.REACHED_END:
+            return np.full(DIRECTIONS, np.nan), np.full((DIRECTIONS, DIRECTIONS), np.nan)
+        return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
+
     def _size(self) -> float:
         """Natural logarithm of the small change, by its energy without stops; NaN where there is none.
 

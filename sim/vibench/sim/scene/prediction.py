@@ -88,6 +88,54 @@ class Ensemble:
     """Time that all starts together were followed."""
 
 
+@dataclass(frozen=True)
+class TargetReport:
+    """What was requested of an answer, and what was reached."""
+
+    wanted_error: float | None
+    """Relative; None where none was requested, as the next."""
+    wanted_time_s: float | None
+    error: float | None
+    """The largest of the four stated errors."""
+    time_s: float
+    """Since the request."""
+    starts: int
+    """Starts in the mean; 1 where the start is not forgotten."""
+    is_met: bool
+    """The error is what was requested, or less."""
+    needed_s: tuple[float, float, float] | None
+    """Time for the requested error: estimate, and the ends of an interval. None where more time does not
+    reduce the error, or where it is not known."""
+
+    @property
+    def text(self) -> str:
+        """The same in a sentence."""
+        if self.error is None:
+            return f"no error is known after {_seconds(self.time_s)}"
+        reached = _percent(self.error)
+        if self.is_met:
+            return f"{reached} reached in {_seconds(self.time_s)}"
+        said = f"{reached} after {_seconds(self.time_s)}"
+        wanted = _percent(self.wanted_error or 0.0)
+        if self.needed_s is None:
+            return f"{said}; the time for {wanted} is not known"
+        about, low, high = (_short(each) for each in self.needed_s)
+        return f"{said}; {wanted} needs about {about} s ({low} to {high})"
+
+
+def _percent(error: float) -> str:
+    return f"{_short(100.0 * error)} %"
+
+
+def _seconds(time_s: float) -> str:
+    return f"{_short(time_s)} s"
+
+
+def _short(value: float) -> str:
+    """Two digits, without an exponent where the number is as short without."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
 class Method(StrEnum):
     """How a scene is answered."""
 
@@ -162,6 +210,8 @@ class ScenePrediction:
     """Whether the start decided which motion was reached."""
     ensemble: Ensemble | None = None
     """What other starts came to where it did not; None where it did, or where there was no budget."""
+    target: TargetReport | None = None
+    """What was requested and reached; None where neither an error nor a time was requested."""
 
     @property
     def is_one_of_several(self) -> bool:
@@ -173,7 +223,9 @@ class ScenePrediction:
         return _fields_of(self)
 
 
-def _fields_of(value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate) -> dict[str, object]:
+def _fields_of(
+    value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate | TargetReport,
+) -> dict[str, object]:
     return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
 
 
@@ -189,7 +241,7 @@ def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of v
             return None
         case tuple():
             return [_plain(each) for each in value]
-        case Ensemble() | FoundMotion() | Share() | EscapeRate():
+        case Ensemble() | FoundMotion() | Share() | EscapeRate() | TargetReport():
             return _fields_of(value)
         case _:
             return value

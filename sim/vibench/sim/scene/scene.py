@@ -88,6 +88,29 @@ class AutomaticDuration:
 
 
 @dataclass(frozen=True)
+class Target:
+    """What an answer is to reach: an error, within a time. One of the two is enough."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    error: float | None = None
+    """Relative, of each response; absent: as small as the time allows."""
+    time_s: float | None = None
+    """From the request to the last answer [s]; absent: a minute at most."""
+
+    def __post_init__(self) -> None:
+        if self.error is None and self.time_s is None:
+            msg = "A target without error and time is not allowed: give one of them, or both."
+            raise ValueError(msg)
+        if self.error is not None and not 0.0 < self.error <= 1.0:
+            msg = f"Error {self.error} is not allowed: it must be above 0 and at most 1, which is 100 %."
+            raise ValueError(msg)
+        if self.time_s is not None and not 0.0 < self.time_s < math.inf:
+            msg = f"Time {self.time_s} s is not allowed: it must be positive and finite."
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
 class Rest:
     """Begin with nothing moving."""
 
@@ -140,6 +163,8 @@ class Scene:
     """Processor time for what one run cannot tell: whether chaos lasts, and what other starts come to where
     the start is forgotten. Counted as on the machine of docs/accuracy.md, so that the answer is the same on
     every other. Zero looks for neither."""
+    target: Target | None = None
+    """Error and time of the answer; accuracy, duration and budget follow from it, and are not given then."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:
@@ -147,6 +172,8 @@ class Scene:
             raise ValueError(msg)
         object.__setattr__(self, "accuracy", chosen(Accuracy, self.accuracy))
         object.__setattr__(self, "observe", tuple(chosen(Observable, each) for each in self.observe))
+        if self.target is not None:
+            self._follow_target()
         if not self.observe:
             msg = f"A scene in which nothing is observed is not allowed: give one of {', '.join(Observable)}."
             raise ValueError(msg)
@@ -165,4 +192,23 @@ class Scene:
                 f"Window {self.duration.window_s} s is not allowed at {self.drive.frequency_hz} Hz: "
                 f"it must hold one drive period, {1.0 / self.drive.frequency_hz} s."
             )
+            raise ValueError(msg)
+
+    def _follow_target(self) -> None:
+        """Leave the duration to the target; refuse what would contradict it."""
+        if self.duration == FixedDuration():
+            window_s = max(PAPER_WINDOW_S, 1.0 / self.drive.frequency_hz)
+            object.__setattr__(self, "duration", AutomaticDuration(window_s))
+        given = {
+            "accuracy": self.accuracy is not Accuracy.STANDARD,
+            "duration": not isinstance(self.duration, AutomaticDuration),
+            "budget": self.budget_s != BUDGET_S,
+        }
+        for name, is_given in given.items():
+            if is_given:
+                msg = f"A target and its own {name} are not allowed together: leave out one of the two."
+                raise ValueError(msg)
+        observed = [each for each in self.observe if each not in (Observable.RESPONSE, Observable.SCATTER)]
+        if observed:
+            msg = f"A target is not allowed with {observed[0]}: ask for {observed[0]} without it."
             raise ValueError(msg)

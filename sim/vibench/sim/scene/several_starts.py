@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.run import Watch
+from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Floats, Y, Z
@@ -62,9 +63,11 @@ class ReachedMotion:
     """Of a small change, as long as one was carried along: over no time, where it repeats."""
 
 
-def pushes(specimen: Specimen, frequency_hz: float, count: int, seed: int) -> Floats:
-    """Draw small changes of a start, shape (count, 6)."""
-    scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
+def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:
+    """Draw small changes of a start, shape (count, 6); over the amplitude where the gap is no length."""
+    gap_m = min(specimen.gaps_m)
+    length_m = gap_m if 0.0 < gap_m < math.inf else drive.amplitude_m
+    scale = PUSH * length_m * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 6)) * scale
 
 
@@ -82,7 +85,7 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
     size_m = max(float(farthest_m), LEAST_SIZE * gap_m)
-    twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1, SEED)[0])
+    twin = begin.pushed(pushes(begin.specimen, begin.drive, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
         pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
@@ -142,7 +145,7 @@ class SeveralStarts:
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
         # In the first round; in each one after it, twice as far.
         self._first_s = min(first_s, self._last_s)
-        changes = pushes(begin.specimen, begin.drive.frequency_hz, draw.most - 1, draw.seed)
+        changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]
         self._under_way: list[StatesAlone] = []
         self._reached = [asked]

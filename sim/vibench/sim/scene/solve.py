@@ -93,9 +93,13 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
     """
     question = chosen(Question, question)
+    if scene.target is not None:
+        from .refinement import refined  # noqa: PLC0415 - most scenes have no target
+
+        return refined(scene)
     method, motion = _planned(scene)
     if method is Method.CLOSED_FORM:
-        return _in_closed_form(scene, motion, question)
+        return in_closed_form(scene, motion, question)
     begun = _Begun(scene, method, motion, question)
     way = begun.course.way
     if way is not None:
@@ -167,7 +171,7 @@ def _solved_together(scenes: Sequence[Scene], question: Question) -> list[Solved
         with _counted(taken_s, [place]):
             method, motion = _planned(scene)
             if method is Method.CLOSED_FORM:
-                answers[place] = _in_closed_form(scene, motion, question)
+                answers[place] = in_closed_form(scene, motion, question)
             else:
                 begun[place] = _Begun(scene, method, motion, question)
     ways = {place: each.course.way for place, each in begun.items() if each.course.way is not None}
@@ -249,7 +253,7 @@ def _planned(scene: Scene) -> tuple[Method, LinearMotion]:
     return plan_of(scene, motion).method, motion
 
 
-def _in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
+def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
     """Return the steady motion without contact."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None

@@ -41,7 +41,7 @@ ROUNDING = 1e-11
 ROUNDED = 1e-13
 """How far away a compared run starts, over the drive's amplitude: some times what roundings come to over a
 run, since the difference that it makes is one draw of many."""
-_SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """y and z alike: stops may leave p no room."""
 SLOWEST_RATIO = 0.9
 """A difference that shrinks less than this from one look to the next is taken to shrink by this."""
@@ -172,7 +172,7 @@ def _more_starts(
     The stricter run is one of them: what the steps have changed before starts come apart is common to all
     others.
     """
-    pushed = pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED)
+    pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
     found = [strict.responses_m] if strict.responses_m is not None else []
     if not found:
@@ -232,7 +232,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
     motion in which roundings grow would pass for exact.
     """
     loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
-    strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * _SIDES * _places_and_speeds(scene))
+    strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
     begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
     while strict.time_s < begin_s:
         until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))

@@ -64,6 +64,9 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     content = _scenes.dump_python(scene, mode="python")
     # A name changes no motion.
     content["start"].pop("name", None)
+    if content["target"] is None:
+        # Files from before there were targets know their scenes.
+        del content["target"]
     if continued:
         content["start"] = {"continues": continued}
         del content["drive"]["phase_rad"]

@@ -20,7 +20,7 @@ from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.frozen_model import FrozenModel
 from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
-from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
+from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene, Target
 from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
@@ -144,6 +144,35 @@ def _ascending(values: Numbers) -> Numbers:
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
+
+_PER = {"%": 0.01, "min": 60.0, "h": 3600.0, "ms": 1e-3, "s": 1.0}
+"""Units of an error and of a time, longest word first where one ends another."""
+
+
+def _with_unit(*units: str) -> BeforeValidator:
+    """Read a number, or a text of a number with one of these units."""
+
+    def read(given: object) -> object:
+        if not isinstance(given, str):
+            return given
+        for unit in units:
+            number = given.strip().removesuffix(unit)
+            if number != given.strip():
+                break
+        else:
+            unit, number = "", given
+        try:
+            return float(number) * _PER.get(unit, 1.0)
+        except ValueError as error:
+            raise ValueError(f"give a number, or one with {' or '.join(units)}") from error
+
+    return BeforeValidator(read, json_schema_input_type=float | str)
+
+
+TargetError = Annotated[float, Field(gt=0.0, le=1.0), _with_unit("%")]
+"""Relative: 0.01, or "1 %"."""
+TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), _with_unit("ms", "min", "h", "s")]
+"""In seconds, or "200 ms", "2 s", "5 min"."""
 StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""
 
@@ -204,6 +233,19 @@ class Study(GridPlan):
     """Length of the end of the run that is observed."""
     budget_s: NonNegativeFloat = BUDGET_S
     """Processor time a point for other starts, where the start is forgotten, and for following chaos on."""
+    error: TargetError | None = None
+    """Relative error that each point is to reach, 0.01 or "1 %"; accuracy, duration and budget follow."""
+    time_s: TargetTime | None = None
+    """Time in which each point is answered as exactly as possible, 2 or "2 s"; a minute when absent."""
+
+    @model_validator(mode="after")
+    def _target_stands_alone(self) -> Self:
+        if self.target is None:
+            return self
+        for name in ("accuracy", "duration_s", "budget_s"):
+            if getattr(self, name) != type(self).model_fields[name].default:
+                raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
+        return self
 
     @model_validator(mode="after")
     def _labels_differ(self) -> Self:
@@ -272,12 +314,18 @@ class Study(GridPlan):
             duration=self.duration,
             start=start,
             budget_s=self.budget_s,
+            target=self.target,
         )
+
+    @property
+    def target(self) -> Target | None:
+        """Of every point; None where neither an error nor a time was given."""
+        return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @property
     def duration(self) -> FixedDuration | AutomaticDuration:
         """Of every point."""
-        match self.duration_s:
+        match "auto" if self.target is not None else self.duration_s:
             case "auto":
                 return AutomaticDuration(window_s=self.window_s)
             case float(duration_s):
@@ -312,7 +360,7 @@ def study_solver(study: Study) -> Solver:
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
     motions = starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
-    pays = not is_chained and batches_are_worth_it(motions, study.duration)
+    pays = study.target is None and not is_chained and batches_are_worth_it(motions, study.duration)
     return InBatches() if pays else solve_scene
 
 

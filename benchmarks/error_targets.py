@@ -1,0 +1,246 @@
+"""How honest and how cheap answers to a requested error are, on random scenes of all contact laws.
+
+``python benchmarks/error_targets.py --seed S --count 200 [--shard 1/4] --save FILE``. Each scene is asked for
+five errors. Its truth is taken from *reference*: of a periodic motion after a long run; of one start in a
+named window, the same window; of forgotten starts, the mean over others in the same window. Truths that are
+not a hundred times better than the stated error are allowed their own error on top of it. A file that is
+there is continued; ``--sum FILES`` adds up several.
+"""
+
+import argparse
+import json
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+from vibench.sim import (
+    Accuracy,
+    FixedDuration,
+    Given,
+    Harmonic,
+    MotionKind,
+    Scene,
+    StartMemory,
+    Target,
+    gong2025,
+    solve_scene,
+)
+from vibench.sim.scene.several_starts import pushes
+
+LAWS = (
+    "hertz",
+    "hertz",
+    "linear_gap",
+    "power:3",
+    "power:5",
+    "power:7",
+    "power:3+5+7",
+    "power:47",
+    "rigid:0.5",
+    "rigid:0.9",
+    "hunt_crossley:0.3",
+    "linear",
+)
+ERRORS = (0.1, 0.01, 1e-3, 1e-4, 1e-6)
+UNDAMPED, UNEVEN = 0.05, 0.2
+"""Parts of the scenes."""
+TRUE_STARTS, FEWEST_TRUE = 400, 40
+TRUE_S = 3.0
+"""Processor time for the truth of one forgotten scene and window [s]."""
+LONG_S = 60.0
+"""After which a damped motion of these scenes has settled."""
+SHORT, SMALL = 0.1, 1e-3
+"""Share of the time that is given to errors up to this: no mean over starts reaches them."""
+NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
+
+
+def drawn_scene(seed, index):
+    """Draw scene ``index``: the same for every shard."""
+    rng = np.random.default_rng([seed, index])
+    law = str(rng.choice(LAWS))
+    damping_s = 0.0 if rng.random() < UNDAMPED else float(rng.uniform(2e-6, 5e-5))
+    gaps = tuple(float(math.exp(rng.uniform(math.log(5e-6), math.log(1e-4)))) for _ in range(2))
+    is_uneven = rng.random() < UNEVEN and not law.startswith(("power", "linear:"))
+    drive = Harmonic(float(rng.uniform(20.0, 700.0)), float(10.0 ** rng.uniform(-6.7, -3.7)))
+    return law, Scene(gong2025(damping_s, gaps if is_uneven else gaps[0], law), drive)
+
+
+def responses(found):
+    """Return the four responses, shape (4,)."""
+    return np.array([getattr(found, name) for name in NAMES], dtype=np.float64)
+
+
+def stated(found):
+    """Return their four errors, shape (4,)."""
+    errors = [getattr(found, f"{name}_error") for name in NAMES]
+    return np.array([math.inf if each is None else each for each in errors])
+
+
+def truth_of(scene, found):
+    """Return what *reference* answers to the same question, and its own error, shape (4,) each."""
+    named = FixedDuration(found.duration_s, found.window_s)
+    if found.memory is not StartMemory.LOST:
+        if found.motion is MotionKind.PERIODIC:
+            named = FixedDuration(LONG_S, max(1.0, found.period / scene.drive.frequency_hz))
+        reference = Scene(
+            scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=named, budget_s=0.0
+        )
+        true = solve_scene(reference)
+        return responses(true), stated(true), true
+    drawn = []
+    began = time.process_time()
+    starts = pushes(scene.specimen, scene.drive, TRUE_STARTS, 99)
+    for push in starts:
+        if len(drawn) >= FEWEST_TRUE and time.process_time() - began > TRUE_S:
+            break
+        start = Given(tuple(float(each) for each in push))
+        # In chaos no accuracy changes a mean: the quick level gives ten times as many starts.
+        asked = Scene(scene.specimen, scene.drive, accuracy=Accuracy.QUICK, duration=named, start=start)
+        true = solve_scene(asked, "motion")
+        if true.response_i is not None:
+            drawn.append(responses(true))
+    values = np.array(drawn)
+    mean = values.mean(axis=0)
+    return mean, 1.96 * values.std(axis=0, ddof=1) / math.sqrt(len(drawn)) / mean, None
+
+
+def judged(scene, time_s):
+    """Answer a scene for every error and for the 30 s default; returns plain values."""
+    began = time.process_time()
+    default = solve_scene(scene)
+    row = {"default_s": time.process_time() - began, "default_error": default.error_estimate, "targets": []}
+    known = {}
+    for error in ERRORS:
+        given_s = time_s * (SHORT if error <= SMALL else 1.0)
+        asked = Scene(scene.specimen, scene.drive, target=Target(error, given_s))
+        began = time.process_time()
+        try:
+            found = solve_scene(asked)
+        except ValueError as refusal:
+            row["targets"].append({"error": error, "refusal": str(refusal)})
+            continue
+        taken_s = time.process_time() - began
+        kind = (
+            "forgotten"
+            if found.memory is StartMemory.LOST
+            else "periodic"
+            if found.motion is MotionKind.PERIODIC
+            else "named window"
+        )
+        if found.response_i is None:
+            row["targets"].append({"error": error, "refusal": found.ended})
+            continue
+        # Truths of one motion or window serve every error.
+        key = (kind, found.duration_s, found.window_s) if kind != "periodic" else kind
+        if key not in known:
+            known[key] = truth_of(scene, found)
+        true, own, reference = known[key]
+        off = np.abs(responses(found) / true - 1.0)
+        row["targets"].append(
+            {
+                "error": error,
+                "kind": kind,
+                "stated": float(stated(found).max()),
+                "is_met": found.target.is_met,
+                "taken_s": taken_s,
+                "time_s": found.target.time_s,
+                "starts": found.target.starts,
+                "needed_s": found.target.needed_s,
+                "covered": [bool(each) for each in off <= stated(found) + own],
+                "times": float(np.max(off / (stated(found) + own))),
+                "own": float(np.max(own)),
+                "true_motion": None if reference is None else str(reference.motion),
+                "ended": found.ended,
+            }
+        )
+    return row
+
+
+def told(rows):
+    """Print what a campaign found."""
+    every = [(row, each) for row in rows for each in row["targets"]]
+    answered = [(row, each) for row, each in every if "kind" in each]
+    print(f"{len(rows)} scenes, {len(every) - len(answered)} targets refused in a sentence")
+    print(
+        f"{'kind':13} {'error':>7} {'scenes':>6} {'covered':>8} {'all four':>8} {'met':>6} {'median CPU':>11}"
+    )
+    for kind in ("periodic", "named window", "forgotten"):
+        for error in (*ERRORS, None):
+            group = [each for _, each in answered if each["kind"] == kind and error in (each["error"], None)]
+            if not group:
+                continue
+            covered = np.mean([np.mean(each["covered"]) for each in group])
+            whole = np.mean([all(each["covered"]) for each in group])
+            met = np.mean([each["is_met"] for each in group])
+            cost_s = np.median([each["taken_s"] for each in group])
+            print(
+                f"{kind:13} {error or 'all':>7} {len(group):6} {covered:8.1%} {whole:8.1%} {met:6.1%}"
+                f" {cost_s:9.4f} s"
+            )
+    pairs = [(row, each) for row, each in answered if each["error"] == ERRORS[1]]
+    ratios = [row["default_s"] / each["taken_s"] for row, each in pairs]
+    median_s = np.median([each["taken_s"] for _, each in pairs])
+    default_s = np.median([row["default_s"] for row, _ in pairs])
+    print(
+        f"to 1 %: median {median_s:.4f} s; 30 s default {default_s:.4f} s: {default_s / median_s:.1f} times;"
+        f" median ratio {np.median(ratios):.1f};"
+        f" in all {sum(row['default_s'] for row, _ in pairs):.1f} s over"
+        f" {sum(each['taken_s'] for _, each in pairs):.1f} s"
+    )
+    costs = [
+        {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == "periodic"}
+        for row in rows
+    ]
+    costs = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
+    print(
+        f"periodic: 1e-6 over 1e-2: median {np.median(costs):.2f}, 95 % below {np.quantile(costs, 0.95):.2f}"
+    )
+    late = [each["time_s"] for _, each in answered]
+    print(f"longest answer {max(late):.2f} s")
+    for row, each in answered:
+        if each["times"] > 3.0:
+            print(
+                f"off by {each['times']:.3g}: scene {row['scene']} {row['law']} {each['kind']}"
+                f" {each['error']} stated {each['stated']:.2g} true motion {each['true_motion']}"
+                f" {each['ended']}"
+            )
+
+
+def main():
+    """Draw, answer, compare, count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--shard", default="1/1", help="i/n: every nth scene, from the ith")
+    parser.add_argument("--time", type=float, default=10.0, help="requested with every error [s]")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="end after this long")
+    parser.add_argument("--only", type=int, help="one scene")
+    parser.add_argument("--save", type=Path, help="file of JSON lines; it is gone on with")
+    parser.add_argument("--sum", type=Path, nargs="+", help="add up such files, and compute nothing")
+    given = parser.parse_args()
+    if given.sum:
+        told([json.loads(line) for path in given.sum for line in path.read_text().splitlines()])
+        return
+    shard, shards = (int(part) for part in given.shard.split("/"))
+    indices = range(shard - 1, given.count, shards) if given.only is None else [given.only]
+    is_there = given.save is not None and given.save.exists()
+    rows = [json.loads(line) for line in given.save.read_text().splitlines()] if is_there else []
+    done = {row["scene"] for row in rows}
+    end_s = time.monotonic() + 60.0 * given.minutes
+    for index in indices:
+        if index in done or time.monotonic() > end_s:
+            continue
+        law, scene = drawn_scene(given.seed, index)
+        rows.append({"scene": index, "law": law, **judged(scene, given.time)})
+        if given.save is not None:
+            with given.save.open("a") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+        if given.only is not None:
+            print(json.dumps(rows[-1], indent=1))
+    told(rows)
+
+
+if __name__ == "__main__":
+    main()

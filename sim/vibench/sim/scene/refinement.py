@@ -1,0 +1,527 @@
+"""A scene answered to a target: as exactly, or within the time, that was requested. SI units.
+
+Each answer says how far it may be off; better ones follow until the target is met. In order of cost: a closed
+form; a periodic motion, found by Newton's iteration as soon as the motion from the start is seen to approach
+it; the motion in a named window, checked by a stricter run; the mean over starts in a named window, where the
+start is forgotten.
+"""
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..engine.run import Watch
+from ..model.accuracy import Accuracy
+from ..model.modes import modal_form
+from ..model.outcome import Outcome
+from ..model.state import Floats
+from .followed_run import (
+    FollowedRun,
+    ObservedWindow,
+    Stretch,
+    follow_strobed,
+    states_of,
+    whole_periods,
+    window_of,
+)
+from .plan import LinearMotion, linear_motion, never_touches, plan_of
+from .prediction import Method, MotionKind, ScenePrediction, StartMemory, State, TargetReport
+from .repetition import MOST_PERIODS, Pace, pace_of
+from .scatter import COVERED
+from .scene import PAPER_DURATION_S, Scene, Target
+from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
+from .shares import student_quantile, wilson_share
+from .solve import Question, in_closed_form
+from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
+
+LONGEST_S = 60.0
+"""Time after which an answer is refined no further, where none was requested [s]."""
+FIRST_S, GRACE_S = 0.1, 0.15
+"""When the first answer is due, and how much later than the requested time the last one may begin [s]."""
+PART_S = 4e-3
+"""Nominal cost of what is followed between two looks at the clock [s]."""
+FIRST_CYCLES = 1e4
+"""Cycles of the fastest mode that are followed before the first look, at most."""
+CLOSE = 3e-3
+"""Change from one of its periods to the next, over its size, at which Newton's iteration is tried."""
+RETURNED = 1e-10
+"""A motion is periodic when it comes back this close, over its size."""
+ITERATIONS = 8
+LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
+"""The motion from the start is looked at after this long, so many drive periods, or this share of the way."""
+LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
+SAME = 1e-3
+"""Relative scatter up to which all starts came to one motion that repeats."""
+OTHER_DIFFERS = 0.5
+"""Relative difference of a motion that no start has come to yet."""
+FEWEST_STARTS, MOST_STARTS = 8, 1_000_000
+MOST_FREEDOM = 200
+"""Degrees of freedom beyond which Student's quantile hardly changes."""
+NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
+"""Cost of Newton's iteration over that of following the period once, and the share of the time it may use."""
+
+
+class _Clock:
+    """How much of the requested time has passed."""
+
+    def __init__(self, target: Target) -> None:
+        self._began_s = time.monotonic()
+        self.limit_s = LONGEST_S if target.time_s is None else target.time_s
+
+    @property
+    def taken_s(self) -> float:
+        return time.monotonic() - self._began_s
+
+    @property
+    def is_over(self) -> bool:
+        return self.taken_s > self.limit_s
+
+
+@dataclass(frozen=True, eq=False)
+class _Orbit:
+    """A stable periodic motion."""
+
+    period: int
+    run: FollowedRun
+    """On it."""
+    responses_m: Floats
+    """Shape (4,)."""
+    errors: Floats
+    """Of them, relative."""
+    impacts: int
+
+
+def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
+    """Give answers to a scene with a target, each better than the one before; the last one is the best.
+
+    Raises
+    ------
+    ValueError
+        When the scene has no target, the specimen cannot be followed in time, or not even one drive period
+        could be followed in the requested time.
+
+    """
+    if scene.target is None:
+        msg = "A scene without a target cannot be refined: give it Target(error=...) or Target(time_s=...)."
+        raise ValueError(msg)
+    clock = _Clock(scene.target)
+    motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
+    if plan_of(scene, motion).method is Method.CLOSED_FORM:
+        found = in_closed_form(scene, motion, Question.ANSWER)
+        yield _reported(found, scene.target, clock, 1, None)
+        return
+    yield from _Refinement(scene, motion, clock).answers()
+
+
+def refined(scene: Scene) -> ScenePrediction:
+    """Return the last of the answers of `refine_scene`."""
+    *_, last = refine_scene(scene)
+    return last
+
+
+class _Refinement:
+    """A scene whose motion is followed in time."""
+
+    def __init__(self, scene: Scene, motion: LinearMotion, clock: _Clock) -> None:
+        assert scene.target is not None
+        self._scene, self._target, self._motion, self._clock = scene, scene.target, motion, clock
+        self._method = plan_of(scene, motion).method
+        self._frequency_hz = frequency_hz = scene.drive.frequency_hz
+        longest_s = scene.duration.longest_s
+        self._pace: Pace = pace_of(
+            scene.specimen, frequency_hz, Accuracy.QUICK, motion.slowest_rate, longest_s
+        )
+        fastest = float(np.abs(modal_form(scene.specimen).rates).max(initial=0.0))
+        self._part_s = min(1.0 / frequency_hz, FIRST_CYCLES / max(fastest, frequency_hz))
+        self._begin = FollowedRun(scene.specimen, scene.drive, LOOSE, scene.start.state)
+        self._pushes = pushes(scene.specimen, scene.drive, 1, SEED)
+        self._main, self._twin = self._begin.apart(), self._begin.apart(TIGHT).pushed(self._pushes[0])
+        self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
+        self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
+        self._due_s = min(FIRST_S, clock.limit_s)
+        self._orbit: _Orbit | None = None
+        self._closest = CLOSE
+        self._size_m = 0.0
+        self._has_answered = False
+
+    def answers(self) -> Iterator[ScenePrediction]:
+        """Follow the motion from its start, and go on by what it turns out to be."""
+        for found in self._all():
+            self._has_answered = True
+            yield found
+        if not self._has_answered:
+            msg = (
+                f"A time of {self._clock.limit_s:g} s is not allowed for this scene: one drive period of "
+                f"{1.0 / self._frequency_hz:g} s takes longer to follow; give more time."
+            )
+            raise ValueError(msg)
+
+    def _all(self) -> Iterator[ScenePrediction]:
+        settle_s = self._settle_s
+        recent = np.empty((0, 6))
+        kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
+        while self._main.time_s < settle_s:
+            made = round(self._main.time_s * self._frequency_hz)
+            look = max(LOOK_S * self._frequency_hz, LOOK_PERIODS, LOOK_SHARE * made)
+            look_s = (made + math.ceil(look)) / self._frequency_hz
+            ours, other = self._followed(self._main, look_s), self._followed(self._twin, look_s)
+            if self._is_lost:
+                yield self._lost()
+                return
+            if ours is None or other is None:
+                yield from self._interim()
+                return
+            if self._have_parted(ours, other):
+                yield from self._many_starts()
+                return
+            recent = np.concatenate([recent, states_of(ours)])[-kept:]
+            if self._approaches(recent):
+                yield self._on_orbit()
+                return
+            if self._clock.taken_s > self._due_s and not self._has_answered:
+                yield from self._interim()
+        yield from self._one_start()
+
+    @property
+    def _settle_s(self) -> float:
+        """How long a motion is followed that does not repeat."""
+        longest_s = self._scene.duration.longest_s
+        if self._motion.slowest_rate >= 0.0:
+            longest_s = min(longest_s, PAPER_DURATION_S)
+        window_s = self._window_periods / self._frequency_hz
+        return max(1.0 / self._frequency_hz, min(self._pace.settling_s, longest_s - window_s))
+
+    @property
+    def _is_lost(self) -> bool:
+        return self._main.outcome is not Outcome.REACHED_END
+
+    def _followed(
+        self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
+    ) -> list[Stretch] | None:
+        """Follow a motion in short parts; None where time has run out, or the motion was lost."""
+        parts: list[Stretch] = []
+        grace_s = 0.0 if self._has_answered else GRACE_S
+        while run.time_s < until_s:
+            if self._clock.taken_s > self._clock.limit_s + grace_s:
+                return None
+            spent_s = run.cost_s
+            parts.append(follow_strobed(run, min(until_s, run.time_s + self._part_s), watch))
+            if run.outcome is not Outcome.REACHED_END:
+                return None
+            spent_s = max(run.cost_s - spent_s, 1e-9)
+            self._part_s *= min(4.0, PART_S / spent_s)
+        return parts
+
+    def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
+        """Observe so many drive periods of a motion; None where time has run out."""
+        begins = run.apart()
+        made = round(run.time_s * self._frequency_hz)
+        parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
+        return None if parts is None else window_of(begins, parts)
+
+    def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
+        """Whether another start has come far from this motion."""
+        mine, theirs = states_of(ours)[:, :3], states_of(other)[:, :3]
+        self._size_m = max(self._size_m, float(np.abs(mine).max(initial=0.0)))
+        gap_m = min(self._scene.specimen.gaps_m)
+        size_m = max(self._size_m, LEAST_SIZE * gap_m if math.isfinite(gap_m) else 0.0)
+        return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
+
+    def _approaches(self, recent: Floats) -> bool:
+        """Whether the motion is seen to approach a stable periodic motion, which is then kept."""
+        if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
+            return False
+        points = recent / self._scales
+        points = points / float(np.abs(points).max(initial=1e-300))
+        changes = np.abs(points[-MOST_PERIODS - 1 : -1] - points[-1]).max(axis=1)[::-1]
+        near = np.flatnonzero(changes < self._closest)
+        if len(near) > 0:
+            period = int(near[0]) + 1
+            self._closest = 0.3 * float(changes[near[0]])
+            self._orbit = self._newton(period) or self._orbit
+        if self._orbit is None:
+            return False
+        lag = self._orbit.period * math.ceil(self._pace.forgetting_periods / self._orbit.period)
+        if len(recent) <= lag:
+            return False
+        place, size = self._orbit.run.state, np.abs(recent / self._scales).max(initial=1e-300)
+        now, before = (
+            float(np.abs((recent[index] - place) / self._scales).max()) / size for index in (-1, -1 - lag)
+        )
+        return bool(now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE))
+
+    def _newton(self, period: int) -> _Orbit | None:
+        """Find the stable motion of so many drive periods near where the motion is now."""
+        cost_s = NEWTON_COST * self._main.cost_s / self._main.time_s * period / self._frequency_hz
+        if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
+            return None
+        run, scales = self._main.apart(TIGHT), self._scales
+        size = float(np.abs(run.state / scales).max(initial=1e-300))
+        gone = math.inf
+        try:
+            for _ in range(ITERATIONS):
+                image, slope = run.image(period)
+                off = (image - run.state) / scales
+                if not np.all(np.isfinite(slope)) or not np.abs(off).max() < gone:
+                    return None
+                gone = float(np.abs(off).max())
+                scaled = slope * scales / scales[:, None]
+                away = np.linalg.inv(np.eye(6) - scaled)
+                if gone < RETURNED * size:
+                    break
+                run = run.pushed(away @ off * scales)
+            if gone > RETURNED * size or np.abs(np.linalg.eigvals(scaled)).max() >= 1.0:
+                return None
+            strict = run.apart(TIGHTEST)
+            off = (strict.image(period)[0] - strict.state) / scales
+            strict = strict.pushed(away @ off * scales)
+            windows = [self._observed(each.apart(), period) for each in (run, strict)]
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+        if windows[0] is None or windows[1] is None:
+            return None
+        first, second = windows[0].responses_m, windows[1].responses_m
+        rounding = ROUNDING * np.repeat(second[::2], 2) / second
+        # What roundings of the state at the end of a period may come to, through the inverse of the map.
+        rounding = rounding * max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
+        return _Orbit(
+            period, strict, second, SAFETY * np.abs(first - second) / second + rounding, windows[1].impacts
+        )
+
+    def _on_orbit(self) -> ScenePrediction:
+        orbit = self._orbit
+        assert orbit is not None
+        period_s = orbit.period / self._frequency_hz
+        found = replace(
+            self._prediction(orbit.responses_m, orbit.errors, self._main.time_s, period_s, orbit.impacts),
+            motion=MotionKind.PERIODIC,
+            period=orbit.period,
+            settled_s=self._main.time_s,
+            ended=f"it repeats after {orbit.period} drive period(s)",
+            final_state=_state(orbit.run.state),
+            memory=StartMemory.KEPT,
+        )
+        return _reported(found, self._target, self._clock, 1, None)
+
+    def _interim(self) -> Iterator[ScenePrediction]:
+        """Answer for a window that begins now, from both motions."""
+        run, twin = self._main.apart(), self._twin.apart()
+        late = max(run.time_s, twin.time_s)
+        late_s = math.ceil(late * self._frequency_hz * (1.0 - 1e-12)) / self._frequency_hz
+        if self._followed(run, late_s) is None or self._followed(twin, late_s) is None:
+            return
+        periods = min(self._window_periods, max(1, round(late_s * self._frequency_hz) // 8))
+        windows = [self._observed(each, periods) for each in (run, twin)]
+        if windows[0] is None or windows[1] is None:
+            return
+        yield self._in_window(windows[0], windows[1], run)
+
+    def _in_window(
+        self,
+        window: ObservedWindow,
+        other: ObservedWindow,
+        run: FollowedRun,
+    ) -> ScenePrediction:
+        """Answer for the motion of one start in a named window, by that of a stricter run."""
+        answer = window.responses_m
+        off = np.abs(answer - other.responses_m) / answer
+        is_parted = not float(off.max()) < PARTED
+        times = 0.5 * student_quantile(1, COVERED) if is_parted else SAFETY
+        errors = times * off + ROUNDING * np.repeat(answer[::2], 2) / answer
+        found = self._prediction(answer, errors, run.time_s, window.length_s, window.impacts)
+        found = replace(
+            found,
+            ended=f"observed from {run.time_s - window.length_s:.4g} to {run.time_s:.4g} s",
+            final_state=_state(run.state),
+            memory=StartMemory.UNKNOWN if is_parted else StartMemory.KEPT,
+            integration_error=float(off.max()),
+        )
+        return _reported(found, self._target, self._clock, 1, None)
+
+    def _one_start(self) -> Iterator[ScenePrediction]:
+        """Answer for a motion that keeps its start but does not repeat, in a named window."""
+        main, twin, periods = self._main, self._twin, self._window_periods
+        for tolerance in (None, TIGHTEST):
+            if tolerance is not None:
+                until_s = main.time_s - periods / self._frequency_hz
+                main = self._begin.apart(TIGHT)
+                rounded = ROUNDED * self._scene.drive.amplitude_m * SIDES * self._scales
+                twin = self._begin.apart(TIGHTEST).pushed(rounded)
+                if self._followed(main, until_s) is None or self._followed(twin, until_s) is None:
+                    return
+            windows = [self._observed(each, periods) for each in (main, twin)]
+            if windows[0] is None or windows[1] is None:
+                if not self._has_answered:
+                    yield from self._interim()
+                return
+            if self._have_parted(windows[0].stretches, windows[1].stretches):
+                self._main, self._twin = main, twin
+                yield from self._many_starts()
+                return
+            found = self._in_window(windows[0], windows[1], main)
+            yield found
+            if found.target is not None and found.target.is_met and self._target.error is not None:
+                return
+
+    def _many_starts(self) -> Iterator[ScenePrediction]:
+        """Answer for the mean over starts that nobody can tell apart, in a named window."""
+        lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
+        begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
+        each_s = begins_s + self._window_periods / self._frequency_hz
+        if self._clock.taken_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
+            yield from self._interim()
+        first = self._observed_start(0, begins_s)
+        if first is None:
+            yield from [self._lost()] if self._is_lost else []
+            return
+        seen = [first.responses_m]
+        wanted = 2
+        while len(seen) < MOST_STARTS:
+            window = self._observed_start(len(seen), begins_s)
+            if window is not None:
+                seen.append(window.responses_m)
+            is_over = window is None or self._clock.is_over
+            is_due = not self._has_answered and self._clock.taken_s > self._due_s
+            if len(seen) == 1:
+                return
+            if not (len(seen) >= wanted or is_due or is_over):
+                continue
+            found = self._mean(seen, first)
+            yield found
+            assert found.target is not None
+            if is_over or (self._target.error is not None and found.target.is_met):
+                return
+            wanted = max(2 * len(seen), FEWEST_STARTS)
+            if self._target.error is not None:
+                wanted = max(min(wanted, self._starts_needed(seen)), len(seen) + 2, FEWEST_STARTS)
+
+    def _observed_start(self, number: int, begins_s: float) -> ObservedWindow | None:
+        """Observe the named window of a start; None where time has run out, or the motion was lost."""
+        if number > len(self._pushes):
+            self._pushes = pushes(self._scene.specimen, self._scene.drive, 2 * number, SEED)
+        run = self._main if number == 0 else self._begin.pushed(self._pushes[number - 1])
+        if self._followed(run, begins_s) is None:
+            return None
+        return self._observed(run, self._window_periods)
+
+    def _starts_needed(self, seen: Sequence[Floats]) -> int:
+        """Estimate how many starts reach the requested error."""
+        assert self._target.error is not None
+        ratio = float(mean_error(seen).max()) / self._target.error
+        power = 1.0 if _is_one_motion(seen) else 2.0
+        return math.ceil(min(1.05 * len(seen) * math.pow(ratio, power), MOST_STARTS))
+
+    def _mean(self, seen: Sequence[Floats], window: ObservedWindow) -> ScenePrediction:
+        """Answer with the mean over the starts so far; ``window`` is that of the first."""
+        run = self._main
+        responses = np.array(seen)
+        mean = responses.mean(axis=0)
+        found = self._prediction(mean, mean_error(seen), run.time_s, window.length_s, window.impacts)
+        repeats = self._pace.repeats(window.stretches) if _is_one_motion(seen) else None
+        begins_s = run.time_s - window.length_s
+        found = replace(
+            found,
+            motion=MotionKind.CHAOTIC_SO_FAR if repeats is None else MotionKind.PERIODIC,
+            period=None if repeats is None else repeats.period,
+            ended=f"mean of {len(seen)} starts, each observed from {begins_s:.4g} to {run.time_s:.4g} s",
+            final_state=_state(run.state),
+            memory=StartMemory.LOST,
+            scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
+        )
+        needed = None
+        if self._target.error is not None:
+            per_start_s = self._clock.taken_s / len(seen)
+            starts = self._starts_needed(seen)
+            # The deviation of n draws is itself known to 1 / sqrt(2 n).
+            off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(seen)))
+            about_s = per_start_s * starts
+            needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
+        return _reported(found, self._target, self._clock, len(seen), needed)
+
+    def _lost(self) -> ScenePrediction:
+        """Say that the motion could not be followed on."""
+        run = self._main
+        found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)
+        found = replace(found, ended=run.outcome.text, outcome=run.outcome)
+        return _reported(found, self._target, self._clock, 0, None)
+
+    def _prediction(
+        self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
+    ) -> ScenePrediction:
+        """Write down responses and their relative errors; what else is known replaces the rest."""
+        amplitude_m = self._scene.drive.amplitude_m
+        response_i, response_ii, relative_i, relative_ii = (
+            None if math.isnan(each) else float(each) / amplitude_m for each in responses_m
+        )
+        found = ScenePrediction(
+            frequency_hz=self._frequency_hz,
+            amplitude_m=amplitude_m,
+            response_i=response_i,
+            response_ii=response_ii,
+            relative_i=relative_i,
+            relative_ii=relative_ii,
+            impacts=impacts,
+            impact_rate_hz=impacts / window_s if window_s > 0.0 else 0.0,
+            motion=MotionKind.UNDECIDED,
+            period=None,
+            duration_s=duration_s,
+            window_s=window_s,
+            settled_s=None,
+            ended="",
+            integration_error=None,
+            scatter=None,
+            lyapunov_per_s=None,
+            lyapunov_error_per_s=None,
+            start=self._scene.start.name,
+            final_state=_state(self._main.state),
+            outcome=Outcome.REACHED_END,
+            method=self._method,
+            accuracy=self._scene.accuracy.value,
+            memory=StartMemory.KEPT if self._never_touches else StartMemory.UNKNOWN,
+        )
+        return with_errors(found, errors)
+
+    @property
+    def _never_touches(self) -> bool:
+        return never_touches(self._scene.specimen, self._motion)
+
+
+def mean_error(seen: Sequence[Floats]) -> Floats:
+    """Return how far the mean over starts may be from that over all starts, relatively, shape (4,).
+
+    Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
+    Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
+    all came to one motion, another may still have the share that Wilson's interval leaves.
+    """
+    responses = np.array(seen)
+    padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
+    mean, count = responses.mean(axis=0), len(seen)
+    times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
+    unseen = OTHER_DIFFERS * wilson_share(0, count).high if _is_one_motion(seen) else 0.0
+    return np.asarray(times * padded.std(axis=0, ddof=1) / mean + unseen + ROUNDING)
+
+
+def _is_one_motion(seen: Sequence[Floats]) -> bool:
+    responses = np.array(seen)
+    return bool(np.all(np.ptp(responses, axis=0) < SAME * responses.mean(axis=0)))
+
+
+def _reported(
+    found: ScenePrediction,
+    target: Target,
+    clock: _Clock,
+    starts: int,
+    needed: tuple[float, float, float] | None,
+) -> ScenePrediction:
+    error = found.error_estimate
+    is_met = error is not None and (target.error is None or error <= target.error)
+    report = TargetReport(target.error, target.time_s, error, clock.taken_s, starts, is_met, needed)
+    return replace(found, target=report)
+
+
+def _state(values: Floats) -> State:
+    x, y, z, vx, vy, vz = (float(value) for value in values)
+    return (x, y, z, vx, vy, vz)

@@ -1,0 +1,150 @@
+"""Answers to a target: the requested error or time, with errors that hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.sim import (
+    Accuracy,
+    AutomaticDuration,
+    FixedDuration,
+    Harmonic,
+    Method,
+    MotionKind,
+    Observable,
+    Scene,
+    StartMemory,
+    Target,
+    gong2025,
+    refine_scene,
+    solve_scene,
+)
+from vibench.sim.scene.refinement import mean_error
+
+LAWS = ("hertz", "linear_gap", "power:3", "power:47", "rigid:0.8", "hunt_crossley:0.5")
+NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
+
+
+def asked(contact="hertz", frequency_hz=130.0, amplitude_m=20e-6, damping_s=2e-5, **target):
+    return Scene(
+        gong2025(damping_s, contact=contact), Harmonic(frequency_hz, amplitude_m), target=Target(**target)
+    )
+
+
+def off(found, truth):
+    """How many stated errors each response is away from the truth."""
+    answers, errors, true = (
+        np.array([getattr(each, f"{name}{end}") for name in NAMES])
+        for each, end in ((found, ""), (found, "_error"), (truth, ""))
+    )
+    own = np.array([getattr(truth, f"{name}_error") for name in NAMES])
+    return np.abs(answers / true - 1.0) / (errors + own)
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_a_periodic_motion_is_within_its_stated_error(contact):
+    scene = asked(contact, 100.0 if contact.startswith("power") else 130.0, 5e-6, error=1e-6)
+    scene = scene if contact.startswith("power") else asked(contact, error=1e-6)
+    found = solve_scene(scene)
+    truth = solve_scene(
+        Scene(scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=FixedDuration(30.0, 1.0))
+    )
+    assert found.motion is truth.motion is MotionKind.PERIODIC
+    assert found.period == truth.period
+    assert found.target.is_met
+    assert found.error_estimate < 1e-8
+    assert np.all(off(found, truth) <= 1.0)
+
+
+def test_a_small_error_costs_a_periodic_motion_no_more_than_a_large_one():
+    rough, fine = (solve_scene(asked(error=error)) for error in (1e-2, 1e-6))
+    assert rough.response_i == fine.response_i
+    assert rough.duration_s == fine.duration_s
+
+
+def test_the_mean_of_forgotten_starts_reaches_one_per_cent():
+    found = solve_scene(asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
+    assert found.memory is StartMemory.LOST
+    assert found.target.is_met
+    assert found.error_estimate <= 0.01
+    assert found.target.starts > 8
+    assert "mean of" in found.ended
+    again = solve_scene(asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
+    assert again.response_ii == found.response_ii
+
+
+def test_better_answers_follow_one_another_until_the_time_is_over():
+    answers = list(refine_scene(asked(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
+    reports = [each.target for each in answers]
+    assert len(answers) > 1
+    assert reports[0].time_s < reports[-1].time_s
+    assert not reports[-1].is_met
+    about_s, low_s, high_s = reports[-1].needed_s
+    assert low_s < about_s < high_s
+    assert "after" in reports[-1].text
+    assert "needs about" in reports[-1].text
+
+
+def test_a_motion_that_never_settles_is_answered_for_a_named_window():
+    scene = asked(frequency_hz=101.0, amplitude_m=1e-6, damping_s=0.0, error=1e-6)
+    found = solve_scene(scene)
+    named = FixedDuration(found.duration_s, found.window_s)
+    truth = solve_scene(Scene(scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=named))
+    assert found.motion is MotionKind.UNDECIDED
+    assert found.target.is_met
+    assert np.all(off(found, truth) <= 1.0)
+
+
+def test_a_motion_without_contact_is_answered_in_closed_form():
+    found = solve_scene(asked(amplitude_m=1e-6, error=0.1))
+    assert found.method is Method.CLOSED_FORM
+    assert found.target.is_met
+
+
+def test_an_error_below_rounding_is_said_not_to_be_reached():
+    report = solve_scene(asked(error=1e-15)).target
+    assert not report.is_met
+    assert report.needed_s is None
+    assert report.text.endswith("is not known")
+
+
+def test_the_time_of_one_drive_period_is_the_shortest():
+    scene = Scene(gong2025(), Harmonic(1e-3, 1e-2), target=Target(time_s=1e-3))
+    with pytest.raises(ValueError, match=r"takes longer to follow; give more time\.$"):
+        solve_scene(scene)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"accuracy": "quick"}, "accuracy"),
+        ({"duration": FixedDuration(10.0, 5.0)}, "duration"),
+        ({"budget_s": 0.0}, "budget"),
+        ({"observe": (Observable.SPECTRUM,)}, "spectrum"),
+    ],
+)
+def test_what_a_target_decides_is_not_given_beside_it(given, named):
+    with pytest.raises(ValueError, match=named):
+        replace(asked(error=0.1), **given)
+
+
+@pytest.mark.parametrize("given", [{}, {"error": 0.0}, {"error": 1.1}, {"time_s": 0.0}, {"time_s": np.inf}])
+def test_a_target_needs_an_error_or_a_time_in_range(given):
+    with pytest.raises(ValueError, match="not allowed"):
+        Target(**given)
+
+
+def test_a_window_may_be_named_beside_a_target():
+    scene = asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.05)
+    found = solve_scene(replace(scene, duration=AutomaticDuration(window_s=1.0)))
+    assert found.window_s == pytest.approx(1.0)
+
+
+def test_the_error_of_a_mean_holds_in_nineteen_cases_of_twenty():
+    random = np.random.default_rng(3)
+    held = [
+        abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values])[0] * values.mean()
+        for values in random.gumbel(1.0 - 0.05 * np.euler_gamma, 0.05, (400, 12))
+    ]
+    assert np.mean(held) > 0.92
