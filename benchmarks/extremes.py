@@ -1,7 +1,7 @@
 """Extremes through the real command: every one is answered in finite numbers, or refused in a sentence.
 
-``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4]``. Each case draws a specimen and a drive
-from the ranges below, writes the specimen as a file, and calls ``vibench predict`` in this process. An
+``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4] [--targets]``. Each case draws a
+specimen and a drive from the ranges below, writes the specimen as a file, and calls ``vibench predict``. An
 answer is good when the exit code is 0 and all four responses and their errors are finite numbers; a refusal,
 when the exit code is 1 and standard error holds one sentence and no traceback. Whatever else happens is
 listed, and ends the script with exit code 1; a case that takes too long ends it at once.
@@ -11,6 +11,7 @@ import argparse
 import faulthandler
 import json
 import math
+import resource
 import sys
 import tempfile
 import time
@@ -24,12 +25,18 @@ import numpy as np
 
 from vibench.cli import main as vibench
 
+ERRORS = ("1e-15", "1e-9", "1e-6", "0.1%", "1%", "10%", "100%")
+TIMES_S = (1e-3, 1e-3, 0.1, 1.0, 3.0)
+"""Requested."""
+LATE, LATE_S = 1.5, 0.2
+"""An answer may take so many times the requested time, or so much longer, whichever is more [s]."""
 AMPLITUDES_M = (1e-300, 1e-120, 1e-100, 1e-30, 1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-2, 1.0)
 FREQUENCIES_HZ = (1e-3, 1.0, 94.6, 130.0, 266.0, 1e3, 1e4, 1e6)
-MASS_FACTORS = (1e-6, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e6)
+MASS_FACTORS = (1e-9, 1e-6, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e6, 1e9)
 STIFFNESSES = (1e3, 1e6, 1e9, 1e12, 1e15)
 GAPS_M = (0.0, 1e-12, 1e-9, 5e-6, 45e-6, 45e-6, 1e-2, 1.0, math.inf)
-DAMPING_TIMES_S = (0.0, 0.0, 1e-9, 2e-5, 1e-2)
+DAMPING_TIMES_S = (0.0, 0.0, 1e-9, 2e-5, 1e-2, 10.0)
+LEVELS = ("quick", "standard", "reference")
 LAWS = ("hertz", "linear", "linear_gap:{:g}", "rigid:0", "rigid:0.5", "rigid:1", "power:3", "power:47")
 MOST_PERIODS = 40
 MASSES_KG = (5.8e-3, 2.1e-3, 2.0e-3)
@@ -40,7 +47,13 @@ LIMIT_S = 300
 NUMBERS = ("response_i", "response_ii", "relative_i", "relative_ii", "error_estimate")
 
 
-def drawn(rng, folder):
+def targets(rng):
+    """Draw a requested error and time, as options."""
+    time = ("--time", f"{rng.choice(TIMES_S):g}s")
+    return (*time, "--error", str(rng.choice(ERRORS))) if rng.random() < 0.8 else time
+
+
+def drawn(rng, folder, is_target):
     """Draw a case: write its specimen, give the words of its command."""
     masses = [mass * float(rng.choice(MASS_FACTORS)) for mass in MASSES_KG]
     stiffness, frequency_hz = float(rng.choice(STIFFNESSES)), float(rng.choice(FREQUENCIES_HZ))
@@ -55,8 +68,12 @@ def drawn(rng, folder):
         *("--model", str(rng.choice(LAWS)).format(stiffness)),
         *("--amplitude", str(rng.choice(AMPLITUDES_M)), "--frequency", f"{frequency_hz:.6g}"),
         *("--gap", str(rng.choice(GAPS_M)), "--damping-time", str(rng.choice(DAMPING_TIMES_S))),
-        *("--duration", repr(periods / frequency_hz), "--window", repr(max(1, periods // 2) / frequency_hz)),
-        *("--accuracy", str(rng.choice(("quick", "standard", "reference")))),
+        *("--window", repr(max(1, periods // 2) / frequency_hz)),
+        *(
+            targets(rng)
+            if is_target
+            else ("--duration", repr(periods / frequency_hz), "--accuracy", str(rng.choice(LEVELS)))
+        ),
     )
 
 
@@ -85,11 +102,22 @@ def complaint(code, out, err):
         return f"a traceback: {code} {err[-300:]}"
     if code == 0:
         (point,) = json.loads(out, parse_constant=lambda word: word)["points"]
+        late_s = lateness_s(point["target"])
+        if late_s > 0.0:
+            return f"later than allowed by {late_s:.2f} s: {point['target']}"
         wrong = [name for name in NUMBERS if not isinstance(point[name], float) or point[name] < 0.0]
         return f"exit code 0 with {', '.join(f'{name} {point[name]}' for name in wrong)}" if wrong else None
     if code != 1 or len(said) != 1:
         return f"exit code {code} and {len(said)} sentences: {err[-300:]}"
     return None
+
+
+def lateness_s(target):
+    """Return how much later than allowed an answer came [s]; zero without a requested time."""
+    if target is None or target["wanted_time_s"] is None:
+        return 0.0
+    wanted_s = target["wanted_time_s"]
+    return max(0.0, target["time_s"] - max(LATE * wanted_s, wanted_s + LATE_S))
 
 
 def main():
@@ -98,6 +126,7 @@ def main():
     parser.add_argument("--seed", type=int, default=2025)
     parser.add_argument("--cases", type=int, default=150)
     parser.add_argument("--shard", default="1/1", help="i/n: every nth case, from the ith")
+    parser.add_argument("--targets", action="store_true", help="ask for errors and times")
     parser.add_argument("--only", type=int, help="one case")
     arguments = parser.parse_args()
     shard, shards = (int(part) for part in arguments.shard.split("/"))
@@ -105,7 +134,7 @@ def main():
     answered, refused, wrong, longest_s = 0, Counter[str](), 0, 0.0
     for case in cases:
         with tempfile.TemporaryDirectory() as folder:
-            words = drawn(np.random.default_rng([arguments.seed, case]), Path(folder))
+            words = drawn(np.random.default_rng([arguments.seed, case]), Path(folder), arguments.targets)
             # Whatever does not come back is the last that is named.
             print(f"case {case}: {' '.join(words)}", file=sys.stderr, flush=True)
             faulthandler.dump_traceback_later(LIMIT_S, exit=True)
@@ -122,7 +151,8 @@ def main():
     for sentence, count in refused.most_common():
         print(f"{count:4} refused: {sentence} ...")
     print(f"{answered} answered, {refused.total()} refused in a sentence, {wrong} wrong")
-    print(f"longest {longest_s:.1f} s")
+    most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"longest {longest_s:.1f} s; most memory {most_mb:.0f} MB")
     sys.exit(wrong > 0)
 
 

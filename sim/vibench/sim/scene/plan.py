@@ -17,7 +17,7 @@ from ..model.state import Complex, Floats, X, Y, Z
 from .followed_run import whole_periods
 from .prediction import Method
 from .repetition import MOST_STATES
-from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
+from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene, Target
 
 if TYPE_CHECKING:
     from .cost import Expected
@@ -199,9 +199,15 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
         raise ValueError(msg)
     sentences = (
         _why_followed(scene.specimen, motion, method),
-        *_carried(scene.observe),
-        _length(scene.duration),
-        *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
+        *(
+            _refined(scene.duration)
+            if scene.target is not None
+            else (
+                *_carried(scene.observe),
+                _length(scene.duration),
+                *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
+            )
+        ),
     )
     longest_s = scene.duration.longest_s
     length_s = longest_s if isinstance(scene.duration, FixedDuration) else min(SETTLING_S, longest_s)
@@ -276,6 +282,16 @@ def _carried(observe: tuple[Observable, ...]) -> list[str]:
     return sentences
 
 
+def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
+    return (
+        "A second start, a millionth of the gap away, is followed beside it at a stricter tolerance.",
+        "A motion that approaches a stable periodic one is completed by Newton's iteration.",
+        f"One that does not is observed over {duration.window_s:g} s, and compared with the second start's.",
+        "Where the two part, the start is forgotten: the answer is the mean over starts in that window.",
+        "Starts are added until the error or the time is reached.",
+    )
+
+
 def _other_starts(budget_s: float) -> str:
     if budget_s == 0.0:
         return "Whether the start decides which motion is reached is not looked for: there is no budget."
@@ -311,9 +327,14 @@ def _kind(scene: Scene, method: Method) -> str:
         (
             *(method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed),
             # Where the start is forgotten other starts take as long as they may.
-            f"{scene.budget_s:.0e} s",
+            f"{scene.budget_s:.0e} s" if scene.target is None else _target_words(scene.target),
         )
     )
+
+
+def _target_words(target: Target) -> str:
+    error = "" if target.error is None else f"{target.error:.0e}"
+    return f"error {error} in {'' if target.time_s is None else f'{target.time_s:.0e}'} s"
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:

@@ -57,7 +57,7 @@ SAME = 1e-3
 """Relative scatter up to which all starts came to one motion that repeats."""
 OTHER_DIFFERS = 0.5
 """Relative difference of a motion that no start has come to yet."""
-FEWEST_STARTS, MOST_STARTS = 8, 1_000_000
+FEWEST_STARTS, MOST_STARTS = 16, 1_000_000
 MOST_FREEDOM = 200
 """Degrees of freedom beyond which Student's quantile hardly changes."""
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
