@@ -69,4 +69,8 @@ from .results.summary import (
     result_summary as result_summary,
 )
 from .signals.window import Window as Window
-from .uncertainty.expected import Expected as Expected, expected_uncertainty as expected_uncertainty
+from .uncertainty.expected import (
+    Expected as Expected,
+    expected_recorded_s as expected_recorded_s,
+    expected_uncertainty as expected_uncertainty,
+)

@@ -22,20 +22,13 @@ from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, Result
 from ..recordings.channels import RecordedChannels, Stretch
 from ..recordings.facts import RecordingFacts, plan_of, recording_facts
-from ..uncertainty.budget import COVERAGE, Budget, Cause
+from ..uncertainty.budget import COVERAGE, RESULT_PATTERNS, Budget, Cause
 from .measurement_analysis import CONTRADICTIONS
 from .summary import budgets_of
 
 PATIENCE_S = 20.0
 """How long the file may take to hold the samples of a look [s]."""
 _PAUSE_S = 0.05
-_QUANTITIES = {
-    "resonance_hz": r"^resonance at .*, frequency$",
-    "transmissibility": r"^transmissibility at ",
-    "response_i": r"\bResponse I\b",
-    "response_ii": r"\bResponse II\b",
-}
-"""Names of budgets, by the result that a plan may name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,23 +55,22 @@ def bounds_of(result: AnyResult) -> dict[str, float | None]:
     None where it is not determined; a result that was not found at all is left out.
     """
     found: dict[str, float | None] = {}
-    for name, pattern in _QUANTITIES.items():
-        bounds = [_bound(each) for each in budgets_of(result) if re.search(pattern, each.quantity)]
+    for name, pattern in RESULT_PATTERNS.items():
+        bounds = [bound_of(each) for each in budgets_of(result) if re.search(pattern, each.quantity)]
         if bounds:
             known = [each for each in bounds if each is not None]
             found[name] = max(known) if len(known) == len(bounds) else None
     return found
 
 
-def _bound(budget: Budget) -> float | None:
+def bound_of(budget: Budget) -> float | None:
+    """Give the relative 95 % bound of one quantity by noise and chance; None where it is not stated."""
     parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
     stated = [each for each in parts if each is not None]
     return COVERAGE * hypot(*stated) if len(stated) == len(parts) else None
 
 
-def look(
-    recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float
-) -> dict[str, float | None]:
+def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
     """Analyse a recording up to a time of one of its stretches.
 
     Raises AnalysisError when nothing in it is usable yet.
@@ -96,7 +88,7 @@ def look(
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)
     channels = _ChannelsSoFar(recording, stretch=stretch, samples_of_it=samples)
-    return bounds_of(Result(ANALYSES[plan.kind].analyse(facts, channels, plan, DEFAULT_REQUEST), None))
+    return Result(ANALYSES[plan.kind].analyse(facts, channels, plan, DEFAULT_REQUEST), None)
 
 
 def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
@@ -132,7 +124,8 @@ def main() -> None:
             with _open_when_there(Path(asked["path"]), asked["stretch"], asked["recorded_s"]) as recording:
                 if asked["path"] not in facts:
                     facts[asked["path"]] = recording_facts(recording)
-                bounds = look(recording, facts[asked["path"]], asked["stretch"], asked["recorded_s"])
+                known = facts[asked["path"]]
+                bounds = bounds_of(result_so_far(recording, known, asked["stretch"], asked["recorded_s"]))
         except (AnalysisError, RecordingError, *CONTRADICTIONS) as error:
             hindrance = str(error)
         sys.stdout.write(json.dumps({"bounds": bounds, "hindrance": hindrance}) + "\n")

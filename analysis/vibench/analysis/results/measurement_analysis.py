@@ -1,5 +1,6 @@
 """From one recording to its result, by what was played."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ..recordings.channel_levels import require_moving_channels
 from ..recordings.channels import RecordedChannels
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import recording_facts
+from ..uncertainty.expected import until_checks
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
 """What a calculation raises over a recording that is well formed, and whose parts do not go together."""
@@ -52,6 +54,7 @@ def analyse(
         require_moving_channels(facts.channels)
         plan = facts.measurement.excitation
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
+        found = replace(found, checks=(*found.checks, *until_checks(facts)))
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error

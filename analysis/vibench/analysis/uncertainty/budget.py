@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import hypot
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +13,19 @@ from ..tables import Labelled, plus_minus
 
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
-WIDENING = 1.35
+WIDENING = 1.4
 """Of scatter where the recording ended by it, see `Budget.widened`."""
+
+
+RESULT_PATTERNS: Mapping[str, str] = MappingProxyType(
+    {
+        "resonance_hz": r"^resonance at .*, frequency$",
+        "transmissibility": r"^transmissibility at ",
+        "response_i": r"\bResponse I\b",
+        "response_ii": r"\bResponse II\b",
+    }
+)
+"""Quantities that belong to a result for which a recording may wait, see `vibench.acquisition.plan.Until`."""
 
 
 class Cause(StrEnum):

@@ -1,30 +1,39 @@
 """What a plan will be able to tell: uncertainty over recording time, before anything moves."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from pydantic import ValidationError
 
 from vibench.acquisition.plan import (
+    FEWEST_REALISATIONS,
+    LOOK_FACTOR,
     Dwell,
     Family,
     HeldDwell,
     HeldNoise,
     Measurement,
+    SteppedSine,
+    Until,
     base_motion,
     preview_measurement,
 )
+from vibench.acquisition.recording import UntilNote
 from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, amplifier_of, shaker_of, specimen_of
 from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
 from ..errors import AnalysisError
 from ..model.overlay import RESPONSE_I, RESPONSE_II
+from ..recordings.checks import Check, Verdict
+from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Labelled
-from .budget import COVERAGE, Cause, Contribution, Stated, stated_of
+from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, Stated, stated_of
 from .quantities import of_one_draw
 
 STEADY = 1e-4
@@ -207,6 +216,72 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
             return tuple(_of_noise(measurement, rig, stated))
         case _:
             return ()
+
+
+MOST_STEPS = 6
+"""Of which the end is predicted; the others are taken to last as long on average."""
+
+
+def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
+    """Predict for how long a measurement with `until` will record, all stretches together [s].
+
+    The scatter of `expected_uncertainty` falls with the root of time, and a recording ends at a look. None
+    where that scatter is not known, or without `until`.
+    """
+    until, excitation = measurement.until, measurement.excitation
+    if until is None:
+        return None
+    steps = list(excitation.steps())
+    if not isinstance(excitation, SteppedSine):
+        first_s = until.shortest_s
+        if excitation.period_points is not None:
+            first_s = FEWEST_REALISATIONS * steps[0].record_s
+        return end_s(expected_uncertainty(measurement, rig), until, first_s, sum(s.record_s for s in steps))
+    tones = [float(step.segment.numbers["frequency_hz"]) for step in steps]
+    ends_s = []
+    for at_hz in tones[:: -(-len(tones) // MOST_STEPS)]:
+        dwell = Dwell(
+            amplitude_vpp=excitation.amplitude_vpp, frequency_hz=at_hz, duration_s=excitation.record_s
+        )
+        alone = measurement.model_copy(update={"excitation": dwell})
+        ends_s.append(end_s(expected_uncertainty(alone, rig), until, until.shortest_s, excitation.record_s))
+    known_s = [each for each in ends_s if each is not None]
+    return len(tones) * float(np.mean(known_s)) if len(known_s) == len(ends_s) else None
+
+
+def end_s(expected: tuple[Expected, ...], until: Until, first_s: float, longest_s: float) -> float | None:
+    """Predict at which look a stretch of at most ``longest_s`` ends [s]; None where scatter is not known."""
+    needed_s = first_s
+    for name, wish in until.wishes.items():
+        found = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
+        if not found:
+            return None
+        for each in found:
+            if each.scatter is None:
+                return None
+            # A scatter of 0 does not fall with time: it is that of a maximum, which `lasting` holds.
+            bound = COVERAGE * WIDENING * (each.scatter or each.lasting)
+            falls = bound / wish if each.scatter else float(np.inf if bound > wish else 0.0)
+            needed_s = max(needed_s, each.time_s * falls**2)
+    looks = max(0, int(np.ceil(np.log(min(needed_s, longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)))
+    return float(min(first_s * LOOK_FACTOR**looks, longest_s))
+
+
+def until_checks(facts: RecordingFacts) -> Iterator[Check]:
+    """Compare how long a recording with `until` lasted with what was predicted."""
+    notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
+    if not notes:
+        return
+    recorded_s = sum(each.recorded_s for each in notes)
+    try:
+        expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
+    except ValidationError:  # imported, or written by another version
+        expected_s = None
+    said = "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
+    last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
+    reached = sum(each.is_reached for each in notes)
+    text = f"{last}{reached} of {len(notes)} stretches known well enough, {recorded_s:.4g} s in all; {said}"
+    yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
 def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:

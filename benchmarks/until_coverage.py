@@ -1,0 +1,294 @@
+"""How often bounds hold where a recording ends by them, and what such an end saves.
+
+    python benchmarks/until_coverage.py --rule                           # the rule alone, on Gaussian records
+    python benchmarks/until_coverage.py --count 60 --seed 1 --shard 1/2 --save part1.json
+    python benchmarks/until_coverage.py --add part1.json part2.json        # the table of what shards kept
+
+The virtual rig makes one recording of each scene at its longest time, in simulated time and with noisier
+sensors. The rule of `vibench.acquisition.run.until` is then applied to its beginning, at the times of the
+looks and with the analysis that runs beside a measurement: each recording ends where one would whose
+analysis takes no time. Wishes are those that the description of the rig promises after several times.
+Linear motion of random rigs is compared with closed forms. The paper's specimen in chaos is compared with
+the mean of the other records, whose scatter widens the bound. A shard that was ended goes on from its file.
+"""
+
+import argparse
+import json
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from report_coverage import modes, peak
+from twin_agreement import random_rig
+
+import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import FEWEST_REALISATIONS, LOOK_FACTOR, Dwell, Measurement, Until, WhiteNoise
+from vibench.acquisition.rig import Rig, load_rig, specimen_of
+from vibench.analysis import AnalysisError, Expected, budgets_of, expected_uncertainty
+from vibench.analysis.recordings.facts import recording_facts
+from vibench.analysis.results.growing_bounds import bound_of, bounds_of, result_so_far
+from vibench.analysis.uncertainty.budget import COVERAGE, RESULT_PATTERNS, WIDENING
+from vibench.analysis.uncertainty.expected import end_s
+from vibench.sim import base_transmissibility
+
+VIRTUAL = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
+KINDS = ("noise", "dwell", "dwell", "chaos")
+WISHES = {"noise": ("resonance_hz", "transmissibility"), "dwell": ("response_ii",), "chaos": ("response_ii",)}
+RATE_HZ = 12_800.0
+LONGEST_S = 32.0
+PIECE_S = 0.5
+WEAK_VPP = 0.03
+SHARES = (0.1, 0.3, 0.5, 0.7)
+"""Where in the time from the first look to the longest a wish is promised, of its logarithm."""
+NOISIER = (10.0, 300.0)
+"""Factor on the noise of the sensors."""
+FARTHEST_HZ = 5.0
+
+
+@dataclass(frozen=True)
+class Ended:
+    """One quantity of one recording, ended by one wish."""
+
+    scene: int
+    kind: str
+    quantity: str
+    wish: float
+    is_reached: bool
+    stopped_s: float
+    longest_s: float
+    expected_s: float | None
+    """Predicted before, as `vibench measure --estimate` does; None where it is not known."""
+    value: float
+    bound: float
+    """Relative, of 95 %, at the end."""
+    whole: float
+    """Value of the whole record."""
+    true: float | None
+
+
+def looks_s(first_s: float, longest_s: float, piece_s: float) -> list[float]:
+    """Give the times of looks, as `UntilWatch` chooses them."""
+    due_s, found = first_s, []
+    for number in range(1, round(longest_s / piece_s) + 1):
+        if number * piece_s >= due_s * (1 - 1e-9):
+            found.append(number * piece_s)
+            while due_s <= number * piece_s * (1 + 1e-9):
+                due_s *= LOOK_FACTOR
+    return found
+
+
+def drawn(number: int, seed: int) -> tuple[str, Rig, Measurement]:
+    """Draw a kind, a rig with noisier sensors, and a plan."""
+    rng = np.random.default_rng((seed, number))
+    kind = KINDS[number % len(KINDS)]
+    rig, _ = random_rig(rng) if kind != "chaos" else (load_rig(VIRTUAL), "")
+    factor = 1.0 if kind == "chaos" else float(np.exp(rng.uniform(*np.log(NOISIER))))
+    sensors = ("accelerometer_noise_m_per_s2", "vibrometer_noise_m_per_s_per_rthz")
+    more = {name: factor * getattr(rig.virtual, name) for name in sensors}
+    virtual = rig.virtual.model_copy(update={**more, "seed": int(rng.integers(1, 1 << 30))})
+    daq = rig.daq.model_copy(update={"sample_rate_hz": RATE_HZ})
+    rig = rig.model_copy(update={"virtual": virtual, "daq": daq})
+    if kind == "noise":
+        excitation = WhiteNoise(
+            amplitude_vpp=WEAK_VPP, band_start_hz=50, band_stop_hz=600, repetition_hz=2, settle_s=1.0,
+            realisations=int(LONGEST_S), seed=int(rng.integers(1, 1 << 30)),
+        )  # fmt: skip
+    elif kind == "dwell":
+        at_hz = float(np.round(rng.uniform(90, 480), 1))
+        excitation = Dwell(amplitude_vpp=WEAK_VPP, frequency_hz=at_hz, settle_s=1.5, duration_s=LONGEST_S)
+    else:
+        excitation = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.5, duration_s=LONGEST_S)
+    wishes = Until(**dict.fromkeys(WISHES[kind], 1e-6))
+    return kind, rig, Measurement(name="measured", excitation=excitation, ramp_s=0.3, until=wishes)
+
+
+def true_value(rig: Rig, plan: Measurement, quantity: str) -> float | None:
+    """Give what linear motion has in closed form; None where no mode is near."""
+    specimen = specimen_of(rig)
+    if isinstance(plan.excitation, Dwell):
+        played_hz = plan.excitation.frequency_hz * (1 + 1e-6 * rig.virtual.generator_clock_ppm)
+        return float(np.abs(base_transmissibility(specimen, [played_hz])[0, 0]))
+    stated_hz = float(re.search(r"([\d.]+) Hz", quantity)[1])
+    natural_hz = modes(specimen)[0]
+    nearest_hz = float(natural_hz[np.argmin(np.abs(natural_hz - stated_hz))])
+    if abs(nearest_hz - stated_hz) > FARTHEST_HZ:
+        return None
+    return nearest_hz if "frequency" in quantity else peak(specimen, nearest_hz)
+
+
+def scene(number: int, seed: int) -> Iterator[Ended]:
+    """Record once, and end that record by wishes of several sizes."""
+    kind, rig, plan = drawn(number, seed)
+    is_noise = kind == "noise"
+    first_s, piece_s = (FEWEST_REALISATIONS * 1.0, 1.0) if is_noise else (plan.until.shortest_s, PIECE_S)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "measured.h5"
+        with open_bench(rig) as bench:
+            run_measurement(bench, plan.model_copy(update={"until": None}), path)
+        with open_recording(path) as recording:
+            facts = replace(recording_facts(recording), measurement=plan)
+            told = []
+            for time_s in looks_s(first_s, LONGEST_S, piece_s):
+                try:
+                    told.append((time_s, result_so_far(recording, facts, 1, time_s)))
+                except AnalysisError:
+                    told.append((time_s, None))
+    expected = expected_uncertainty(plan, rig)
+    for name in WISHES[kind]:
+        for wish in wishes(expected, name, first_s):
+            expected_s = end_s(expected, Until(**{name: wish}), first_s, LONGEST_S)
+            met = [
+                place
+                for place, (_, each) in enumerate(told)
+                if each is not None and (bounds_of(each).get(name) or np.inf) <= wish
+            ]
+            stopped_s, result = told[met[0] if met else -1]
+            whole = {each.quantity.split(" Hz")[0]: each.value for each in budgets_of(told[-1][1])}
+            for budget in () if result is None else budgets_of(result):
+                bound, key = bound_of(budget), budget.quantity.split(" Hz")[0]
+                if bound and re.search(RESULT_PATTERNS[name], budget.quantity) and key in whole:
+                    yield Ended(
+                        scene=number,
+                        kind=kind,
+                        quantity=name,
+                        wish=wish,
+                        is_reached=bool(met),
+                        stopped_s=stopped_s,
+                        longest_s=LONGEST_S,
+                        expected_s=expected_s,
+                        value=budget.value,
+                        bound=bound,
+                        whole=whole[key],
+                        true=None if kind == "chaos" else true_value(rig, plan, budget.quantity),
+                    )
+
+
+def wishes(expected: tuple[Expected, ...], name: str, first_s: float) -> Iterator[float]:
+    """Give wishes that the description of the rig promises after several times."""
+    mine = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
+    scatter = max((each.scatter or 0.0 for each in mine), default=0.0)
+    for share in SHARES if scatter else ():
+        time_s = first_s * (LONGEST_S / first_s) ** share
+        yield min(COVERAGE * WIDENING * scatter * float(np.sqrt(mine[0].time_s / time_s)), 0.9)
+
+
+def table(found: list[Ended]) -> Iterator[str]:
+    """Count: coverage at the end, with and without widening, time against fixed plans, predictions."""
+    chaos = {each.scene: each.whole for each in found if each.kind == "chaos"}
+    rows, times, ratios = defaultdict(list), defaultdict(dict), defaultdict(dict)
+    for each in found:
+        row = each.kind, each.quantity
+        true, more = each.true, 1.0
+        if each.kind == "chaos":
+            others = np.array([value for scene, value in chaos.items() if scene != each.scene])
+            if others.size < 5:
+                continue
+            true = float(np.mean(others))
+            more = float(
+                np.hypot(1.0, 2 * np.std(others, ddof=1) / np.sqrt(others.size) / (each.bound * true))
+            )
+        if true is None:
+            continue
+        rows[row].append((abs(each.value / true - 1) / (more * each.bound), each.is_reached))
+        place = each.scene, each.wish
+        times[row][place] = each.stopped_s, each.is_reached
+        if each.expected_s is not None and each.is_reached and each.expected_s < each.longest_s:
+            ratios[row][place] = each.stopped_s / each.expected_s
+    yield "| measured | result | records | bounds | reached | held | unwidened | time saved | within 1.5 |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for row, offs in sorted(rows.items()):
+        off = np.array([each for each, _ in offs])
+        reached = np.array([flag for _, flag in offs])
+        saved = saving(found, row)
+        ratio = np.array(list(ratios[row].values()))
+        near = np.mean((ratio < 1.5 + 1e-9) & (ratio > 1 / 1.5 - 1e-9)) if ratio.size else np.nan
+        records = len({place[0] for place in times[row]})
+        held, plain = (100 * np.mean(off[reached] <= most) for most in (1.0, 1 / WIDENING))
+        yield (
+            f"| {row[0]} | {row[1]} | {records} | {off.size} | {100 * np.mean(reached):.0f} % | "
+            f"{held:.1f} % | {plain:.1f} % | {100 * saved:.0f} % | {100 * near:.0f} % of {ratio.size} |"
+        )
+
+
+def saving(found: list[Ended], row: tuple[str, str]) -> float:
+    """Give the time saved against a fixed plan long enough for 95 % of the records with wishes alike.
+
+    Wishes are alike that are promised after the same time; what such records need differs by noise and by
+    what the description of a rig does not tell.
+    """
+    alike = defaultdict(dict)
+    for each in found:
+        if (each.kind, each.quantity) == row and each.expected_s is not None:
+            time_s = each.stopped_s if each.is_reached else np.inf
+            alike[round(each.expected_s, 3)][each.scene, each.wish] = time_s
+    used = fixed = 0.0
+    for group in alike.values():
+        ends_s = np.array(list(group.values()))
+        plan_s = float(np.quantile(ends_s, 0.95, method="higher"))
+        if np.isfinite(plan_s):
+            used += float(np.sum(np.minimum(ends_s, plan_s)))
+            fixed += plan_s * ends_s.size
+    return 1 - used / fixed if fixed else float("nan")
+
+
+def rule(runs: int, seed: int) -> Iterator[str]:
+    """Give the coverage at the end of Gaussian records of ten parts, in the worst of all wishes."""
+    rng = np.random.default_rng(seed)
+    lengths = [round(2 * LOOK_FACTOR**look) for look in range(9)]
+    sd, mean = np.empty((runs, len(lengths))), np.empty((runs, len(lengths)))
+    for first in range(0, runs, 500):
+        samples = rng.standard_normal((min(500, runs - first), 10 * lengths[-1]))
+        sums = np.concatenate([np.zeros((samples.shape[0], 1)), samples.cumsum(axis=1)], axis=1)
+        for look, length in enumerate(lengths):
+            parts = np.diff(sums[:, : 10 * length + 1 : length], axis=1) / length
+            sd[first : first + 500, look] = parts.std(axis=1, ddof=1) / np.sqrt(10)
+            mean[first : first + 500, look] = parts.mean(axis=1)
+    for factor in (1.0, 1.2, WIDENING, 1.6):
+        worst = 1.0
+        for wish in np.geomspace(0.3 / np.sqrt(10 * lengths[-1]), 10 / np.sqrt(10 * lengths[0]), 80):
+            bound = COVERAGE * factor * sd
+            met = bound <= wish
+            ended = np.where(met.any(axis=1), met.argmax(axis=1), len(lengths) - 1)
+            rows = np.arange(runs)
+            worst = min(worst, float(np.mean(np.abs(mean[rows, ended]) <= bound[rows, ended])))
+        yield f"widening {factor:.2f}: {100 * worst:.1f} % held in the worst of 80 wishes"
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--count", type=int, default=4, help="recordings")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--shard", default="1/1", help="which part of the scenes: 3/10 is the third of ten")
+    parser.add_argument("--save", type=Path, metavar="FILE.json", help="keep every end, and go on from it")
+    parser.add_argument("--add", type=Path, nargs="+", metavar="FILE.json", help="count what shards kept")
+    parser.add_argument("--rule", action="store_true", help="only the rule, on Gaussian records")
+    asked = parser.parse_args()
+    if asked.rule:
+        print("\n".join(rule(20_000, asked.seed)))
+        return
+    files = asked.add or ([asked.save] if asked.save is not None and asked.save.exists() else [])
+    lines = [json.loads(line) for path in files for line in path.read_text("utf-8").splitlines()]
+    found = [Ended(**each) for line in lines for each in line["ends"]]
+    if asked.add is None:
+        part, of = (int(each) for each in asked.shard.split("/"))
+        done = {line["scene"] for line in lines}
+        for number in range(part - 1, asked.count, of):
+            if number in done:
+                continue
+            ends = list(scene(number, asked.seed))
+            found += ends
+            if asked.save is not None:
+                with asked.save.open("a", encoding="utf-8") as file:
+                    line = {"scene": number, "ends": [asdict(each) for each in ends]}
+                    file.write(json.dumps(line) + "\n")
+    print("\n".join(table(found)))
+
+
+if __name__ == "__main__":
+    main()
