@@ -22,9 +22,6 @@ constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
 constexpr double SOON = 1e-3;        // a window may as well begin with a touch in this part of it
 constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next
 constexpr double ROUNDED_PIECE = 1e-9;  // part of a piece of the drive that is rounding
-// Errors of steps take energy and do not give it, so that they add up; those of whole collisions do not. Steps may use
-// this part of the tolerance, but need not be finer than the finest.
-constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
 // Of steps under a power law, whose windows are short: see power_law.hpp for what they are there.
 constexpr double FINER_FIT = 0.01, CLOSE_PLACE = 1e-3, CLOSEST_PLACE = 1e-15, CELL_FADING = 0.999;
 constexpr double LONGER_STEP = 1.4142135623730951, SHORTER_STEP = 0.5;
@@ -314,7 +311,7 @@ class ChainRun {
   const CellKind &kind(int64_t k) const { return reinterpret_cast<const CellKind *>(m.kinds.at)[k]; }
   int64_t kind_of(int64_t cell) const { return int64_t(m.kind_of.at[cell]); }
   bool watches() const { return m.watch != WATCH_NOTHING; }
-  double step_tolerance() const { return smaller(m.tolerance, larger(STEP_CARE * m.tolerance, FINEST_STEP)); }
+  double step_tolerance() const { return careful(m.tolerance); }
 
   void fill_kind(KindTables &k, const CellKind &of) const {
     Specimen s = of.specimen;
@@ -752,7 +749,7 @@ class ChainRun {
       while (length * kind.power.stiffest_rate(magnitude(p) + outward * length, 0.0, t.inverse_pair) > WALL_TURN)
         length *= SHORTER_STEP;
       step.length = length;
-      misfit = step.attempt(c, m.tolerance);
+      misfit = step.attempt(c, vibench::step_tolerance(m.tolerance, kind.tables.specimen));
     }
     if (!(misfit <= 1.0)) return 0.0;
     bool is_fine = misfit < TRY_LONGER;

@@ -41,6 +41,16 @@ template <class T> struct Contact {
   double step, root_scale, rate_scale, pace;
 };
 
+// Errors of steps take energy and do not give it, so that they add up; those of whole collisions do not. Steps may use
+// this part of the tolerance, but need not be finer than the finest.
+constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
+
+INLINE double careful(double tolerance) { return smaller(tolerance, larger(STEP_CARE * tolerance, FINEST_STEP)); }
+// A damped motion forgets the errors of its steps; an undamped one keeps them all.
+INLINE double step_tolerance(double tolerance, const Specimen &s) {
+  return s.c0 + s.c1 + s.c2 + s.loss > 0.0 ? tolerance : careful(tolerance);
+}
+
 INLINE double step_scale(double tolerance) { return eighth_root(tolerance / STANDARD_TOLERANCE); }
 
 // Longest step that will do, over the collision's pace, at a depth over the largest. Contacts are all alike: the
@@ -76,7 +86,7 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
   c.rate_scale = speed + RATE_FLOOR;
   c.pace = deepest / speed;
   double pressed = 0.7 / square_root(0.5 * press + 1e-300);
-  c.step = step_scale(tolerance) * foreseen_step(w / c.root_scale, r) * smaller(c.pace, pressed);
+  c.step = step_scale(step_tolerance(tolerance, s)) * foreseen_step(w / c.root_scale, r) * smaller(c.pace, pressed);
 }
 
 // k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N]; one that is a cubic, about its start.
@@ -194,7 +204,8 @@ template <class T, class Force> struct ContactSteps {
 // on the clock of `base`. `seen(steps, h)` is called with every accepted step before it becomes the point.
 template <class T, class Force, class Seen>
 inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &limit, const BaseForce &base,
-                                  const Force &force, double tolerance, const Body &t, const Seen &seen) {
+                                  const Force &force, double allowed, const Body &t, const Seen &seen) {
+  double tolerance = step_tolerance(allowed, t.specimen);
   double gap = gap_at(t.specimen, c.side), step = c.step, longest = c.pace * step_scale(tolerance);
   if (!(value_of(tau) < value_of(limit))) return ContactEnd::HELD;
   ContactSteps<T, Force> steps{{t, base, force, c.side, gap}, tolerance, {}, {}, {}};

@@ -388,7 +388,7 @@ template <class T> class PowerRun {
   Observer observer;
 
   Outcome go_on(double until) {
-    PowerStep<T> step{t, of, tolerance, {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
+    PowerStep<T> step{t, of, step_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
     int level = m.powers.level > 0.0 ? int(m.powers.level) - 1 : FIRST_LEVEL;
     begin(step);
     Outcome outcome = REACHED_END;

@@ -37,6 +37,36 @@ def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
     assert np.abs(drifts(contact, 3, 0.5)).max() < bound
 
 
+@pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
+@pytest.mark.parametrize("cells", [1, 2])
+@pytest.mark.parametrize(
+    "contact",
+    [
+        "hertz",
+        "hunt_crossley:0",
+        "linear_gap:2e5",
+        "power:3",
+        "power:5",
+        "power:29",
+        "power:47",
+        "power:3+5+7",
+    ],
+)
+def test_no_law_drive_or_level_changes_the_energy_of_an_undamped_motion(contact, cells, accuracy):
+    """Steps took up to 2e-2 of it on a sampled drive, and gave or took 2e-3 of it under a power law."""
+    specimen = gong2025(damping_time_s=0.0, contact=contact)
+    chain = chain_of(specimen, cells)
+    moving = np.random.default_rng(1).normal(size=(cells, 6)) * np.repeat([3e-5, 0.15], 3)
+    deep = np.zeros((cells, 6))
+    deep[0, 1] = (1.2 if contact == "power:47" else 1.4) * specimen.gap_m
+    for start in (moving, deep):
+        before = chain_energies(chain, start).sum()
+        for drive in (STILL, Sampled(np.zeros(408), 1e4)):
+            run = integrate_chain(chain, drive, 0.04, accuracy, start)
+            assert run.outcome is Outcome.REACHED_END
+            assert chain_energies(chain, run.final_state).sum() == pytest.approx(before, rel=1e-5)
+
+
 @pytest.mark.parametrize("contact", ["power:5", "power:29", "hertz", "linear_gap:2e5"])
 @pytest.mark.parametrize("gaps", [3.0, 1e3, 1e6])
 def test_a_motion_that_cannot_be_followed_ends_where_it_was_last_known(contact, gaps):
