@@ -377,7 +377,8 @@ bool is_usable(const LoadedShaker &s) {
   int64_t steps = s.drive.size;
   return is_usable(s.specimen, 0.0, s.tolerance) && is_positive(s.step) && is_lent(s.drive) &&
          has_size(s.noise, steps) && has_size(s.amplifier_voltage, steps) && has_size(s.base_acceleration, steps) &&
-         has_size(s.m0_velocity, steps) && has_columns(s.ends, ENDS) && s.ends.size / ENDS <= steps;
+         has_size(s.m0_velocity, steps) && has_columns(s.ends, ENDS) && s.ends.size / ENDS <= steps &&
+         is_lent(s.begun) && (s.begun.size == 0 || s.block > 0);
 }
 
 bool is_usable(const LoopCables &loop) {

@@ -83,9 +83,17 @@ template <class Act> inline int64_t with_shaker(LoadedShaker &s, const Act &act)
   return result;
 }
 
-// Moves by as many steps as there are; returns the steps done.
+// Moves by as many steps as there are, block by block; returns the steps done.
 inline int64_t move_shaker(LoadedShaker &s) {
-  return with_shaker(s, [&](const auto &move) { return move(0, s.drive.size); });
+  int64_t steps = s.drive.size, done = 0;
+  for (int64_t k = 0; done < steps; k++) {
+    int64_t stop = k < s.begun.size && s.block < steps - done ? done + s.block : steps;
+    int64_t moved = with_shaker(s, [&](const auto &move) { return move(done, stop); });
+    if (k < s.begun.size) s.begun.at[k] = double(s.impacts);
+    if (done + moved < stop) return done + moved;
+    done = stop;
+  }
+  return steps;
 }
 
 }  // namespace vibench

@@ -328,6 +328,8 @@ STRUCTURE(LoadedShaker,
   Numbers drive, noise;        // [steps]: at the amplifier's input and output [V]
   Numbers amplifier_voltage, base_acceleration, m0_velocity;  // [steps]: results [V] [m/s^2] [m/s]
   Numbers ends;                // [first steps][9]: base, its velocity, current, x, y, z, vx, vy, vz at their ends
+  Numbers begun;               // [blocks]: contacts begun up to the end of each block of steps; or none
+  int64_t block;               // steps of a block
   int64_t impacts, bumps, limited_steps;  // contacts begun; steps in the rubber stops, and with clipping
 )
 

@@ -101,10 +101,16 @@ def shaker_of(engine, draws, drive):
         engine, tables, specimen, state, [2e-5, 4.4e-5, 0.0, 0.0, draws.uniform(-0.5, 0.5), 0.0], 3e-7
     )
     moved = {name: np.zeros(STEPS) for name in ("amplifier_voltage", "base_acceleration", "m0_velocity")}
-    moved["ends"] = np.zeros((STEPS // 2, 9))
+    moved["ends"], moved["begun"] = np.zeros((STEPS // 2, 9)), np.zeros(4)
     lags = {"low_decay": 0.99, "low_mean": 0.995, "high_decay": 0.3, "high_mean": 0.6}
     limits = {"gain": 3.0, "clip": 2.5, "current_limit": 3.0, "stroke": 1e-5}
-    stops = {"stop_stiffness": 1e5, "stop_damping": 10.0, "tolerance": 3e-7, "step": 1e-5}
+    stops = {
+        "stop_stiffness": 1e5,
+        "stop_damping": 10.0,
+        "tolerance": 3e-7,
+        "step": 1e-5,
+        "block": STEPS // 4,
+    }
     arrays = {"tables": tables, "drive": drive, "noise": np.zeros(STEPS), **moved}
     shaker = engine.new("LoadedShaker", specimen=state, **lags, **limits, **stops, **arrays)
     shaker["transition"] = np.eye(3, 5)

@@ -386,7 +386,7 @@ def _drawn_channels(
     return SimulatedChannels(
         recorded,
         motion.m0_velocity,
-        (motion.impact_times_s, motion.impacts.astype(np.float64)),
+        (motion.impact_times_s, motion.impacts),
         recorded.response_delay_s,
         motion.base_acceleration,
         drive_v,

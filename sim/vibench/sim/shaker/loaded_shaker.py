@@ -138,12 +138,14 @@ class ShakenMotion:
     """[m/s]"""
     ends: FloatArray
     """Shape (steps, 9), columns MOTION_COLUMNS, at the ends of the steps; no rows unless asked for."""
+    begun: FloatArray
+    """Contacts begun up to the end of each block of steps, shape (blocks,); none unless asked for."""
 
     @classmethod
-    def of(cls, count: int, end_rows: int) -> Self:
-        """Make room for this many steps, and for the ends of the first of them."""
+    def of(cls, count: int, end_rows: int, blocks: int = 0) -> Self:
+        """Make room for this many steps, for the ends of the first of them, and for blocks of contacts."""
         ends = np.empty((end_rows, len(MOTION_COLUMNS)))
-        return cls(np.empty(count), np.empty(count), np.empty(count), ends)
+        return cls(np.empty(count), np.empty(count), np.empty(count), ends, np.empty(blocks))
 
 
 class MotionFailed(ArithmeticError):
@@ -245,7 +247,9 @@ class LoadedShaker:
         start_on_cubics(engine, tables, specimen, state, motion, _CONTACT_TOLERANCE)
         engine.fill(self.structure, tables=tables, specimen=state)
 
-    def move(self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0) -> ShakenMotion:
+    def move(
+        self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0, block: int = 0
+    ) -> ShakenMotion:
         """Advance by as many steps as ``drive_v`` has values.
 
         Parameters
@@ -256,6 +260,8 @@ class LoadedShaker:
             Added at the amplifier's output [V], shape (steps,).
         end_rows
             For how many steps, counted from the first, the state at their ends is kept.
+        block
+            Steps of a block, at the end of which the contacts begun are kept; 0 for none.
 
         Raises
         ------
@@ -263,7 +269,10 @@ class LoadedShaker:
             When the motion is no longer finite; this shaker cannot go on.
 
         """
-        drive, motion = np.ascontiguousarray(drive_v, np.float64), ShakenMotion.of(len(drive_v), end_rows)
+        blocks = math.ceil(len(drive_v) / block) if block else 0
+        drive = np.ascontiguousarray(drive_v, np.float64)
+        motion = ShakenMotion.of(len(drive), end_rows, blocks)
+        self.structure["block"] = block
         noise = np.zeros(len(drive)) if noise_v is None else np.ascontiguousarray(noise_v, np.float64)
         self.move_into(motion, drive, noise)
         return motion
@@ -283,6 +292,7 @@ class LoadedShaker:
             base_acceleration=motion.base_acceleration,
             m0_velocity=motion.m0_velocity,
             ends=motion.ends,
+            begun=motion.begun,
         )
 
     def account(self, good: int, count: int) -> None:

@@ -63,7 +63,7 @@ class SampledMotion:
     """[m/s]"""
     impact_times_s: FloatArray
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
-    impacts: NDArray[np.int64]
+    impacts: FloatArray
     """Contacts started up to them, shape (blocks + 1,)."""
 
 
@@ -97,20 +97,15 @@ def follow_voltage(
     shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
     gains = (table.base_sensor, table.m0_sensor)
     kept = [np.empty(volts.size), np.empty(volts.size)]
-    impacts = [0]
+    impacts = [np.zeros(1)]
     block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
     tail = np.zeros((2, 0))
     done = 0
     resampling = _Resampling(sample_rate_hz, ratio, table.shaker)
     for stop, fine in resampling.stretches(volts):
-        means = np.empty((2, fine.size))
-        for begin in range(0, fine.size, block):
-            end = min(begin + block, fine.size)
-            motion = shaken.move(fine[begin:end])
-            means[0, begin:end] = motion.base_acceleration
-            means[1, begin:end] = motion.m0_velocity
-            impacts.append(shaken.impacts)
-        tail = np.concatenate([tail, means], axis=1)
+        motion = shaken.move(fine, block=block)
+        impacts.append(motion.begun)
+        tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
         # The last samples wait for the motion behind them, but at the end.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
@@ -118,12 +113,13 @@ def follow_voltage(
             result[done:upto] = resampling.samples(row, gain)[done - held : upto - held]
         done = upto
         tail = tail[:, max(0, (done - _MARGIN - held)) * ratio :]
-    blocks_s = np.minimum(np.arange(len(impacts)) * (block * step_s), volts.size / sample_rate_hz)
+    begun = np.concatenate(impacts)
+    blocks_s = np.minimum(np.arange(begun.size) * (block * step_s), volts.size / sample_rate_hz)
     return SampledMotion(
         base_acceleration=_coupled(kept[0], table.base_low_cut_hz / sample_rate_hz),
         m0_velocity=kept[1],
         impact_times_s=blocks_s,
-        impacts=np.array(impacts, dtype=np.int64),
+        impacts=begun,
     )
 
 
