@@ -112,17 +112,22 @@ def tracked_together(
 
 
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
-    """Return exp(i order phase) for each order, shape (orders, ...).
+    """Return exp(i order phase) for each order, shape (orders, ...)."""
+    return np.stack(_turns(phase_rad, orders))
+
+
+def _turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
+    """Return exp(i order phase) order by order.
 
     Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
     a sine and a cosine.
     """
     fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
     if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):
-        return np.asarray(np.exp(1j * np.multiply.outer(np.asarray(orders), phase_rad)))
+        return [np.exp(1j * order * phase_rad) for order in orders]
     together = lcm(*(each.denominator for each in fractions))
     powers = {1: np.exp(1j / together * phase_rad)}
-    return np.stack([_power(int(each * together), powers) for each in fractions])
+    return [_power(int(each * together), powers) for each in fractions]
 
 
 def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
@@ -135,11 +140,13 @@ def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
 
 def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
     """Fit signals of shape (intervals, samples, signals); results have shape (signals, ..., intervals)."""
-    samples = signals.shape[1]
-    turned = order_turns(phase, (*orders, 1.0))
-    changing = np.linspace(-1.0, 1.0, samples) * turned[-1]
-    first = np.stack((changing.real, changing.imag, np.ones_like(phase)))
-    basis = np.concatenate((turned[:-1].real, turned[:-1].imag, first)).transpose(1, 0, 2)
+    samples, count = signals.shape[1], len(orders)
+    *turned, first = _turns(phase, (*orders, 1.0))
+    changing = np.linspace(-1.0, 1.0, samples) * first
+    basis = np.empty((len(phase), 2 * count + 3, samples))
+    for place, turn in enumerate(turned):
+        basis[:, place], basis[:, count + place] = turn.real, turn.imag
+    basis[:, -3], basis[:, -2], basis[:, -1] = changing.real, changing.imag, 1.0
     normal = basis @ basis.transpose(0, 2, 1)
     try:
         inverse = np.linalg.inv(normal)
@@ -151,7 +158,6 @@ def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Compl
     solution = inverse @ (basis @ signals)
     residual = signals - basis.transpose(0, 2, 1) @ solution
     squares = np.sum(residual**2, axis=1)
-    count = len(orders)
     value = solution[:, :count] - 1j * solution[:, count : 2 * count]
     diagonal = np.einsum("ikk->ik", inverse)
     mean = (diagonal[:, :count] + diagonal[:, count : 2 * count]) / 2

@@ -1,6 +1,8 @@
 """Frequency, amplitude and phase of a steady sine, as well as its noise allows."""
 
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
 from typing import ClassVar
 
 import numpy as np
@@ -61,8 +63,8 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
         )
     found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]
-    placed = [_placed(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])]]
-    return tuple(peak for peak in placed if peak.amplitude > _LEAST_RATIO * peak.floor)[:count]
+    placed = (_placed(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])])
+    return tuple(islice((peak for peak in placed if peak.amplitude > _LEAST_RATIO * peak.floor), count))
 
 
 def _placed(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
@@ -118,6 +120,13 @@ def fitted_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> Fitted
         Where the sine should be, within 20 %.
 
     """
+    return _kept_sine(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), sample_rate_hz, near_hz)
+
+
+@lru_cache(maxsize=4)
+def _kept_sine(recorded: bytes, sample_rate_hz: float, near_hz: float) -> FittedSine:
+    """Fit once what all draws of a recording share: its drive, in the window and in the whole dwell."""
+    samples = np.frombuffer(recorded)
     spectrum = amplitude_spectrum(samples, sample_rate_hz)
     found = peaks(spectrum, low_hz=near_hz * (1 - _SEARCH), high_hz=near_hz * (1 + _SEARCH), count=1)
     if not found:
