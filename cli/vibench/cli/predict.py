@@ -34,13 +34,11 @@ from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 from .range_option import frequencies
-from .specimen_option import SPECIMEN, described
+from .specimen_option import AXES, SPECIMEN, described
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
 """Rows of a table on the terminal; all of them are in the JSON and in the file."""
-_AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Axes of one value that a study has in place of what replaces a part of the specimen."""
 
 
 def predict(
@@ -84,7 +82,7 @@ def predict(
     _refuse_beside_target(typed.keys() | options.typed.keys())
     asked = options.request(
         specimen=described(choice.typed.get("specimen")),
-        **{axis: (choice.typed[name],) for axis, name in _AXES.items() if name in choice.typed},
+        **{axis: (choice.typed[name],) for axis, name in AXES.items() if name in choice.typed},
         amplitudes_m=(amplitude,),
         frequencies_hz=frequencies(frequency),
         observe=_observables(observe),

@@ -12,6 +12,8 @@ from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
 """Fields of a request about a specimen that every command has as options."""
+AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
+"""Axes of one value that a study has in place of what replaces a part of the specimen."""
 SpecimenOption = Annotated[
     str | None, option("A specimen's file, or a name that `vibench specimen` lists.", "NAME|FILE.toml")
 ]

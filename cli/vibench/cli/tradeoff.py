@@ -1,15 +1,18 @@
 """`vibench tradeoff`: speed against accuracy, measured on this machine."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import Accuracy
+from vibench.analysis.dynamics import SpecimenChoice
+from vibench.sim import Accuracy, Rest
+from vibench.sim.accuracy_benchmark.curve import scene_curve
 from vibench.sim.accuracy_benchmark.figures import (
     LOTTERIES,
     MOTIONS,
@@ -20,11 +23,13 @@ from vibench.sim.accuracy_benchmark.figures import (
 )
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 from vibench.sim.operating_system.this import replaced
+from vibench.sim.study import Study
 
-from .options import option
+from .options import Fields, RequestOptions, option, validated
 from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder, room_for_page
 from .progress_bars import shown
+from .specimen_option import AXES, SPECIMEN, described
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
@@ -32,12 +37,30 @@ _STEPS = len(MOTIONS) + len(LOTTERIES) + len(TRANSIENTS)
 
 
 def tradeoff(
+    amplitude: Annotated[float | None, option("Of the base displacement of your scene.", "M")] = None,
+    frequency: Annotated[float | None, option("Drive frequency of your scene [Hz].", "F")] = None,
+    error: Annotated[str | None, option("Error requested for it; 1% if neither is given.", "E")] = None,
+    time_limit: Annotated[str | None, option("Time requested for it, as 2s.", "T", name="--time")] = None,
     out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
     markdown: Annotated[Path | None, option("Write the page of docs/accuracy.md.", "FILE.md")] = None,
     span: Annotated[float, option("Length of the motion compared; the paper's test is 2.", "S")] = 2.0,
     as_json: AsJson = False,
+    *,
+    choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
 ) -> None:
-    """Measure what each accuracy costs and what error it makes, with and without impacts and in chaos."""
+    """Measure error over time: of every method for your scene, or of each accuracy in known motions."""
+    said = {"amplitude": amplitude, "frequency": frequency, "error": error, "time": time_limit}
+    said = {name: value for name, value in said.items() if value is not None} | dict(choice.typed)
+    if said:
+        if markdown is not None:
+            raise InvalidRequest("--markdown was given with a scene; leave out one of the two")
+        _tell_scene(_study(said), out, as_json)
+    else:
+        _measure_known(out, markdown, span, as_json)
+
+
+def _measure_known(out: Path | None, markdown: Path | None, span: float, as_json: bool) -> None:
+    """Measure every level in motions that are known."""
     if not _SHORTEST_S <= span <= _LONGEST_S:
         raise InvalidRequest(f"a span of {span} s was asked for; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
     folder = _folder(out, markdown)
@@ -62,6 +85,53 @@ def tradeoff(
         _tell_lotteries(benchmark.lotteries)
     if folder is not None:
         _save(benchmark, folder, markdown)
+
+
+def _study(said: Mapping[str, Any]) -> Study:
+    """Read the scene that was asked about, with its target."""
+    if not {"amplitude", "frequency"} <= said.keys():
+        raise InvalidRequest("a scene needs both --amplitude and --frequency; one or both are missing")
+    target = {field: said[name] for name, field in (("error", "error"), ("time", "time_s")) if name in said}
+    return validated(
+        Study,
+        {
+            "specimen": described(said.get("specimen")),
+            **{axis: (said[name],) for axis, name in AXES.items() if name in said},
+            "amplitudes_m": (said["amplitude"],),
+            "frequencies_hz": (said["frequency"],),
+            **(target or {"error": "1 %"}),
+        },
+    )
+
+
+def _tell_scene(study: Study, out: Path | None, as_json: bool) -> None:
+    """Measure and show the curve of one scene."""
+    from vibench.analysis.report import curve_figure
+
+    if out is not None:
+        room_for_folder(out)
+    scene = study.scene((0,) * len(study.axes), Rest())
+    try:
+        points = sorted(scene_curve(scene), key=lambda each: not each.is_chosen)
+    except ValueError as fault:
+        raise InvalidRequest(str(fault)) from fault
+    name = f"{study.models[0]}, {scene.drive.frequency_hz:g} Hz, {1e6 * scene.drive.amplitude_m:g} µm"
+    if as_json:
+        print_json({"scene": name, "points": [asdict(each) for each in points]})
+    else:
+        rows = Table(title=f"error over time: {name}", title_justify="left")
+        for heading in ("method", "time [s]", "error", "", "Response I", "II"):
+            rows.add_column(heading)
+        for each in points:
+            kind = "stated" if each.is_stated else "from the best"
+            numbers = f"{each.time_s:.2g}", f"{each.error:.1g}", kind
+            mark = f"{each.method} (chosen)" if each.is_chosen else each.method
+            rows.add_row(mark, *numbers, f"{each.response_i:.5g}", f"{each.response_ii:.5g}")
+        print_table(rows)
+    if out is not None:
+        path = curve_figure(points, name).save(out)[0]
+        if not as_json:
+            console.print("The figure:", path.resolve())
 
 
 def _folder(out: Path | None, markdown: Path | None) -> Path | None:

@@ -109,6 +109,13 @@ def test_an_error_below_rounding_is_said_not_to_be_reached():
     assert report.text.endswith("is not known")
 
 
+def test_an_answer_in_a_transient_says_that_it_is_not_settled():
+    soon = solve_scene(asked(time_s=1e-6))
+    settled = solve_scene(asked(error=1e-6))
+    assert soon.error_estimate > abs(soon.response_i / settled.response_i - 1.0) > 1e-3
+    assert soon.error_estimate > abs(soon.relative_ii / settled.relative_ii - 1.0)
+
+
 def test_the_time_of_one_drive_period_is_the_shortest():
     scene = Scene(gong2025(), Harmonic(1e-3, 1e-2), target=Target(time_s=1e-3))
     with pytest.raises(ValueError, match=r"takes longer to follow; give more time\.$"):

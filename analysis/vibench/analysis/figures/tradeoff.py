@@ -1,8 +1,12 @@
 """Error over cost: every level of ours and every general solver, motion by motion."""
 
+from collections.abc import Sequence
+from itertools import cycle
+
 import numpy as np
 
 from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark.curve import CurvePoint
 from vibench.sim.accuracy_benchmark.figures import AccuracyBenchmark
 
 from ..tables import table
@@ -11,6 +15,59 @@ from .style import BOUNDS, LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, new_
 _MARKERS = {"DOP853": "x", "LSODA": "+", "Radau": "1"}
 _LEAST = 1e-14
 """An error below this is rounding."""
+
+
+def curve_figure(points: Sequence[CurvePoint], scene: str) -> DrawnFigure:
+    """Draw the error of the responses over time, a line for each method and a ring around the choice."""
+    methods = list(dict.fromkeys(each.method for each in points))
+    with styled():
+        figure = new_figure(4.6)
+        axes = figure.subplots()
+        for method, colour, line in zip(methods, cycle(LEVELS), cycle(LEVEL_STYLES), strict=False):
+            own = [each for each in points if each.method == method]
+            axes.plot(
+                [each.time_s for each in own],
+                [max(each.error, _LEAST) for each in own],
+                color=colour,
+                linestyle=line,
+                marker="o" if own[0].is_stated else "x",
+                markersize=4,
+                label=method,
+            )
+        for each in points:
+            if each.is_chosen:
+                axes.plot(
+                    each.time_s,
+                    max(each.error, _LEAST),
+                    color=BOUNDS,
+                    marker="o",
+                    markersize=11,
+                    fillstyle="none",
+                )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("relative error of the responses")
+        legend_above(figure, [axes])
+    return DrawnFigure(
+        name="tradeoff_scene",
+        title=f"Speed against accuracy: {scene}",
+        caption=(
+            f"Largest relative error of the four responses over processor time, {scene}. Dots: as stated by "
+            "the method; crosses: difference from the best answer. Ring: the answer to the request."
+        ),
+        figure=figure,
+        tables=(
+            table(
+                "tradeoff_scene",
+                method=np.array([each.method for each in points]),
+                time_s=np.array([each.time_s for each in points]),
+                error=np.array([each.error for each in points]),
+                is_stated=np.array([int(each.is_stated) for each in points]),
+                is_chosen=np.array([int(each.is_chosen) for each in points]),
+            ),
+        ),
+    )
 
 
 def tradeoff_figure(benchmark: AccuracyBenchmark) -> DrawnFigure:

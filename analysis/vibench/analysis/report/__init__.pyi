@@ -31,6 +31,7 @@ from ._figures import (
     branches_figure as branches_figure,
     chain_figure as chain_figure,
     contact_forces_figure as contact_forces_figure,
+    curve_figure as curve_figure,
     draw_line as draw_line,
     exponent_spectrum_figure as exponent_spectrum_figure,
     frequency_axis as frequency_axis,

@@ -20,7 +20,7 @@ from ..figures.style import (
     new_figure,
     styled,
 )
-from ..figures.tradeoff import tradeoff_figure
+from ..figures.tradeoff import curve_figure, tradeoff_figure
 
 __all__ = [
     "COLLIDING",
@@ -34,6 +34,7 @@ __all__ = [
     "branches_figure",
     "chain_figure",
     "contact_forces_figure",
+    "curve_figure",
     "draw_line",
     "exponent_spectrum_figure",
     "frequency_axis",

@@ -39,8 +39,8 @@ from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
 
 LONGEST_S = 60.0
 """Time after which an answer is refined no further, where none was requested [s]."""
-FIRST_S, GRACE_S = 0.1, 0.15
-"""When the first answer is due, and how much later than the requested time the last one may begin [s]."""
+FIRST_S, GRACE_S = 0.1, 0.05
+"""When the first answer is due, and the nominal cost that it may take in any case [s]."""
 PART_S = 4e-3
 """Nominal cost of what is followed between two looks at the clock [s]."""
 FIRST_CYCLES = 1e4
@@ -54,9 +54,9 @@ LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """The motion from the start is looked at after this long, so many drive periods, or this share of the way."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
 SAME = 1e-3
-"""Relative scatter up to which all starts came to one motion that repeats."""
-OTHER_DIFFERS = 0.5
-"""Relative difference of a motion that no start has come to yet."""
+"""Relative difference from the middle of all starts up to which they came to one motion that repeats."""
+OTHER_DIFFERS = 1.0
+"""Relative difference of a motion that no start has come to yet: chaos beside a motion without impacts."""
 FEWEST_STARTS, MOST_STARTS = 16, 1_000_000
 MOST_FREEDOM = 200
 """Degrees of freedom beyond which Student's quantile hardly changes."""
@@ -144,8 +144,10 @@ class _Refinement:
         self._due_s = min(FIRST_S, clock.limit_s)
         self._orbit: _Orbit | None = None
         self._closest = CLOSE
-        self._size_m = 0.0
+        self._size_m = self._spent_s = 0.0
         self._has_answered = False
+        self._recent = np.empty((0, 6))
+        """States once a drive period, shape (n, 6)."""
 
     def answers(self) -> Iterator[ScenePrediction]:
         """Follow the motion from its start, and go on by what it turns out to be."""
@@ -161,7 +163,6 @@ class _Refinement:
 
     def _all(self) -> Iterator[ScenePrediction]:
         settle_s = self._settle_s
-        recent = np.empty((0, 6))
         kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
         while self._main.time_s < settle_s:
             made = round(self._main.time_s * self._frequency_hz)
@@ -177,7 +178,7 @@ class _Refinement:
             if self._have_parted(ours, other):
                 yield from self._many_starts()
                 return
-            recent = np.concatenate([recent, states_of(ours)])[-kept:]
+            self._recent = recent = np.concatenate([self._recent, states_of(ours)])[-kept:]
             if self._approaches(recent):
                 yield self._on_orbit()
                 return
@@ -203,15 +204,15 @@ class _Refinement:
     ) -> list[Stretch] | None:
         """Follow a motion in short parts; None where time has run out, or the motion was lost."""
         parts: list[Stretch] = []
-        grace_s = 0.0 if self._has_answered else GRACE_S
         while run.time_s < until_s:
-            if self._clock.taken_s > self._clock.limit_s + grace_s:
+            if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
                 return None
             spent_s = run.cost_s
             parts.append(follow_strobed(run, min(until_s, run.time_s + self._part_s), watch))
             if run.outcome is not Outcome.REACHED_END:
                 return None
             spent_s = max(run.cost_s - spent_s, 1e-9)
+            self._spent_s += spent_s
             self._part_s *= min(4.0, PART_S / spent_s)
         return parts
 
@@ -317,7 +318,28 @@ class _Refinement:
         windows = [self._observed(each, periods) for each in (run, twin)]
         if windows[0] is None or windows[1] is None:
             return
-        yield self._in_window(windows[0], windows[1], run)
+        found = self._in_window(windows[0], windows[1], run)
+        if found.error_estimate is not None:
+            errors = (
+                found.response_i_error,
+                found.response_ii_error,
+                found.relative_i_error,
+                found.relative_ii_error,
+            )
+            stated = np.array(errors, dtype=np.float64) + self._unsettled
+            found = _reported(with_errors(found, stated), self._target, self._clock, 1, None)
+        yield found
+
+    @property
+    def _unsettled(self) -> float:
+        """How far the motion still has to go, over its size, by how it changed in a forgetting time."""
+        points = self._recent / self._scales
+        lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
+        before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
+        if len(before) == 0:
+            return 1.0
+        size = float(np.abs(points).max(initial=1e-300))
+        return SAFETY * float(np.abs(before - points[-1]).max(axis=1).min()) / size
 
     def _in_window(
         self,
@@ -411,7 +433,7 @@ class _Refinement:
         """Estimate how many starts reach the requested error."""
         assert self._target.error is not None
         ratio = float(mean_error(seen).max()) / self._target.error
-        power = 1.0 if _is_one_motion(seen) else 2.0
+        power = 2.0 if _others(seen) is None else 1.0
         return math.ceil(min(1.05 * len(seen) * math.pow(ratio, power), MOST_STARTS))
 
     def _mean(self, seen: Sequence[Floats], window: ObservedWindow) -> ScenePrediction:
@@ -420,7 +442,7 @@ class _Refinement:
         responses = np.array(seen)
         mean = responses.mean(axis=0)
         found = self._prediction(mean, mean_error(seen), run.time_s, window.length_s, window.impacts)
-        repeats = self._pace.repeats(window.stretches) if _is_one_motion(seen) else None
+        repeats = self._pace.repeats(window.stretches) if _others(seen) == 0 else None
         begins_s = run.time_s - window.length_s
         found = replace(
             found,
@@ -494,19 +516,27 @@ def mean_error(seen: Sequence[Floats]) -> Floats:
 
     Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
     Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
-    all came to one motion, another may still have the share that Wilson's interval leaves.
+    most came to one motion that repeats, others may have the share that Wilson's interval leaves.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
     mean, count = responses.mean(axis=0), len(seen)
     times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
-    unseen = OTHER_DIFFERS * wilson_share(0, count).high if _is_one_motion(seen) else 0.0
+    others, unseen = _others(seen), 0.0
+    if others is not None:
+        share = wilson_share(others, count)
+        unseen = (share.high - share.share) * max(
+            OTHER_DIFFERS, float((np.ptp(responses, axis=0) / mean).max())
+        )
     return np.asarray(times * padded.std(axis=0, ddof=1) / mean + unseen + ROUNDING)
 
 
-def _is_one_motion(seen: Sequence[Floats]) -> bool:
+def _others(seen: Sequence[Floats]) -> int | None:
+    """Count the starts that did not come to the motion of most; None where most came to none that repeats."""
     responses = np.array(seen)
-    return bool(np.all(np.ptp(responses, axis=0) < SAME * responses.mean(axis=0)))
+    middle = np.median(responses, axis=0)
+    others = int(np.sum(np.any(np.abs(responses - middle) > SAME * middle, axis=1)))
+    return others if 2 * others <= len(seen) else None
 
 
 def _reported(

@@ -1,0 +1,146 @@
+"""Error over time of every method that can answer one scene, measured on this machine. SI units."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ..model.accuracy import Accuracy
+from ..model.state import Floats
+from ..periodic.balance_branch import BalanceOptions, balance
+from ..periodic.first_order_balance import first_order_states
+from ..periodic.harmonic_balance import BalanceEnd, HarmonicSet, structure_of
+from ..periodic.restoring_force import PowerSpring, spring_of
+from ..periodic.shooting import ShootingEnd, periodic_orbit
+from ..scene.prediction import Method, ScenePrediction
+from ..scene.refinement import refine_scene
+from ..scene.scene import AutomaticDuration, FixedDuration, Scene
+from ..scene.solve import solve_scene
+
+REFINED = "requested error"
+TOLERANCES = (1e-2, 1e-4)
+"""Of the many-harmonic balance."""
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """One answer of one method."""
+
+    method: str
+    time_s: float
+    """Processor time."""
+    error: float
+    """The largest relative error of the four responses."""
+    response_i: float
+    response_ii: float
+    is_stated: bool
+    """By the method itself; otherwise it is the difference from the best answer."""
+    is_chosen: bool = False
+    """What a request for the scene's error and time returns."""
+
+
+Answer = tuple[Floats, float | None]
+"""The four responses, and their largest relative error where the method states one."""
+
+
+def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
+    """Answer a scene with a target by every method that can, the answers to its target first.
+
+    Methods that give no answer for the scene are left out. Raises ValueError when the scene has no target, or
+    cannot be followed in time.
+    """
+    refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
+    for found in refine_scene(scene):
+        refined.append(found)
+        times_s.append(time.thread_time() - began_s)
+    best = _responses(refined[-1])
+    if refined[-1].error_estimate is None:
+        return
+    is_closed = refined[-1].method is Method.CLOSED_FORM
+    name = "closed form" if is_closed else REFINED
+    for found, taken_s in zip(refined, times_s, strict=True):
+        if found.error_estimate is not None:
+            two = _two(found)
+            yield CurvePoint(
+                name, taken_s, found.error_estimate, *two, is_stated=True, is_chosen=found is refined[-1]
+            )
+    for method, answer in _methods(scene):
+        began_s = time.thread_time()
+        try:
+            given = answer()
+        except ValueError:
+            continue
+        taken_s = time.thread_time() - began_s
+        if given is None:
+            continue
+        responses, stated = given
+        error = float(np.max(np.abs(responses / best - 1.0))) if stated is None else stated
+        two = float(responses[0]), float(responses[1])
+        yield CurvePoint(method, taken_s, error, *two, is_stated=stated is not None)
+
+
+def _methods(scene: Scene) -> Iterator[tuple[str, Callable[[], Answer | None]]]:
+    window_s = scene.duration.window_s
+    for level in Accuracy:
+        yield f"30 s, {level}", partial(_solved, scene, level, partial(FixedDuration, window_s=window_s))
+        yield f"until settled, {level}", partial(_solved, scene, level, partial(AutomaticDuration, window_s))
+    yield "shooting", partial(_shot, scene)
+    yield "first-order balance", partial(_first_order, scene)
+    for tolerance in TOLERANCES:
+        yield f"many-harmonic balance, {tolerance:g}", partial(_balanced, scene, tolerance)
+
+
+def _solved(
+    scene: Scene, level: Accuracy, duration: Callable[[], FixedDuration | AutomaticDuration]
+) -> Answer | None:
+    asked = Scene(
+        scene.specimen, scene.drive, accuracy=level, duration=duration(), start=scene.start, budget_s=0.0
+    )
+    found = solve_scene(asked)
+    return None if found.error_estimate is None else (_responses(found), found.error_estimate)
+
+
+def _shot(scene: Scene) -> Answer | None:
+    orbit = periodic_orbit(scene.specimen, scene.drive)
+    if orbit.outcome is not ShootingEnd.CONVERGED or not orbit.is_stable:
+        return None
+    return np.array([orbit.response_i[0], orbit.response_ii[0], orbit.response_i[3], orbit.response_ii[3]]), (
+        orbit.error
+    )
+
+
+def _first_order(scene: Scene) -> Answer | None:
+    """Answer by the weakest stable motion, as from rest."""
+    spring = spring_of(scene.specimen)
+    if not isinstance(spring, PowerSpring):
+        return None
+    drive = scene.drive
+    states = first_order_states(structure_of(scene.specimen), spring, drive.frequency_hz, drive.amplitude_m)
+    stable = [each for each in states if each.is_stable_to_amplitude]
+    if not stable:
+        return None
+    x, p = abs(stable[0].displacements[0]), abs(stable[0].relative)
+    return np.array([x, x, p, p]) / drive.amplitude_m, None
+
+
+def _balanced(scene: Scene, tolerance: float) -> Answer | None:
+    spring, drive = spring_of(scene.specimen), scene.drive
+    kept = HarmonicSet.ODD if spring.is_odd else HarmonicSet.ALL
+    options = BalanceOptions(kept, tolerance=tolerance)
+    found = balance(structure_of(scene.specimen), spring, drive.frequency_hz, drive.amplitude_m, options)
+    if found.outcome is not BalanceEnd.CONVERGED:
+        return None
+    first, lines = found.response_i, found.response_ii
+    return np.array([first[0], lines[0], first[-1], lines[-1]]), None
+
+
+def _responses(found: ScenePrediction) -> Floats:
+    values = (found.response_i, found.response_ii, found.relative_i, found.relative_ii)
+    return np.array(values, dtype=np.float64)
+
+
+def _two(found: ScenePrediction) -> tuple[float, float]:
+    responses = _responses(found)
+    return float(responses[0]), float(responses[1])

@@ -1,0 +1,38 @@
+"""`vibench tradeoff` of one's own scene: error over time for every method that can answer it."""
+
+import json
+
+import pytest
+
+
+def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibench_here, tmp_path):
+    asked = ("tradeoff", "--amplitude", 5e-6, "--frequency", 100, "--model", "power:7", "--error", "0.1 %")
+    ran = vibench_here(*asked, "--json", "--out", tmp_path / "new", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    points = json.loads(ran.stdout)["points"]
+    (chosen,) = [each for each in points if each["is_chosen"]]
+    assert chosen["error"] <= 1e-3
+    by_method = {each["method"]: each for each in points}
+    assert {"shooting", "first-order balance", "30 s, quick", "until settled, reference"} < by_method.keys()
+    assert by_method["shooting"]["response_i"] == pytest.approx(chosen["response_i"], rel=1e-6)
+    assert not by_method["first-order balance"]["is_stated"]
+    assert 0.01 < by_method["first-order balance"]["error"] < 0.2
+    assert (tmp_path / "new" / "tradeoff_scene.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--amplitude", 5e-6), "a scene needs both --amplitude and --frequency"),
+        (("--error", "1%"), "a scene needs both --amplitude and --frequency"),
+        (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0"),
+        (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
+        (("--amplitude", 5e-6, "--frequency", 100, "--markdown", "x.md"), "leave out one of the two"),
+    ],
+)
+def test_a_scene_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
+    ran = vibench_here("tradeoff", *arguments, cwd=tmp_path)
+    assert ran.returncode != 0
+    (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
+    assert said in line
+    assert list(tmp_path.iterdir()) == []
