@@ -151,3 +151,10 @@ def test_a_long_request_that_is_dropped_is_overtaken_by_a_short_one():
     assert 0 < len(first) < 11_001
     assert len(second) == 12 + 1
     assert second[-1] is None
+
+
+def test_a_requested_error_replaces_accuracy_duration_and_budget():
+    request = SimulationRequest(**LINEAR, error="1 %", time_s="2 s", accuracy="quick", duration_s=4.0)
+    assert request.study.target is not None
+    assert (request.study.error, request.study.time_s, request.study.accuracy) == (0.01, 2.0, "standard")
+    assert cost_sentences(request, 2) == ("12 points, each to an error of 1 % within 2 s, on 2 idle cores.",)

@@ -39,6 +39,10 @@ CHAOS_SCATTER = 0.03
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     """Return what a request's accuracy costs and errs, and how long it takes on this many idle cores."""
+    if request.has_target:
+        wish = "" if request.error is None else f" to an error of {100.0 * request.error:g} %"
+        limit = "a minute" if request.time_s is None else f"{request.time_s:g} s"
+        return (f"{request.points} points, each{wish} within {limit}, on {cores} idle cores.",)
     level = MEASURED[request.accuracy]
     each_s = request.simulated_s / len(request.models)
     laws = [request.specimen_under(model).contact for model in request.models]

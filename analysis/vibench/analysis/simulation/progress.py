@@ -25,7 +25,15 @@ from vibench.sim import (
     settle_scene,
 )
 from vibench.sim.maps import Map, MapResults, Range, Spacing, compute_map, map_solver
-from vibench.sim.study import MemoryStore, PointAnswer, Study, executor_of, frequency_range
+from vibench.sim.study import (
+    MemoryStore,
+    PointAnswer,
+    Study,
+    TargetError,
+    TargetTime,
+    executor_of,
+    frequency_range,
+)
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..dynamics import (
@@ -315,6 +323,10 @@ class SimulationRequest(SpecimenChoice):
     """Length of its end that is observed."""
     budget_s: NonNegativeFloat = BUDGET_S
     """Most processor time a point for other starts, where the start is forgotten; 0 looks for none."""
+    error: TargetError | None = None
+    """Relative error to reach at each point, as 0.01; it replaces accuracy, duration and budget."""
+    time_s: TargetTime | None = None
+    """Time in which each point is answered as exactly as possible; as the error, alone or with it."""
     exponent: Exponent = Exponent.LEFT_OUT
     """Largest Lyapunov exponent; it about doubles the work."""
     signal_hz: PositiveFloat | None = 260.0
@@ -350,11 +362,20 @@ class SimulationRequest(SpecimenChoice):
             amplitudes_m=(self.amplitude_m,),
             frequencies_hz=frequency_range(self.start_hz, self.stop_hz, self.step_hz),
             observe=(Observable.RESPONSE, *exponents),
-            accuracy=self.accuracy,
-            duration_s=self.duration_s,
             window_s=self.window_s,
-            budget_s=self.budget_s,
+            error=self.error,
+            time_s=self.time_s,
+            **({} if self.has_target else self._by_hand),
         )
+
+    @property
+    def has_target(self) -> bool:
+        """Whether an error or a time was requested."""
+        return self.error is not None or self.time_s is not None
+
+    @property
+    def _by_hand(self) -> dict[str, object]:
+        return {"accuracy": self.accuracy, "duration_s": self.duration_s, "budget_s": self.budget_s}
 
     @property
     def points(self) -> int:

@@ -41,8 +41,8 @@ LONGEST_S = 60.0
 """Time after which an answer is refined no further, where none was requested [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
 """When the first answer is due, and the nominal cost that it may take in any case [s]."""
-PART_S = 4e-3
-"""Nominal cost of what is followed between two looks at the clock [s]."""
+PART_S, MOST_PART_S = 4e-3, 30e-3
+"""Nominal cost, and the most processor time, of what is followed between two looks at the clock [s]."""
 FIRST_CYCLES = 1e4
 """Cycles of the fastest mode that are followed before the first look, at most."""
 CLOSE = 3e-3
@@ -50,6 +50,8 @@ CLOSE = 3e-3
 RETURNED = 1e-10
 """A motion is periodic when it comes back this close, over its size."""
 ITERATIONS = 8
+MOST_PUSH = 1000.0
+"""Drive amplitudes that stand for the gap, at most, where other starts are drawn."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """The motion from the start is looked at after this long, so many drive periods, or this share of the way."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
@@ -137,7 +139,7 @@ class _Refinement:
         fastest = float(np.abs(modal_form(scene.specimen).rates).max(initial=0.0))
         self._part_s = min(1.0 / frequency_hz, FIRST_CYCLES / max(fastest, frequency_hz))
         self._begin = FollowedRun(scene.specimen, scene.drive, LOOSE, scene.start.state)
-        self._pushes = pushes(scene.specimen, scene.drive, 1, SEED)
+        self._pushes = self._drawn(1)
         self._main, self._twin = self._begin.apart(), self._begin.apart(TIGHT).pushed(self._pushes[0])
         self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
@@ -186,6 +188,12 @@ class _Refinement:
                 yield from self._interim()
         yield from self._one_start()
 
+    def _drawn(self, count: int) -> Floats:
+        """Draw small changes of the start, shape (count, 6), far below a motion that is itself small."""
+        drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
+        gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
+        return np.asarray(drawn * (most_m / gap_m if most_m < gap_m < math.inf else 1.0))
+
     @property
     def _settle_s(self) -> float:
         """How long a motion is followed that does not repeat."""
@@ -207,13 +215,14 @@ class _Refinement:
         while run.time_s < until_s:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
                 return None
-            spent_s = run.cost_s
+            spent_s, began_s = run.cost_s, time.thread_time()
             parts.append(follow_strobed(run, min(until_s, run.time_s + self._part_s), watch))
             if run.outcome is not Outcome.REACHED_END:
                 return None
-            spent_s = max(run.cost_s - spent_s, 1e-9)
-            self._spent_s += spent_s
-            self._part_s *= min(4.0, PART_S / spent_s)
+            spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
+            self._spent_s += max(spent_s, taken_s)
+            # Parts go by the nominal cost, the same on every machine, unless that is far too low.
+            self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
     def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
@@ -423,7 +432,7 @@ class _Refinement:
     def _observed_start(self, number: int, begins_s: float) -> ObservedWindow | None:
         """Observe the named window of a start; None where time has run out, or the motion was lost."""
         if number > len(self._pushes):
-            self._pushes = pushes(self._scene.specimen, self._scene.drive, 2 * number, SEED)
+            self._pushes = self._drawn(2 * number)
         run = self._main if number == 0 else self._begin.pushed(self._pushes[number - 1])
         if self._followed(run, begins_s) is None:
             return None

@@ -59,6 +59,8 @@ from ._study import (
     Start as Start,
     Study as Study,
     StudyObservable as StudyObservable,
+    TargetError as TargetError,
+    TargetTime as TargetTime,
     frequency_range as frequency_range,
     plausibility_warnings as plausibility_warnings,
     study_solver as study_solver,
