@@ -22,17 +22,22 @@ class Announced:
         self.pid = pid
         self.start = start
         self.is_alive = is_alive
+        try:
+            with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
+                self._facts = file.read()  # before it is withdrawn
+        except OSError:
+            self._facts = b""
 
     def name(self) -> str:
-        """Return what it was started for, and its number."""
+        """Return what it was started for, as `printable` writes it, and its number."""
         import json
 
         try:
-            with open(self.path, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                what = json.load(file)["what"]
-        except (OSError, ValueError, KeyError, TypeError):
+            what = str(json.loads(self._facts)["what"])
+        except (ValueError, KeyError, TypeError):
             what = "a program of another user"
-        return f"{what}, process {self.pid}"
+        shown = (each if each.isprintable() else each.encode("unicode_escape").decode() for each in what)
+        return f"{''.join(shown)}, process {self.pid}"
 
 
 def main() -> None:
@@ -75,14 +80,13 @@ def stopped(level: str, reason: str, pid: str) -> int | None:
             put_down(stop, reason)
     except OSError:
         return None
-    names = {each.path: each.name() for each in programs}  # before they are withdrawn
     if not programs or any(fate_of(stop) is not Fate.SILENT for stop in stops):
         return None
     for each in living:
-        print(f"{names[each.path]}: has taken the stop ({level}); its output is off.")  # noqa: T201
+        print(f"{each.name()}: has taken the stop ({level}); its output is off.")  # noqa: T201
     killed = [each for each in programs if not each.is_alive]
     for each in killed:
-        print(f"error: {names[each.path]}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
+        print(f"error: {each.name()}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
         os.unlink(each.path)  # noqa: PTH108 - the caller of the stop was informed
     return 1 if killed else 0
 

@@ -93,6 +93,16 @@ def test_of_one_that_was_killed_it_says_what_to_do():
         assert "no engine is running" in vibench_stop().stderr
 
 
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_a_name_moves_no_cursor(is_killed):
+    with driving("a\x1b[2J\u202e\x9b1m") as hostile:
+        if is_killed:
+            hostile.kill()
+            hostile.wait()
+        told = vibench_stop()
+    assert rf"a\x1b[2J\u202e\x9b1m, process {hostile.pid}" in (told.stderr if is_killed else told.stdout)
+
+
 def test_what_the_system_stopped_is_not_called_silent():
     with driving("north") as north:
         os.kill(north.pid, 19)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vibench.acquisition import ConfigurationError
+from vibench.acquisition import ConfigurationError, printable
 from vibench.acquisition.rig import load_rig
 
 from .window.open_window import display_trouble
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
         try:
             load_rig(options.bench)
         except ConfigurationError as error:
-            sys.stderr.write(f"{error}\n")
+            sys.stderr.write(f"{printable(str(error))}\n")
             return NO_WINDOW
     starting = _sign_of_life()
     from .window.open_window import open_window  # noqa: PLC0415

@@ -153,6 +153,12 @@ def test_a_bench_that_is_missing_is_refused_before_a_window_opens(tmp_path, caps
     assert len(said.splitlines()) == 1
 
 
+def test_the_name_of_a_refused_bench_moves_no_cursor(tmp_path, capsys):
+    (tmp_path / "a\x1b[2J\u202e.toml").write_text("name = 1", encoding="utf-8")
+    assert main(["--bench", str(tmp_path / "a\x1b[2J\u202e.toml")]) == NO_WINDOW
+    assert r"a\x1b[2J\u202e.toml: name = 1" in capsys.readouterr().err
+
+
 def test_what_says_that_the_window_is_coming_bears_its_name(qapp):
     """The program's file stood there."""
     label = _sign_of_life()
