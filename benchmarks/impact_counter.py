@@ -8,7 +8,7 @@ goes to the counter in blocks of 50 ms, as it does in a run. The simulation know
 
 import numpy as np
 
-from vibench.analysis.live._impacts import ImpactCounter
+from vibench.analysis.live._view import ImpactCounter
 from vibench.sim import Harmonic, gong2025, integrate
 
 RATE_HZ = 51_200.0

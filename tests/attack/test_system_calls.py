@@ -27,7 +27,7 @@ def arm():
     ctypes.CDLL(os.environ["{LIBRARY}"]).arm(call, 1, when, fault, bytes(folder))
 """
 EXPORT = """
-from vibench.analysis.exchange._new_file import new_file
+from vibench.analysis.exchange._export import new_file
 with new_file(folder / "file") as path:
     path.write_text("all of it")
     arm()

@@ -4,7 +4,7 @@ import signal
 import pytest
 
 from vibench.analysis import AnalysisError
-from vibench.cli.analyst import second_process
+from vibench.cli.demo import second_process
 
 
 def test_the_end_of_the_process_that_analyses_is_told_and_ends_no_measurement(tmp_path):

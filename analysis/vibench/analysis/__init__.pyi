@@ -51,8 +51,12 @@ from .results.campaign_results import (
     CampaignResults as CampaignResults,
     FailedStep as FailedStep,
     analyse_files as analyse_files,
+    budget_sentences as budget_sentences,
+    budgets_of as budgets_of,
+    campaign_summary as campaign_summary,
     merged_results as merged_results,
     recordings_in as recordings_in,
+    result_summary as result_summary,
 )
 from .results.compared_recording import (
     ComparedRecording as ComparedRecording,
@@ -62,12 +66,6 @@ from .results.compared_recording import (
 )
 from .results.measurement_analysis import analyse as analyse
 from .results.spectral_functions import spectral_functions as spectral_functions
-from .results.summary import (
-    budget_sentences as budget_sentences,
-    budgets_of as budgets_of,
-    campaign_summary as campaign_summary,
-    result_summary as result_summary,
-)
 from .signals.window import Window as Window
 from .uncertainty.expected import (
     Expected as Expected,

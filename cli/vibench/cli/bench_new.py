@@ -22,8 +22,14 @@ from vibench.acquisition import (
     open_bench,
     stop_on_signal,
 )
-from vibench.acquisition.first_day.configured import QUESTIONS, Question, configured
-from vibench.acquisition.first_day.procedure import DayPage, first_day, in_a_command
+from vibench.acquisition.first_day.configured import (
+    QUESTIONS,
+    DayPage,
+    Question,
+    configured,
+    first_day,
+    in_a_command,
+)
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
 from vibench.sim import toml_table

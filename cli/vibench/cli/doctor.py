@@ -18,7 +18,7 @@ from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
 from vibench.sim.engine.library import EngineError
 from vibench.sim.engine.run import native_engine
-from vibench.sim.operating_system.state_folder import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
+from vibench.sim.operating_system.this import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
 
 from .output import console, print_json
 from .paths import AsJson

@@ -56,7 +56,7 @@ from .motion.integrate import (
     integrate as integrate,
 )
 from .motion.response import Response as Response, steady_response as steady_response
-from .operating_system.state_folder import state_folder as state_folder
+from .operating_system.this import state_folder as state_folder
 from .periodic.balance_branch import BalanceOptions as BalanceOptions
 from .periodic.branch import (
     BifurcationKind as BifurcationKind,

@@ -8,8 +8,7 @@ import pytest
 
 from vibench.acquisition.rig import GeneratorConfig
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.afg1022_settings import ChannelSettings
-from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.channel_output import ChannelSettings, Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks, Reply
 from vibench.virtual_rig.generator.scpi_message import ErrorCode
 from vibench.virtual_rig.usb.bus import plug_in, unplug

@@ -11,8 +11,7 @@ from vibench.acquisition.drivers import AFG1022X
 from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
-from vibench.virtual_rig.generator.afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP, RunMode
-from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.channel_output import OPEN_AMPLITUDE_RANGE_VPP, Panel, RunMode
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)

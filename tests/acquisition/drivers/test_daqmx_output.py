@@ -9,8 +9,8 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import DaqmxDigitizer, DaqmxOutput
+from vibench.acquisition.drivers._daqmx import daqmx_session
 from vibench.acquisition.drivers._daqmx_output import _told_to_idle_at_zero
-from vibench.acquisition.drivers._daqmx_session import daqmx_session
 from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput
 from vibench.acquisition.rig import OutputConfig, load_rig

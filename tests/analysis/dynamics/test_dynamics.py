@@ -32,7 +32,7 @@ from vibench.analysis.dynamics import (
     write_spectrum,
 )
 from vibench.analysis.report import branches_figure, exponent_spectrum_figure
-from vibench.analysis.sine.tracked_resonance import TrackedResonance
+from vibench.analysis.sine.stepped_response import TrackedResonance
 from vibench.sim import Parameter, gong2025
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live._impacts import ImpactCounter
+from vibench.analysis.live._view import ImpactCounter
 
 RATE = 51_200.0
 

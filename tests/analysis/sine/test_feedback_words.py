@@ -20,7 +20,7 @@ from vibench.analysis.figures.stepped_sine import (
 )
 from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.report import findings, result_figures
-from vibench.analysis.sine.tracked_resonance import feedback_sentences, noted_jumps
+from vibench.analysis.sine.stepped_response import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parents[3]
 JUMP = JumpNote(

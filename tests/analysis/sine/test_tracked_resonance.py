@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vibench.acquisition.recording import DwellNote, ResonanceNote, Steadiness
-from vibench.analysis.sine.tracked_resonance import (
+from vibench.analysis.sine.stepped_response import (
     backbone_sentence,
     feedback_sentences,
     lost_levels,

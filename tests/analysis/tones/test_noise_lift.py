@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.integrate import quad
 from scipy.special import erf
 
-from vibench.analysis.tones.noise_lift import noise_lift
+from vibench.analysis.tones.sine_fit import noise_lift
 
 
 def test_noise_alone_reaches_four_and_a_half_standard_deviations_in_a_second():

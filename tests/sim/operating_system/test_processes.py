@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.sim.operating_system.processes import Place, is_process, place_of
-from vibench.sim.operating_system.this import process_start
+from vibench.sim.operating_system.this import Place, is_process, place_of, process_start
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 

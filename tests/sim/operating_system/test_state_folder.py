@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.windows_here import windows
-from vibench.sim.operating_system import state_folder as _state_folder
-from vibench.sim.operating_system.state_folder import state_folder
+from vibench.sim.operating_system import this as _state_folder
+from vibench.sim.operating_system.this import state_folder
 
 
 def test_the_variable_comes_before_everything(monkeypatch, tmp_path):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.afg1022_settings import MODULATIONS
+from vibench.virtual_rig.generator.channel_output import MODULATIONS
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 PLAIN = Quirks(

@@ -7,7 +7,7 @@ import pytest
 import pyvisa
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.scpi_socket import ScpiSocket
+from vibench.virtual_rig.generator.scpi_instrument import ScpiSocket
 
 
 @pytest.fixture

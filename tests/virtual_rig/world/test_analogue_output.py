@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.world.analogue_output import AnalogueOutput
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
+from vibench.virtual_rig.world.world import AnalogueOutput
 
 GRID_RATE_HZ = USUAL_GRID.rate_hz
 

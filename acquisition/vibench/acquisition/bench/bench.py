@@ -14,8 +14,14 @@ from threading import Event as Alarm
 from types import TracebackType
 from typing import Any, Self
 
-from vibench.sim.operating_system.state_folder import shared_folder, state_folder
-from vibench.sim.operating_system.this import is_locked_alone, open_for_all, read_at, write_at
+from vibench.sim.operating_system.this import (
+    is_locked_alone,
+    open_for_all,
+    read_at,
+    shared_folder,
+    state_folder,
+    write_at,
+)
 
 from ..errors import AcquisitionError, InstrumentBusy
 from ..host.chosen import chosen

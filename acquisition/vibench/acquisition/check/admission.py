@@ -15,8 +15,7 @@ from typing import assert_never
 
 from pydantic import ValidationError
 
-from vibench.sim.operating_system.state_folder import state_folder
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replaced, state_folder
 
 from ..bench.bench import Bench, BenchKind
 from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest

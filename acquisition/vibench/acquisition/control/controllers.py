@@ -8,11 +8,11 @@ from ..instruments import PlugInKind, plug_in
 from ..plan import Measurement
 from ..rig import Channel, Rig
 from .control_action import Controller
-from .dwell_controller import hold_dwell, hold_sweep
 from .feedback_channels import feedback_channels_of
 from .jump_controller import step_settled
 from .noise_controller import equalise_noise
 from .resonance_controller import track_resonance
+from .settling_controller import hold_dwell, hold_sweep
 from .sine_loop import SineLoop, hold_response
 
 CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(

@@ -12,7 +12,6 @@ from ..excitation.steps import Segment
 from ..plan import RunState
 from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
 from .control_action import Controller
-from .dwell_controller import recorded
 from .settling_controller import (
     LocatedJump,
     SettledPoint,
@@ -21,6 +20,7 @@ from .settling_controller import (
     is_on_branch,
     located,
     ratio,
+    recorded,
     side,
 )
 from .sine_loop import SineLoop, glided, started

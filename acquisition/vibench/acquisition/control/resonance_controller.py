@@ -13,10 +13,9 @@ from ..plan import LOOK_PERIODS, RunState, needed_vpp
 from ..recording import Held, LockResult, ResonanceNote, Steadiness
 from ..rig import OnTable
 from .control_action import Controller
-from .dwell_controller import recorded, recorded_and_judged
 from .feedback_channels import require_answer
 from .phase_law import LearntMode, PhaseError, PhaseLaw, PhaseResonance, PhaseSearch, TrackedPlace
-from .settling_controller import SettledState, SettlingController
+from .settling_controller import SettledState, SettlingController, recorded, recorded_and_judged
 from .sine_loop import SineLoop, moved, started
 from .steadiness import ORDERS, Periods
 

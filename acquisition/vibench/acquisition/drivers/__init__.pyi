@@ -3,12 +3,10 @@ from ._afg1022x import (
 )
 from ._daqmx import (
     DaqmxDigitizer as DaqmxDigitizer,
+    list_daqmx_devices as list_daqmx_devices,
 )
 from ._daqmx_output import (
     DaqmxOutput as DaqmxOutput,
-)
-from ._daqmx_session import (
-    list_daqmx_devices as list_daqmx_devices,
 )
 from ._file_player import (
     FilePlayer as FilePlayer,

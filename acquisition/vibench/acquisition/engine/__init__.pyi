@@ -25,8 +25,10 @@ from ._server import (
 from ._start import (
     AdoptedEngine as AdoptedEngine,
     EngineProcess as EngineProcess,
+    StopDelivery as StopDelivery,
     left_alone as left_alone,
     start_engine as start_engine,
+    stop_engine as stop_engine,
 )
 from ._status import (
     DRIVING as DRIVING,
@@ -43,10 +45,6 @@ from ._status import (
     Supervision as Supervision,
     TwinStatus as TwinStatus,
     TwinSwitch as TwinSwitch,
-)
-from ._stop_engine import (
-    StopDelivery as StopDelivery,
-    stop_engine as stop_engine,
 )
 from ._verbs import (
     CampaignRequest as CampaignRequest,

@@ -13,8 +13,7 @@ from threading import Lock
 from time import monotonic
 from typing import IO, Any, Literal, TypeVar
 
-from vibench.sim.operating_system.processes import Place
-from vibench.sim.operating_system.state_folder import state_folder
+from vibench.sim.operating_system.this import Place, state_folder
 from vibench.stop_files import SWITCH_OFF
 
 from .. import errors

@@ -7,22 +7,20 @@ from ._guarded import (
 )
 from ._protocols import (
     AnalogOutput as AnalogOutput,
+    Block as Block,
+    Counts as Counts,
     Digitizer as Digitizer,
+    FoundDevice as FoundDevice,
     FunctionGenerator as FunctionGenerator,
     GeneratorDescription as GeneratorDescription,
+    Identity as Identity,
     IdleOutput as IdleOutput,
+    Knob as Knob,
+    Overload as Overload,
     RealTimeController as RealTimeController,
+    Samples as Samples,
+    SensorFacts as SensorFacts,
     Spacing as Spacing,
     Sweep as Sweep,
     read_block as read_block,
-)
-from ._values import (
-    Block as Block,
-    Counts as Counts,
-    FoundDevice as FoundDevice,
-    Identity as Identity,
-    Knob as Knob,
-    Overload as Overload,
-    Samples as Samples,
-    SensorFacts as SensorFacts,
 )

@@ -16,9 +16,15 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
-from vibench.sim.operating_system.processes import Place, is_process, place_of
-from vibench.sim.operating_system.state_folder import state_folder
-from vibench.sim.operating_system.this import OpenFile, process_start, rename
+from vibench.sim.operating_system.this import (
+    OpenFile,
+    Place,
+    is_process,
+    place_of,
+    process_start,
+    rename,
+    state_folder,
+)
 from vibench.stop_files import stop_path, taken_path
 
 from ..errors import AcquisitionError

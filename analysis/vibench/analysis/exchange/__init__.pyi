@@ -11,15 +11,13 @@ from ._export import (
     Results as Results,
     export_functions as export_functions,
     export_samples as export_samples,
+    new_file as new_file,
 )
 from ._import_recording import (
     import_recording as import_recording,
 )
 from ._mapping import (
     ImportMapping as ImportMapping,
-)
-from ._new_file import (
-    new_file as new_file,
 )
 from ._sep005 import (
     sep005 as sep005,

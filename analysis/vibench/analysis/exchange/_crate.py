@@ -21,7 +21,7 @@ from vibench.acquisition.recording import Recording
 
 from ..errors import InvalidRequest, NotEnoughData
 from ._excerpt import TransferObserver, unobserved
-from ._new_file import new_file
+from ._export import new_file
 
 METADATA = "ro-crate-metadata.json"
 CONTEXT = "https://w3id.org/ro/crate/1.1"

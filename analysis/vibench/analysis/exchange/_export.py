@@ -1,7 +1,9 @@
 """An excerpt of a recording becomes a file that other programs read."""
 
+import errno
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vibench.acquisition.recording import Recording, ResultArray, SavedResult
+from vibench.sim.operating_system.this import rename
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.facts import require_intact
@@ -19,10 +22,47 @@ from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts
 from ._mat import require_small, write_mat
-from ._new_file import new_file, require_unused
 from ._nexus import write_nexus
 from ._uff import UniversalFunction, write_uff, write_uff_functions
 from ._wav import require_sound, write_wav
+
+UNFINISHED = ".unfinished"
+_REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
+
+
+def require_unused(path: Path) -> None:
+    """InvalidRequest when a file has that name, or its folder does not exist."""
+    if path.exists():
+        raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
+    if not path.parent.is_dir():
+        raise InvalidRequest(f"{path.parent} is no folder; make it, or choose another place for {path.name}")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Give a name to write to; when all went well the file has ``path`` as its name, else it is gone.
+
+    Raises
+    ------
+    InvalidRequest
+        When ``path`` or its unfinished form exists, the folder does not, or the disk refuses.
+
+    """
+    unfinished = path.with_name(path.name + UNFINISHED)
+    for each in (path, unfinished):
+        require_unused(each)
+    try:
+        yield unfinished
+        require_unused(path)  # another program may have been as busy
+        rename(unfinished, path)
+    except OSError as error:
+        mend = "choose another folder" if error.errno in _REFUSED else "make room and try again"
+        raise InvalidRequest(
+            f"{path} could not be written: {error}; nothing was kept of it, so {mend}"
+        ) from error
+    finally:
+        with suppress(OSError):
+            unfinished.unlink()
 
 
 def require_results(recording: Recording) -> Mapping[str, SavedResult]:

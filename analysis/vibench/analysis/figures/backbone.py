@@ -9,8 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..model.overlay import SteppedSineOverlay
 from ..signals.arrays import Reals
-from ..sine.stepped_response import SteppedSineAnalysis
-from ..sine.tracked_resonance import (
+from ..sine.stepped_response import (
+    SteppedSineAnalysis,
     TrackedResonance,
     backbone_sentence,
     feedback_sentences,

@@ -12,7 +12,7 @@ from vibench.sim.branches import least_growth_time_s
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..dynamics import BranchDiagram, BranchLine
 from ..signals.arrays import Reals
-from ..sine.tracked_resonance import TrackedResonance
+from ..sine.stepped_response import TrackedResonance
 from ..tables import Table, rows, table
 from .style import (
     COLLIDING,

@@ -18,8 +18,7 @@ from vibench.acquisition.plan import (
 from ..model.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
 from ..signals.arrays import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
-from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
-from ..sine.tracked_resonance import feedback_sentences, noted_jumps
+from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis, feedback_sentences, noted_jumps
 from ..tables import columns, plus_minus, table
 from .ensemble_band import band_columns, run_text, simulated_label
 from .style import (

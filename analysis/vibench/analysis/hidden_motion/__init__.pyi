@@ -1,14 +1,3 @@
-from ._change_watch import (
-    BLOCK_S as BLOCK_S,
-    FALSE_ALARM_S as FALSE_ALARM_S,
-    Baseline as Baseline,
-    ChangeWatch as ChangeWatch,
-    KnownNumber as KnownNumber,
-    Level as Level,
-    baseline_path as baseline_path,
-    keep_baseline as keep_baseline,
-    kept_baseline as kept_baseline,
-)
 from ._contact_free import (
     Collisions as Collisions,
     FreeGap as FreeGap,
@@ -38,9 +27,18 @@ from ._hidden_view import (
     hidden_view as hidden_view,
 )
 from ._live_twin import (
+    BLOCK_S as BLOCK_S,
+    FALSE_ALARM_S as FALSE_ALARM_S,
+    Baseline as Baseline,
+    ChangeWatch as ChangeWatch,
+    KnownNumber as KnownNumber,
+    Level as Level,
     LiveMotion as LiveMotion,
     LiveState as LiveState,
     LiveTwin as LiveTwin,
+    baseline_path as baseline_path,
+    keep_baseline as keep_baseline,
+    kept_baseline as kept_baseline,
 )
 from ._parameters import (
     Hidden as Hidden,

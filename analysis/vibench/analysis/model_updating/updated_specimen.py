@@ -21,9 +21,8 @@ from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Labelled, columns, plain, plus_minus
 from ..uncertainty.budget import stated_of
-from .bracketed_gap import bracketed_gap
 from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
-from .gap_fit import fit_gap
+from .gap_fit import bracketed_gap, fit_gap
 from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
 from .specimen_fit import SpecimenFit, fit_specimen
 from .suspects import Assumption, Suspect

@@ -44,9 +44,8 @@ from ..model.draws import CLOCK_TOLERANCE
 from ..model.overlay import AbstractOverlay
 from ..model.prediction import PREDICTION_S, WINDOW_S
 from ..recordings.checks import AbstractAnalysis
-from ..results.campaign_results import CampaignResults
-from ..results.summary import budgets_of
-from ..sine.tracked_resonance import feedback_sentences, tracked_resonances
+from ..results.campaign_results import CampaignResults, budgets_of
+from ..sine.stepped_response import feedback_sentences, tracked_resonances
 from ..tables import plus_minus
 from ._page import ReportTable
 from ._result_tables import collision_table, dwell_table, edge_text, line_table, resonance_table

@@ -27,7 +27,7 @@ from ..recordings.checks import Check, Verdict
 from ..recordings.facts import RecordingFacts
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from ..results.compared_recording import drive_level
-from ..sine.tracked_resonance import lost_levels, tracked_resonances
+from ..sine.stepped_response import lost_levels, tracked_resonances
 from ._drawings import DRAWINGS, figures_together, limits, recording_figures, result_sentence
 from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
 from ._result_tables import nearest_resonance, uncertainty_table

@@ -10,7 +10,7 @@ from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, SweepResu
 from ..model.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
 from ..model.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..recordings.facts import specimen_of
-from ..results.summary import budgets_of
+from ..results.campaign_results import budgets_of
 from ..sine.collision_region import Edge
 from ..tables import plus_minus
 from ..uncertainty.budget import COVERAGE, Budget, Cause

@@ -1,6 +1,6 @@
 """All recordings of a campaign, analysed; one that cannot be analysed says why and stops no other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,7 +16,7 @@ from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
-from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, Result, SweepResult
+from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
 from ..kinds.noise import NOISE_FAMILY
 from ..model.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
 from ..model.driven_rig import says_shaker
@@ -26,6 +26,8 @@ from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
+from ..tables import plain
+from ..uncertainty.budget import Budget
 from .measurement_analysis import analyse
 
 Stage = Callable[[str], None]
@@ -320,3 +322,47 @@ def _started(path: Path) -> str:
             return recording.started_utc
     except RecordingError:
         return last
+
+
+def result_summary(result: AnyResult) -> Json:
+    """Say a result in numbers that JSON can hold; what is not finite becomes null."""
+    analysis = result.analysis
+    return {
+        "recording": plain(analysis.facts),
+        "checks": plain(analysis.checks),
+        "kind": ANALYSES[result.kind].family,
+        "measured": plain(analysis),
+        "uncertainty": plain(budgets_of(result)),
+        "simulated": plain(result.laid),
+    }
+
+
+def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
+    """Return the budget of uncertainty of each number that a reader takes away from a result.
+
+    Returns
+    -------
+    A budget each for A0 and Responses I and II of a dwell, the largest of both of a sweep or of steps,
+    and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). Those of a
+    recording that lasted until its results were known are widened, see `Budget.widened`.
+
+    """
+    found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
+    has_chosen_end = result.analysis.facts.measurement.until is not None
+    return tuple(each.widened() for each in found) if has_chosen_end else found
+
+
+def budget_sentences(results: CampaignResults) -> Iterator[str]:
+    """Say the numbers of each recording with their uncertainty and what it is made of, a sentence each."""
+    for each in results.in_order:
+        for budget in budgets_of(each):
+            yield f"{each.analysis.facts.name}: {budget.sentence}."
+
+
+def campaign_summary(results: CampaignResults) -> Json:
+    """Say all results of a campaign, and what failed."""
+    return {
+        "campaign": results.name,
+        "results": [result_summary(each) for each in results.results],
+        "failures": plain(results.failures),
+    }

@@ -18,7 +18,6 @@ from ..signals.confidence import standard_uncertainty
 from ..signals.quantity import ConvertedSignal, Quantity, converted_signal
 from ..spectra.spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Labelled
-from ..tones.noise_lift import noise_lift
 from ..tones.order_tracking import (
     ALL_ORDERS,
     TrackedOrders,
@@ -27,7 +26,7 @@ from ..tones.order_tracking import (
     order_turns,
     tracked_together,
 )
-from ..tones.sine_fit import DriveLevel, drive_level, peaks, steady_phase
+from ..tones.sine_fit import DriveLevel, drive_level, noise_lift, peaks, steady_phase
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5

@@ -1,7 +1,11 @@
 """Responses I and II at every frequency of a stepped sine."""
 
-from collections.abc import Callable
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import sqrt
+from statistics import fmean
 from typing import ClassVar
 
 import numpy as np
@@ -13,13 +17,23 @@ from vibench.acquisition.plan import (
     SteppedLevel,
     SteppedSine,
 )
-from vibench.acquisition.recording import SegmentLabel
+from vibench.acquisition.recording import (
+    FeedbackNote,
+    Held,
+    JumpNote,
+    JumpSearchEnd,
+    NoiseNote,
+    ResonanceNote,
+    SegmentLabel,
+    SegmentNote,
+    Steadiness,
+)
 
 from ..errors import NotEnoughData
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
-from ..tables import Labelled, columns
+from ..tables import Labelled, columns, plus_minus
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
@@ -161,3 +175,170 @@ class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
     """A stepped sine: responses at every frequency, or at every level."""
 
     DOCUMENT: ClassVar = "*response"
+
+
+# A mode's resonance at every level at which it was tracked: its backbone.
+#
+# What feedback found, in sentences: jumps, motions that do not repeat, resonances, missed levels.
+
+
+@dataclass(frozen=True)
+class NotedJump:
+    """A jump of a stepped sine between two settled frequencies."""
+
+    direction: str
+    low_hz: float
+    high_hz: float
+
+
+def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
+    """Return the jumps that were bracketed as closely as the plan asks."""
+    return tuple(
+        NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
+        for each in notes
+        if isinstance(each, JumpNote) and each.how is JumpSearchEnd.LOCALISED
+    )
+
+
+def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
+    """Yield what feedback found; nothing for a measurement without it."""
+    jumps = noted_jumps(notes)
+    if jumps:
+        said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
+        yield f"Jumps between {said}."
+    yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
+    yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
+    yield from _spectrum([each for each in notes if isinstance(each, NoiseNote) and each.realisation >= 0])
+
+
+def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
+    """Count recorded motions by what they do; a plain period of one is not worth a word."""
+    count = Counter((each.motion, each.period) for each in steps)
+    kinds = [
+        f"period {period}: {count[Steadiness.PERIODIC, period]}"
+        for period in sorted(period for motion, period in count if motion is Steadiness.PERIODIC)
+        if period > 1
+    ]
+    motions = Counter(each.motion for each in steps)
+    for motion, word in ((Steadiness.APERIODIC, "no period"), (Steadiness.UNSETTLED, "not settled")):
+        kinds += [f"{word}: {motions[motion]}"] * bool(motions[motion])
+    if kinds:
+        yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
+    outside = sum(each.level is Held.OUTSIDE for each in steps)
+    if outside:
+        yield f"The base was off its level in {outside} of them."
+
+
+def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
+    """Yield how near the base came to the spectrum that was asked for, over what was kept."""
+    if not kept:
+        return
+    worst = max(kept, key=lambda each: abs(each.worst_db))
+    rms = sqrt(fmean(each.base_rms**2 for each in kept))
+    asked = sqrt(fmean(each.asked_rms**2 for each in kept))
+    yield (
+        f"The base moved with {rms:.3g} m/s² rms, asked for were {asked:.3g}; "
+        f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance, the worst "
+        f"{worst.worst_db:+.1f} dB at {worst.worst_hz:g} Hz; kurtosis "
+        f"{fmean(each.kurtosis for each in kept):.2f}."
+    )
+    if (notched := fmean(each.notched for each in kept)) > 0:
+        yield f"{notched:.1%} of the lines were lowered for the response's sake."
+
+
+def _resonance(note: ResonanceNote) -> str:
+    level = f"{note.asked_m_per_s2:g} m/s²"
+    of = "phase resonance"
+    if note.harmonic > 1:
+        of = f"superharmonic {note.harmonic}:1 {of}"
+    if note.subharmonic > 1:
+        of = f"subharmonic 1:{note.subharmonic} {of}"
+    if note.frequency_hz is None or note.frequency_u_hz is None:
+        after = f"after {note.periods} periods " if note.periods else ""
+        return (
+            f"No {of} at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° "
+            f"at {note.at_hz:.5g} Hz, the level {note.held.value}, the motion {note.motion.value}."
+        )
+    took = f", {note.periods} periods" if note.periods else ""
+    hertz = plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)
+    text = f"{of[0].upper()}{of[1:]} at {hertz} Hz ({level}{took})"
+    if note.mode_hz is None or note.mode_u_hz is None:
+        return f"{text}."
+    return (
+        f"{text}; natural frequency {plus_minus(note.mode_hz, 2 * note.mode_u_hz)} Hz, "
+        f"damping ratio {note.damping_ratio:.3g}."
+    )
+
+
+@dataclass(frozen=True)
+class TrackedResonance:
+    """What was found of a mode at one level of the base."""
+
+    number: int
+    """Of the level, in the order played, from 0."""
+    base_m_per_s2: float
+    """Fundamental of the base's acceleration, peak."""
+    frequency_hz: float
+    """Where m0 lags the base by the phase asked for."""
+    u_frequency_hz: float
+    """Standard uncertainty, with that of the sensors' phase, which all levels share."""
+    amplitude_m: float
+    """Of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
+    harmonic: int
+    """Of the drive, at which m0 resonates."""
+    subharmonic: int
+    """Drives in a period of m0."""
+    mode_hz: float | None
+    """Natural frequency, fitted to both flanks; None where they do not tell it."""
+    u_mode_hz: float | None
+    damping_ratio: float | None
+
+    @property
+    def is_fundamental(self) -> bool:
+        """Whether m0 resonates at the frequency of the drive."""
+        return self.harmonic == self.subharmonic == 1
+
+
+def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
+    """Return the levels at which the resonance was found, weakest first; where it was lost is left out."""
+    return tuple(sorted(_found(notes), key=lambda each: each.base_m_per_s2))
+
+
+def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
+    """Return the levels [m/s²] that were asked for and at which no resonance was found."""
+    lost = (each for each in notes if isinstance(each, ResonanceNote) and each.frequency_hz is None)
+    return tuple(sorted(each.asked_m_per_s2 for each in lost))
+
+
+def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
+    for each in notes:
+        if not isinstance(each, ResonanceNote) or each.frequency_hz is None or each.frequency_u_hz is None:
+            continue
+        yield TrackedResonance(
+            number=each.level,
+            base_m_per_s2=each.base_m_per_s2,
+            frequency_hz=each.frequency_hz,
+            u_frequency_hz=each.frequency_u_hz,
+            amplitude_m=each.harmonic_m
+            or each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
+            harmonic=each.harmonic,
+            subharmonic=each.subharmonic,
+            mode_hz=each.mode_hz,
+            u_mode_hz=each.mode_u_hz,
+            damping_ratio=each.damping_ratio,
+        )
+
+
+def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
+    """Return whether a mode softens or hardens from its weakest level to its strongest."""
+    if len(levels) < 2:
+        return ""
+    first, last = levels[0], levels[-1]
+    shift_hz = last.frequency_hz - first.frequency_hz
+    u_hz = 2 * math.hypot(first.u_frequency_hz, last.u_frequency_hz)
+    moved = f"by {'+' if shift_hz > 0 else ''}{plus_minus(shift_hz, u_hz)} Hz"
+    what = "the phase resonance" if first.is_fundamental else "the drive at phase resonance"
+    between = f"From {first.base_m_per_s2:.3g} to {last.base_m_per_s2:.3g} m/s² {what} moves"
+    if abs(shift_hz) <= u_hz:
+        return f"{between} {moved}: neither softening nor hardening is seen."
+    return f"{between} {moved}: the mode {'hardens' if shift_hz > 0 else 'softens'}."

@@ -18,7 +18,6 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.interpolation import Decimator, decimation_factor
 from ..signals.quantity import Quantity, converted_signal, disturbed_samples
 from ..tables import Labelled
-from ..tones.noise_lift import noise_lift
 from ..tones.order_tracking import (
     ALL_ORDERS,
     ORDERS,
@@ -27,6 +26,7 @@ from ..tones.order_tracking import (
     tracked_orders,
     tracked_together,
 )
+from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5

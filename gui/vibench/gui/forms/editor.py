@@ -13,9 +13,8 @@ from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewIt
 from vibench.acquisition import ConfigurationError
 
 from ..widgets.units import CHOICES
-from .field_edge import LineField, draw_edge
 from .field_facts import FieldFacts
-from .quantity_edit import QuantityEdit, parsed_quantity, quantity_text, unit_of
+from .quantity_edit import LineField, QuantityEdit, draw_edge, parsed_quantity, quantity_text, unit_of
 
 
 class Editor(Protocol):

@@ -4,14 +4,34 @@ import re
 from decimal import Decimal
 from math import isfinite, log10
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent, QPaintEvent, QValidator, QWheelEvent
-from PySide6.QtWidgets import QAbstractSpinBox
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QPalette, QValidator, QWheelEvent
+from PySide6.QtWidgets import QAbstractSpinBox, QLineEdit, QWidget
 
 from vibench.acquisition import ConfigurationError
 
 from ..widgets.units import AUTOMATIC, CHOICES, POWERS, STANDARD_GRAVITY, UNITS
-from .field_edge import draw_edge
+
+_ROUND = 2.0
+
+
+def draw_edge(field: QWidget) -> None:
+    """Draw a line around a field, after the style has drawn the field itself."""
+    role = QPalette.ColorRole.Highlight if field.hasFocus() else QPalette.ColorRole.Mid
+    painter = QPainter(field)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(field.palette().color(role))
+    painter.drawRoundedRect(QRectF(field.rect()).adjusted(0.5, 0.5, -0.5, -0.5), _ROUND, _ROUND)
+
+
+class LineField(QLineEdit):
+    """A line of text with an edge."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the field, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
+
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*$")
 

@@ -2,6 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter
+from PySide6.QtWidgets import QStyledItemDelegate, QStyleOptionViewItem
 
 from vibench.analysis.live import outline, zigzag
 
@@ -53,3 +56,30 @@ class SignalCurve:
         edges = np.arange(columns) * len(seen) // columns
         time_s = self._start_s + (first + np.repeat(edges, 2)) / self._rate_hz
         self._curve.setData(time_s, zigzag(np.asarray(low, float), np.asarray(high, float)))
+
+
+SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
+"""Where an item keeps its share, 0 to 1 and more."""
+OVER = "#b3261e"
+NEAR = "#a06a00"
+WELL = "#00694d"
+NEAR_SHARE = 0.8
+
+
+class BarDelegate(QStyledItemDelegate):
+    """Paints the bar; above 1 it is full and red, and the text says so as well."""
+
+    def paint(
+        self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        """Paint the bar under the text."""
+        share = index.data(SHARE_ROLE)
+        if isinstance(share, float):
+            area = QRectF(option.rect).adjusted(2, 3, -2, -3)
+            area.setWidth(area.width() * min(share, 1.0))
+            painter.save()
+            colour = QColor(OVER if share > 1 + 1e-9 else NEAR if share > NEAR_SHARE else WELL)
+            colour.setAlphaF(0.35)
+            painter.fillRect(area, colour)
+            painter.restore()
+        super().paint(painter, option, index)

@@ -1,9 +1,11 @@
 """The functions of the system that runs this program."""
 
+import errno
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from enum import Enum, auto
 from pathlib import Path
 
 if sys.platform == "win32":
@@ -154,3 +156,58 @@ def rename(unfinished: Path, final: Path) -> None:
     except OSError:
         if not final.exists() or not os.path.samestat(made, final.stat()):
             raise
+
+
+UNKNOWN = ""
+"""The start of a process that lives, where the system does not tell it."""
+
+
+class Place(Enum):
+    """Where a process was started, as its start says it; numbers of processes are known `HERE` only."""
+
+    HERE = auto()
+    CONTAINER = auto()
+    """On this computer since it was switched on, in another container than this program."""
+    ELSEWHERE = auto()
+    """On another computer, or before this one was switched on."""
+
+
+def place_of(start: str) -> Place:
+    """Return where a process was started; `Place.HERE` where the system does not say."""
+    own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
+    if len(own) != len(other) or own[:-1] == other[:-1]:
+        return Place.HERE
+    return Place.CONTAINER if own[0] == other[0] else Place.ELSEWHERE
+
+
+def is_process(pid: int, start: str) -> bool:
+    """Whether the process that began then still lives; with `UNKNOWN`, whether any of that number does."""
+    now = process_start(pid)
+    return now is not None and (UNKNOWN in (now, start) or now == start)
+
+
+VARIABLE = "VIBENCH_STATE_DIR"
+LOCK_VARIABLE = "VIBENCH_LOCK_DIR"
+
+
+def state_place() -> Path:
+    """Return where the user's own folder is, or would be; ``VIBENCH_STATE_DIR`` names another place."""
+    given = os.environ.get(VARIABLE)
+    return Path(given) if given else usual_state_folder()
+
+
+def state_folder() -> Path:
+    """Return the user's own folder, made if need be; raises PermissionError where none can be made."""
+    folder = state_place()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:  # a file in the way, a disk that makes no folders
+        refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+        refused.add_note(f"{VARIABLE} names another folder for locks, bench checks and learnt costs")
+        raise refused from error
+    return folder
+
+
+def shared_folder() -> Path:
+    """Return the folder where every user may make files; ``VIBENCH_LOCK_DIR`` names another."""
+    return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

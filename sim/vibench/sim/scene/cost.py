@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Self
 
 from ..engine.library import physics_digest
-from ..operating_system.state_folder import state_folder, state_place
-from ..operating_system.this import replaced
+from ..operating_system.this import replaced, state_folder, state_place
 from .plan import ScenePlan, plan_scene
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene

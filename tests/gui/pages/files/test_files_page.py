@@ -19,8 +19,7 @@ from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files import files_page as _files_page
 from vibench.gui.pages.files.files_page import FilesPage
-from vibench.gui.pages.files.listing import listed, made_levels
-from vibench.gui.pages.files.recording_table import HEADINGS, facts_text
+from vibench.gui.pages.files.recording_table import HEADINGS, facts_text, listed, made_levels
 from vibench.gui.widgets.theme import DARK
 
 IMPACT_S = 40_002 / 6400.0

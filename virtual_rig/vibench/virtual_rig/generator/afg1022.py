@@ -13,18 +13,20 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from .afg1022_settings import (
+from .channel_output import (
     MODULATIONS,
     NOISE,
     OPEN_AMPLITUDE_RANGE_VPP,
     OPEN_PEAK_V,
     BurstMode,
+    ChannelOutput,
     ChannelSettings,
+    Panel,
     RunMode,
     highest_frequency_hz,
+    shape_of,
     standard_shape,
 )
-from .channel_output import ChannelOutput, Panel, shape_of
 from .scpi_instrument import (
     CHANNELS,
     Command,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .afg1022 import AFG1022, SHARED_COMMANDS, burst_cycles, load_command, modulation_switch, with_mode
-from .afg1022_settings import SINE, BurstMode, ChannelSettings, OwnSweep, RunMode, SweepTrigger
+from .channel_output import SINE, BurstMode, ChannelSettings, OwnSweep, RunMode, SweepTrigger
 from .phase_course import Spacing
 from .scpi_instrument import Command, Parameters, Quirks, choice, none, only, switch
 from .scpi_message import (

@@ -19,8 +19,7 @@ from ..daqmx.server import LOOPBACK, DaqServer, token_for
 from ..generator.afg1022 import AFG1022
 from ..generator.channel_output import Panel
 from ..generator.keysight_33500b import Keysight33500B
-from ..generator.scpi_instrument import Quirks
-from ..generator.scpi_socket import ScpiSocket
+from ..generator.scpi_instrument import Quirks, ScpiSocket
 from ..generator.terminal_voltage import Terminal
 from ..usb.bus import plug_in, unplug, usb_service
 from ..usb.usbtmc import UsbTmcInstrument

@@ -13,14 +13,24 @@ from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
 from vibench.sim.background import Job
 
-from ...forms.field_edge import LineField
+from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext, Remembered
 from ...page.page import FileKind, Page, Shown
 from ...widgets.boxes import ElidedLabel, Scrolled, column, filled, new_path, push_button, row
 from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind, notice_of
 from ...widgets.units import SentenceLabel
-from .listing import Levels, Listing, exported, listed, made_levels, noted, thumbnails
-from .recording_table import CampaignChoice, RecordingTable, facts_text
+from .recording_table import (
+    CampaignChoice,
+    Levels,
+    Listing,
+    RecordingTable,
+    exported,
+    facts_text,
+    listed,
+    made_levels,
+    noted,
+    thumbnails,
+)
 from .spectrogram_view import Pictures
 
 EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"

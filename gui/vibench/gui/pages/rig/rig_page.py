@@ -35,7 +35,7 @@ from vibench.acquisition.rig import KnobSheet, Rig, load_rig
 from vibench.sim import SpecimenWarning
 
 from ...forms.editor import Choice
-from ...forms.field_edge import LineField
+from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext, Remembered
 from ...page.page import FileKind, Page, SideAndPicture
 from ...page.user_actions import UserActions

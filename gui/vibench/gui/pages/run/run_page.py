@@ -28,7 +28,7 @@ from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...engine_link.bridge import measurement_called
 from ...forms.editor import Choice
-from ...forms.field_edge import LineField
+from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
 from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
 from ...page.page import Page, Shown, SideAndPicture

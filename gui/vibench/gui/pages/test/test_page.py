@@ -49,10 +49,9 @@ from ...page.app_context import AppContext, Remembered
 from ...page.page import FileKind, History, Page, Shown, SideAndPicture
 from ...page.user_actions import UserActions
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
-from ...plots.bar_delegate import SHARE_ROLE, BarDelegate
 from ...plots.line_style import Dash, LineStyle, curve_style
 from ...plots.plot import Plot
-from ...plots.signal_curve import SignalCurve
+from ...plots.signal_curve import SHARE_ROLE, BarDelegate, SignalCurve
 from ...widgets.boxes import boxed, column, filled, push_button, row
 from ...widgets.notice import TEST, Notice, NoticeKind, clock, notice_of
 from ...widgets.read_table import ReadTable
