@@ -90,7 +90,14 @@ class VirtualController:
         with self._turn:
             if self._now["done"]:
                 self._keep_block(time_s)
-            self._watch()
+            now = self._now
+            if now["unheard"] > now["most_unheard"]:
+                self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
+            elif now["at_limit"] > now["most_at_limit"]:
+                self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
+            if self._state is LoopState.ENDING and now["fade"] <= 0.0:
+                self._state = LoopState.SILENT
+                now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def execute(self, message: bytes) -> Reply:
         """Carry out one line of the protocol, and give the line that answers it."""
@@ -157,16 +164,6 @@ class VirtualController:
         if self.is_on and self._state is not LoopState.ENDING:
             self._state, self._reason = LoopState.ENDING, reason
             self._now["fade_step"] = 1.0 / max(ramp_s * self.facts.rate_hz, 1.0)
-
-    def _watch(self) -> None:
-        now = self._now
-        if now["unheard"] > now["most_unheard"]:
-            self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
-        elif now["at_limit"] > now["most_at_limit"]:
-            self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
-        if self._state is LoopState.ENDING and now["fade"] <= 0.0:
-            self._state = LoopState.SILENT
-            now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def _keep_block(self, end_s: float) -> None:
         count = 0 if self._program is None else self._program.harmonics + 1

@@ -249,17 +249,6 @@ def connected(path: Path) -> sqlite3.Connection:
         return connection
 
 
-def brought_up(connection: sqlite3.Connection) -> None:
-    """Give a journal of version 1 what it lacks, in one transaction."""
-    connection.execute("BEGIN IMMEDIATE")
-    (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
-    if int(version) < VERSION:
-        for statement in SEAL_COLUMNS:
-            connection.execute(statement)
-        connection.execute("UPDATE campaign SET value = ? WHERE key = 'version'", (str(VERSION),))
-    connection.execute("COMMIT")
-
-
 def require_version(path: Path, connection: sqlite3.Connection) -> None:
     """Refuse what is no journal, or one of a newer version; raises RecordingError."""
     try:
@@ -411,7 +400,14 @@ class Journal(ClosedOnLeaving):
         with closed_on_error(connected(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
-                brought_up(connection)
+                # A journal of version 1 gets what it lacks, in one transaction.
+                connection.execute("BEGIN IMMEDIATE")
+                (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
+                if int(version) < VERSION:
+                    for statement in SEAL_COLUMNS:
+                        connection.execute(statement)
+                    connection.execute("UPDATE campaign SET value = ? WHERE key = 'version'", (str(VERSION),))
+                connection.execute("COMMIT")
             return cls(path, connection)
 
     @property

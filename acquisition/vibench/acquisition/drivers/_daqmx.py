@@ -144,7 +144,12 @@ def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | No
     made = task.ai_channels[channel.role.value]
     _excite(made, channel)
     _couple(made, channel)
-    return _volts_per_count(made, channel.range_v)
+    try:
+        return linear_step_v([float(each) for each in made.ai_dev_scaling_coeff], channel.range_v)
+    except DaqError as error:
+        if error.error_type in NOT_OFFERED:
+            return None
+        raise
 
 
 def _excite(made: AIChannel, channel: Channel) -> None:
@@ -176,15 +181,6 @@ def _couple(made: AIChannel, channel: Channel) -> None:
         raise
     if held is not wanted:
         raise _refused(channel, "coupling", wanted.name, held.name)
-
-
-def _volts_per_count(made: AIChannel, range_v: float) -> float | None:
-    try:
-        return linear_step_v([float(each) for each in made.ai_dev_scaling_coeff], range_v)
-    except DaqError as error:
-        if error.error_type in NOT_OFFERED:
-            return None
-        raise
 
 
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:

@@ -254,7 +254,14 @@ class RecordingHeader:
             ("bench_json", self.bench_json),
             ("bench_check_json", self.bench_check_json),
         ):
-            _require_json_object(name, text)
+            try:
+                parsed = json.loads(text)
+            except ValueError as error:
+                raise RecordingError(
+                    f"{name} is not JSON ({error}); give the plan's or bench's own JSON text."
+                ) from error
+            if not isinstance(parsed, dict):
+                raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")
 
     def configuration(self) -> dict[str, str]:
         """Texts of the group ``/configuration``, all JSON."""
@@ -294,17 +301,6 @@ def require_different(channels: Iterable[ChannelHeader]) -> tuple[ChannelHeader,
 def _require_positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0):
         raise RecordingError(f"{name} is {value}; it must be finite and greater than zero.")
-
-
-def _require_json_object(name: str, text: str) -> None:
-    try:
-        parsed = json.loads(text)
-    except ValueError as error:
-        raise RecordingError(
-            f"{name} is not JSON ({error}); give the plan's or bench's own JSON text."
-        ) from error
-    if not isinstance(parsed, dict):
-        raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")
 
 
 def coupling_cut_hz(coupling: str) -> float:

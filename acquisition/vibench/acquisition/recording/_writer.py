@@ -54,11 +54,6 @@ class CountScale:
         """
         scaled = (np.asarray(volts, dtype=np.float64) - self._zero_v) / self._step_v
         rounded = np.rint(scaled)
-        self._require_range(rounded)
-        self._require_whole_counts(np.abs(scaled - rounded))
-        return np.ascontiguousarray(rounded.astype(COUNT_DTYPE))
-
-    def _require_range(self, rounded: Samples) -> None:
         inside = np.abs(rounded) <= LARGEST_COUNT
         if not inside.all():
             row, column = np.argwhere(~inside)[0]
@@ -67,6 +62,8 @@ class CountScale:
                 f" {rounded[row, column]:g} steps of {self._step_v[row, 0]:g} V; at most 2^31 - 1 fit."
                 " The block was not recorded; correct volts_per_count or range_v of the channel."
             )
+        self._require_whole_counts(np.abs(scaled - rounded))
+        return np.ascontiguousarray(rounded.astype(COUNT_DTYPE))
 
     def _require_whole_counts(self, distance: Samples) -> None:
         worst = np.where(self._has_converter_step, distance.max(axis=1, initial=0.0), 0.0)

@@ -79,7 +79,17 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
             )
-        self._refuse_other_laws()
+        law = self.shaken.contact
+        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
+            raise ValueError(
+                f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the method "
+                "balance or shooting"
+            )
+        if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
+            raise ValueError(
+                "rigid stops push with no finite force, so that they have no harmonic balance; take the "
+                "method shooting"
+            )
         self._refuse_other_resonances()
         pairs = self.recorded_level
         if pairs and self.along is Parameter.AMPLITUDE:
@@ -100,19 +110,6 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(
                 "a phase resonance is followed along amplitude, by shooting, between two equal stops; give a "
                 "range of amplitudes, and a specimen with one gap"
-            )
-
-    def _refuse_other_laws(self) -> None:
-        law = self.shaken.contact
-        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
-            raise ValueError(
-                f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the method "
-                "balance or shooting"
-            )
-        if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
-            raise ValueError(
-                "rigid stops push with no finite force, so that they have no harmonic balance; take the "
-                "method shooting"
             )
 
     @property

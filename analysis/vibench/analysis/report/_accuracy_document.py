@@ -175,11 +175,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         worst = worst_error(benchmark, accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
-    yield from _without_gain(benchmark)
-
-
-def _without_gain(benchmark: AccuracyBenchmark) -> Iterator[str]:
-    """Name the motions on which a level buys nothing."""
+    # Name the motions on which a level buys nothing.
     names: dict[str, list[str]] = {}
     for each in benchmark.motions:
         for level, before in each.without_gain:

@@ -91,21 +91,18 @@ class SegmentSpectra:
             (data.shape[1] - self._taper.size) // self._hop + 1 if data.shape[1] >= self._taper.size else 0
         )
         if count:
-            self._sum_segments(data, marks, count)
+            invalid = np.concatenate(([0], np.cumsum(~marks)))
+            starts = np.arange(count) * self._hop
+            used = invalid[starts + self._taper.size] == invalid[starts]
+            self._used.append(used)
+            segments = sliding_window_view(data, self._taper.size, axis=1)
+            size = max(1, _BATCH_SAMPLES // (data.shape[0] * self._taper.size))
+            usable = starts[used]
+            for first in range(0, usable.size, size):
+                batch = segments[:, usable[first : first + size]] * self._taper
+                self._sum_products(np.asarray(fft.rfft(batch, axis=-1, overwrite_x=True)))
         self._carry = data[:, count * self._hop :].copy()
         self._carry_valid = marks[count * self._hop :]
-
-    def _sum_segments(self, data: Reals, marks: Flags, count: int) -> None:
-        invalid = np.concatenate(([0], np.cumsum(~marks)))
-        starts = np.arange(count) * self._hop
-        used = invalid[starts + self._taper.size] == invalid[starts]
-        self._used.append(used)
-        segments = sliding_window_view(data, self._taper.size, axis=1)
-        size = max(1, _BATCH_SAMPLES // (data.shape[0] * self._taper.size))
-        usable = starts[used]
-        for first in range(0, usable.size, size):
-            batch = segments[:, usable[first : first + size]] * self._taper
-            self._sum_products(np.asarray(fft.rfft(batch, axis=-1, overwrite_x=True)))
 
     def _sum_products(self, spectra: Complexes) -> None:
         """Add conj(X_i) X_j for i <= j; the other half is filled in at the end."""

@@ -50,7 +50,12 @@ def file_kind(path: Path) -> FileKind:
     if path.is_dir():
         return FileKind.FOLDER
     if path.name.endswith((".h5", ".h5.part")):
-        return _of_hdf5(path)
+        try:
+            open_recording(path).close()
+        except RecordingError:
+            # Compare reads it, or says why it cannot.
+            return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
+        return FileKind.RECORDING
     allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
     if path.suffix != ".toml":
         raise ConfigurationError(f"{path} is nothing that can be opened here; {allowed}")
@@ -62,15 +67,6 @@ def file_kind(path: Path) -> FileKind:
     if found is None:
         raise ConfigurationError(f"{path} is no test, campaign or hardware configuration; {allowed}")
     return found
-
-
-def _of_hdf5(path: Path) -> FileKind:
-    try:
-        open_recording(path).close()
-    except RecordingError:
-        # Compare reads it, or says why it cannot.
-        return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
-    return FileKind.RECORDING
 
 
 @dataclass(frozen=True)

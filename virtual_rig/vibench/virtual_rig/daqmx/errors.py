@@ -168,15 +168,12 @@ class Faults:
                 continue
             seen = self._seen[id(rule)] = self._seen.get(id(rule), 0) + 1
             if seen >= rule.from_call:
-                self._apply(rule, rpc, seen)
-
-    def _apply(self, rule: Fault | ServerGone, rpc: str, seen: int) -> None:
-        match rule:
-            case ServerGone():
-                raise Unavailable(SERVER_GONE)
-            case Fault() if seen < rule.from_call + rule.calls:
-                reads = 0 if rpc.startswith("Read") else None
-                writes = 0 if rpc.startswith("Write") else None
-                raise DaqmxRefusal(rule.code, f"Injected into {rpc}.", reads, writes)
-            case Fault():
-                self.rules.remove(rule)
+                match rule:
+                    case ServerGone():
+                        raise Unavailable(SERVER_GONE)
+                    case Fault() if seen < rule.from_call + rule.calls:
+                        reads = 0 if rpc.startswith("Read") else None
+                        writes = 0 if rpc.startswith("Write") else None
+                        raise DaqmxRefusal(rule.code, f"Injected into {rpc}.", reads, writes)
+                    case Fault():
+                        self.rules.remove(rule)

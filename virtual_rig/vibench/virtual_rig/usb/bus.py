@@ -229,7 +229,18 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         config: int,  # noqa: ARG002 - there is one
     ) -> SimpleNamespace:
         """Return an endpoint; IndexError past the last."""
-        return endpoint_descriptor(dev.device.identification, ep)
+        # Bulk out or bulk in (table 9-13); IndexError past them.
+        return SimpleNamespace(
+            bLength=_ENDPOINT_BYTES,
+            bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
+            bEndpointAddress=_ENDPOINTS[ep],
+            bmAttributes=usb.util.ENDPOINT_TYPE_BULK,
+            wMaxPacketSize=dev.device.identification.packet_bytes,
+            bInterval=0,
+            bRefresh=0,
+            bSynchAddress=0,
+            extra_descriptors=array("B"),
+        )
 
     # Opening and claiming
 
@@ -455,21 +466,6 @@ def interface_descriptor(interface: int, alternate: int) -> SimpleNamespace:
         bInterfaceSubClass=_TMC_SUBCLASS,
         bInterfaceProtocol=_USB488_PROTOCOL,
         iInterface=0,
-        extra_descriptors=array("B"),
-    )
-
-
-def endpoint_descriptor(identification: Identification, endpoint: int) -> SimpleNamespace:
-    """Return bulk out or bulk in (table 9-13); IndexError past them."""
-    return SimpleNamespace(
-        bLength=_ENDPOINT_BYTES,
-        bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
-        bEndpointAddress=_ENDPOINTS[endpoint],
-        bmAttributes=usb.util.ENDPOINT_TYPE_BULK,
-        wMaxPacketSize=identification.packet_bytes,
-        bInterval=0,
-        bRefresh=0,
-        bSynchAddress=0,
         extra_descriptors=array("B"),
     )
 

@@ -250,16 +250,13 @@ class UsbTmcInstrument:
             _stall()
         if Attributes.END_OF_MESSAGE in attributes:
             message, self._flight.message = self._flight.message, b""
-            self._execute(message)
-
-    def _execute(self, message: bytes) -> None:
-        """Carry out a message; an unread reply before it is lost, with -410 (IEEE 488.2, 6.3.2.3)."""
-        if self._flight.reply or self._flight.rest:
-            self._flight.reply = self._flight.rest = b""
-            self._flight.request = None
-            self._device.report(ErrorCode.QUERY_INTERRUPTED)
-        reply = self._device.execute(message)
-        self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
+            # Carry out a message; an unread reply before it is lost, with -410 (IEEE 488.2, 6.3.2.3).
+            if self._flight.reply or self._flight.rest:
+                self._flight.reply = self._flight.rest = b""
+                self._flight.request = None
+                self._device.report(ErrorCode.QUERY_INTERRUPTED)
+            reply = self._device.execute(message)
+            self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
 
     def _transfer(self, request: _Request) -> bytes:
         """Wrap as much of the reply as was asked for; the last piece carries the end-of-message bit."""

@@ -123,7 +123,13 @@ def _weights(ratio: float, fraction: float) -> FloatArray:
     newest = _half_width_steps(ratio) + 1
     count = ceil(2 * newest / _LANES) * _LANES
     positions = newest - np.arange(count - 1, -1, -1.0) - fraction
-    correction = _droop_correction()
+    # Symmetric weights that undo sin(pi f)/(pi f), the gain of a mean over one step.
+    frequency = np.linspace(0, _DROOP_BAND, _DROOP_FIT_POINTS)
+    cosines = [np.ones_like(frequency)]
+    cosines += [2 * np.cos(2 * np.pi * order * frequency) for order in range(1, _DROOP_REACH + 1)]
+    matrix = np.array(cosines).T
+    half, *_ = np.linalg.lstsq(matrix * np.sinc(frequency)[:, np.newaxis], np.ones_like(frequency))
+    correction = np.concatenate([half[:0:-1], half])
     weights = np.zeros(count)
     for shift, weight in zip(range(-_DROOP_REACH, _DROOP_REACH + 1), correction, strict=True):
         weights += weight * _windowed_sinc(positions - shift, ratio)
@@ -135,16 +141,6 @@ def _windowed_sinc(positions: FloatArray, ratio: float) -> FloatArray:
     inside = np.clip(1 - (samples / _HALF_WIDTH_SAMPLES) ** 2, 0, None)
     window = np.where(inside > 0, np.i0(_KAISER_BETA * np.sqrt(inside)), 0.0)
     return np.asarray(np.sinc(samples) * window)
-
-
-def _droop_correction() -> FloatArray:
-    """Symmetric weights that undo sin(pi f)/(pi f), the gain of a mean over one step."""
-    frequency = np.linspace(0, _DROOP_BAND, _DROOP_FIT_POINTS)
-    cosines = [np.ones_like(frequency)]
-    cosines += [2 * np.cos(2 * np.pi * order * frequency) for order in range(1, _DROOP_REACH + 1)]
-    matrix = np.array(cosines).T
-    half, *_ = np.linalg.lstsq(matrix * np.sinc(frequency)[:, np.newaxis], np.ones_like(frequency))
-    return np.concatenate([half[:0:-1], half])
 
 
 AC_CUT_HZ = 0.5

@@ -95,15 +95,12 @@ class BranchPicture(_PairPicture):
                     curve = plot.curve(style, "" if name in named else name)
                     curve.setData(line.along(along)[piece], getattr(line, what)[piece, 0])
                 named.add(name)
-        self._mark_special(answer, pair[1])
-
-    def _mark_special(self, answer: BranchDiagram, plot: Plot) -> None:
         is_frequency = answer.request.along is Parameter.FREQUENCY
         for number, kind in enumerate(_SPECIAL, start=_FIRST_SPECIAL_COLOUR):
             found = [each for line in answer.lines for each in line.events if each.kind == kind]
             if found:
                 place = [each.frequency_hz if is_frequency else each.amplitude_m for each in found]
-                dots = plot.dots(curve_style(number), kind, size=7)
+                dots = pair[1].dots(curve_style(number), kind, size=7)
                 dots.setData(np.array(place), np.array([each.response_ii for each in found]))
 
 
@@ -188,7 +185,13 @@ class ChainPicture:
         run = answer.shown_run
         if run is not None:
             self._show_motion(run)
-            self._show_energies(run)
+            known = np.isfinite(run.energy_j) & (run.energy_j > 0.0)
+            place = np.arange(1.0, run.cells + 1.0)[known]
+            impacts = f"{run.impacts.sum() / run.observed_s:.4g} impacts a second in all"
+            where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
+            self.energies.dots(curve_style(1), f"{run.cells} cells{where}, {impacts}", size=7).setData(
+                place, run.energy_j[known]
+            )
 
     def _show_across(self, answer: ChainAnswer) -> None:
         top_hz = float(answer.linear_hz[-1])
@@ -215,15 +218,6 @@ class ChainPicture:
         is_shown = np.isin(run.impact_cell, places)
         self.motion.dots(curve_style(2), "impacts", size=3).setData(
             run.impact_time_s[is_shown], run.impact_cell[is_shown] + 1.0
-        )
-
-    def _show_energies(self, run: ChainRun) -> None:
-        known = np.isfinite(run.energy_j) & (run.energy_j > 0.0)
-        place = np.arange(1.0, run.cells + 1.0)[known]
-        impacts = f"{run.impacts.sum() / run.observed_s:.4g} impacts a second in all"
-        where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
-        self.energies.dots(curve_style(1), f"{run.cells} cells{where}, {impacts}", size=7).setData(
-            place, run.energy_j[known]
         )
 
 
