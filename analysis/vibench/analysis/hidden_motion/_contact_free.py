@@ -13,7 +13,7 @@ from ..signals.arrays import Flags, Reals, Samples
 from ..tables import Labelled
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start
-from ._parameters import PRIOR_SD, Hidden, value_of, with_values
+from ._parameters import PRIOR_SD, SEARCHES, Hidden, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import TrackedPiece
 from ._tracking_model import TrackedSpecimen
@@ -27,14 +27,6 @@ _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
 _FIT_STRETCH_S = 0.12
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
-_STEPS = {
-    Hidden.M1: 1e-4,
-    Hidden.C1: 1e-2,
-    Hidden.K0: 1e-5,
-    Hidden.K2: 1e-5,
-    Hidden.C0: 1e-2,
-    Hidden.C2: 1e-2,
-}
 _LEAST_OF_MEDIAN = 0.07
 """An impulse below this part of the usual one is not told from what is left of its neighbours."""
 _LEAST_P_OF_MEDIAN = 0.9
@@ -328,13 +320,13 @@ def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
             [
                 (
                     _residuals(
-                        with_values(current, {each: value_of(current, each) * (1 + _STEPS[each])}),
+                        with_values(current, {each: value_of(current, each) * (1 + SEARCHES[each].step)}),
                         motion,
                         latent,
                     )
                     - residual
                 )
-                / (scale * _STEPS[each])
+                / (scale * SEARCHES[each].step)
                 for each in FITTED
             ],
             axis=1,

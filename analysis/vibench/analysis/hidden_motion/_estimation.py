@@ -23,25 +23,11 @@ from ._contact_free import (
     free_numbers,
 )
 from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, move_filter
-from ._parameters import Hidden, scale_of, value_of, with_values
+from ._parameters import NEAR, SEARCHES, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
 from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m, step_tables
 
-_DEVIATION = {
-    Hidden.LOWER_GAP: 1e-5,
-    Hidden.UPPER_GAP: 1e-5,
-    Hidden.M1: 1e-4,
-    Hidden.C1: 1e-2,
-    Hidden.K0: 1e-5,
-    Hidden.K2: 1e-5,
-    Hidden.C0: 1e-2,
-    Hidden.C2: 1e-2,
-    Hidden.FORCE: 1e-3,
-    Hidden.EXPONENT: 1e-4,
-    Hidden.LOSS: 1e-3,
-}
-"""Relative step of the derivatives by a parameter."""
 _WANDER = 0.02
 """Of the prior standard deviation, in every block: a parameter that is sure of itself too early moves on."""
 REBUILT_S = 0.05
@@ -105,7 +91,7 @@ class _Search:
         self._nominal = np.array([value_of(start, each) for each in wanted])
         scale = np.array([scale_of(start, each) for each in wanted])
         self._prior_sd = np.array(list(relative_sd.values())) * scale
-        self._deviation = np.array([_DEVIATION[each] for each in wanted]) * scale
+        self._deviation = np.array([SEARCHES[each].step for each in wanted]) * scale
         self._least = np.where(np.array(wanted) == Hidden.LOSS, -np.inf, _LEAST_OF_START * self._nominal)
         # In units of the prior standard deviations: forces and gaps differ by six powers of ten.
         self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
@@ -218,28 +204,6 @@ class _Search:
 #
 # m1, springs and dampers from flights, gaps and loss from where impacts happen and how fast they end.
 
-NEAR = {
-    Hidden.LOWER_GAP: 0.004,
-    Hidden.UPPER_GAP: 0.004,
-    Hidden.M1: 1e-3,
-    Hidden.C1: 0.05,
-    Hidden.K0: 1e-4,
-    Hidden.K2: 1e-4,
-    Hidden.C0: 0.01,
-    Hidden.C2: 0.01,
-    Hidden.FORCE: 0.1,
-    Hidden.EXPONENT: 0.03,
-    Hidden.LOSS: 0.03,
-}
-"""How far from a description that can be tracked its parameters are looked for, relative."""
-_LEAST_SD = {
-    Hidden.M1: 1e-3,
-    Hidden.C1: 0.03,
-    Hidden.K0: 3e-4,
-    Hidden.K2: 3e-4,
-    Hidden.C0: 0.03,
-    Hidden.C2: 0.03,
-}
 _TELLING_LOSS = 0.15
 """Loss [s/m] from which speeds without a contact model tell more than a description."""
 _LAW_UNKNOWN = 0.3
@@ -276,7 +240,10 @@ def search_start(
         start = with_values(start, {Hidden.LOSS: loss})
     near = {**NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
-    near |= {each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(FITTED, numbers.sd, strict=True)}
+    near |= {
+        each: max(SEARCHES[each].least_sd, 3.0 * float(sd))
+        for each, sd in zip(FITTED, numbers.sd, strict=True)
+    }
     return start, looked_for(described, near)
 
 

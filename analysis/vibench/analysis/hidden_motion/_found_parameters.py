@@ -15,9 +15,9 @@ from scipy.stats import t as student
 
 from ..signals.arrays import Reals
 from ..tables import Labelled, plus_minus, unit_of
-from ._estimation import NEAR, Estimate, estimate, looked_for, search_start
+from ._estimation import Estimate, estimate, looked_for, search_start
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
-from ._parameters import PRIOR_SD, Hidden, scale_of, value_of, with_values
+from ._parameters import NEAR, PRIOR_SD, SEARCHES, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
@@ -54,18 +54,6 @@ _ONE_SIDED_SD = {
 }
 """Error [SI] that restarts share where m1 meets one stop alone: on 15 random dwells all gaps came out
 smaller, by 0.4 to 7 nm, from a cause that was not found."""
-_CLAIMED = {
-    Hidden.LOWER_GAP: 0.75,
-    Hidden.UPPER_GAP: 0.75,
-    Hidden.M1: 0.5,
-    Hidden.C1: 0.5,
-    Hidden.C0: 0.5,
-    Hidden.C2: 0.55,
-    Hidden.FORCE: 1.1,
-    Hidden.LOSS: 0.5,
-}
-"""Part of the standard deviation that a filter claims which its errors have; parameters that wander look
-less certain than they are. Found on 31 random rigs; checked against others by the slow tests."""
 _STARTS_APART = 0.3
 """Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
 
@@ -298,7 +286,7 @@ def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, R
     # A parameter that wanders is better known than it claims once wandering is all that it does not know;
     # one that is hardly determined states honest bounds, which wandering would widen.
     wandering = found.wandered / (found.wandered + np.diag(found.covariance))
-    part = np.array([_CLAIMED.get(each, 1.0) for each in found.wanted])
+    part = np.array([SEARCHES[each].claimed for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
     scale = found.prior_sd**2
     return found.begun_at + found.prior_sd * moved, variance * scale, likely * scale
