@@ -93,15 +93,6 @@ class _JumpSearch:
         self.after = point
 
 
-@dataclass(frozen=True)
-class Arrival:
-    """Where a search has ended, at the frequency it was started for."""
-
-    point: SettledPoint
-    branch: JumpSide
-    is_jump: bool
-
-
 class JumpLocator:
     """Looks into one jump of a pass."""
 
@@ -116,8 +107,12 @@ class JumpLocator:
         self._number = number
         self._until_s = settling_controller.loop.elapsed_s + plan.search_s
 
-    def localised(self, points: Sequence[SettledPoint], after: SettledPoint) -> Controller[Arrival]:
+    def localised(
+        self, points: Sequence[SettledPoint], after: SettledPoint
+    ) -> Controller[tuple[SettledPoint, bool]]:
         """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
+
+        Gives the point there, and whether a jump led to it.
 
         A response that only changes steeply is no jump: it closes as the bracket does. Where both
         branches are there at ``after``, the way to it may end on either, which is said.
@@ -130,7 +125,7 @@ class JumpLocator:
         has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
         self._say(found, why, branch)
-        return Arrival(point, branch, is_jump)
+        return point, is_jump and has_arrived
 
     def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
         for _ in range(_MOST_BRACKETS):
@@ -289,11 +284,10 @@ class Pass:
             if search is not None and has_jumped and searched < search.most_searches:
                 searched += 1
                 locator = JumpLocator(self._settling_controller, self._plan, self._direction, self._number)
-                arrival = yield from locator.localised(points, point)
-                if arrival.is_jump and arrival.branch is JumpSide.AFTER:
+                point, is_on_next_branch = yield from locator.localised(points, point)
+                if is_on_next_branch:
                     self._branch += 1
                     points = []
-                point = arrival.point
             points.append(point)
             came_from = f"{frequency_hz:g} Hz"
 
