@@ -21,7 +21,7 @@ from scipy.io import loadmat
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis.exchange import ImportMapping, import_recording
 from vibench.analysis.tones.order_tracking import tracked_orders
-from vibench.analysis.tones.sine_fit import fitted_sine, steady_phase
+from vibench.analysis.tones.sine_fit import fit_sine, steady_phase
 
 EXCERPTS = Path(__file__).parents[1] / "tests/analysis/exchange/flutter_rig"
 NEAR_HZ, PERIODS = 2.45, 5
@@ -54,7 +54,7 @@ def held_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
     with open_recording(import_recording(path, mapping, folder / f"{path.stem}.h5")) as recording:
         rate_hz = recording.sample_rate_hz
         heave, target = (recording.read(each) for each in ("heave", "target"))
-    frequency_hz = fitted_sine(heave, rate_hz, NEAR_HZ).frequency_hz
+    frequency_hz = fit_sine(heave, rate_hz, NEAR_HZ).frequency_hz
     phase = steady_phase(heave.size, frequency_hz / rate_hz, 0.0)
     interval = round(PERIODS * rate_hz / frequency_hz)
     response, wanted = (

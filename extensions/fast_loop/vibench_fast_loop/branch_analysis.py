@@ -6,7 +6,7 @@ from math import nan
 
 from vibench.acquisition.recording import SegmentLabel
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.kinds.stepped import stepped
+from vibench.analysis.kinds.stepped import stepped_analysis
 from vibench.analysis.model.draws import Draw
 from vibench.analysis.model.simulated_channels import SimulatedChannels
 from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis
@@ -21,5 +21,5 @@ def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[Stepp
 
 # A branch folds: it is no curve over frequency.
 BRANCH_CONTINUATION = replace(
-    stepped(lambda *_: nan, SegmentLabel.BRANCH), draws=_undrawn, curves=lambda *_: iter(())
+    stepped_analysis(lambda *_: nan, SegmentLabel.BRANCH), draws=_undrawn, curves=lambda *_: iter(())
 )

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.chaos.witnesses import (
+    delay_vectors,
     divergence,
-    embedded,
     nearest_neighbours,
     surrogate,
     surrogate_test,
@@ -71,7 +71,7 @@ def test_the_zero_one_test_does_not_mind_a_shift_or_a_scale():
     ids=["logistic", "henon"],
 )
 def test_neighbours_part_at_the_rate_of_the_exponent(series, delays, exponent):
-    found = divergence(embedded(series, delays), steps=25)
+    found = divergence(delay_vectors(series, delays), steps=25)
     assert found.is_resolved
     assert found.exponent == pytest.approx(exponent, rel=0.03)
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
@@ -88,8 +88,8 @@ def test_there_is_no_exponent_where_noise_fills_the_room_below_saturation():
     noise = np.random.default_rng(0).standard_normal((2000, 3))
     assert not divergence(noise, steps=8).is_resolved
     clean, noisy = henon(3000), henon(3000) + 0.2 * np.random.default_rng(1).standard_normal(3000)
-    assert divergence(embedded(clean, 2), steps=20).is_resolved
-    assert not divergence(embedded(noisy, 2), steps=20, noise=0.2).is_resolved
+    assert divergence(delay_vectors(clean, 2), steps=20).is_resolved
+    assert not divergence(delay_vectors(noisy, 2), steps=20, noise=0.2).is_resolved
 
 
 def test_henon_with_noise_is_more_than_linear_noise_and_an_autoregression_is_not():
@@ -141,4 +141,4 @@ def test_what_is_too_short_is_refused():
     with pytest.raises(NotEnoughData, match="neighbour"):
         divergence(np.ones((30, 2)), steps=20)
     with pytest.raises(InvalidRequest, match="delays"):
-        embedded(np.ones(10), 0)
+        delay_vectors(np.ones(10), 0)

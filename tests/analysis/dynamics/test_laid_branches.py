@@ -16,7 +16,7 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
 from vibench.analysis.report import write_report
-from vibench.analysis.report._report import laid_branches
+from vibench.analysis.report._report import draw_branches
 from vibench.cli.__main__ import app
 
 
@@ -55,14 +55,14 @@ def test_a_report_lays_branches_over_the_steps_and_says_how_their_levels_differ(
     diagram, stepped_file, tmp_path
 ):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
-    (drawn,) = laid_branches(results, [diagram])
+    (drawn,) = draw_branches(results, [diagram])
     measured = [each for each in drawn.figure.axes[0].get_lines() if "measured" in str(each.get_label())]
     assert sum(len(each.get_xdata()) for each in measured) == len(
         results.results[0].analysis.response.frequency_hz
     )
     assert "moved 1 to 1 times as far" in drawn.caption
     half = BranchRequest(amplitude_m=1.0, start=diagram.request.start, stop=diagram.request.stop)
-    (other,) = laid_branches(results, [BranchDiagram(half, diagram.lines, 1.0)])
+    (other,) = draw_branches(results, [BranchDiagram(half, diagram.lines, 1.0)])
     assert "moved 1 to 1 times" not in other.caption
     page = write_report(results, tmp_path / "report.html", diagrams=[diagram]).read_text("utf-8")
     assert "Branches: hertz, recorded level, shooting" in page

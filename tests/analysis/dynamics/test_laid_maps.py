@@ -6,7 +6,7 @@ from matplotlib.collections import PathCollection
 
 from vibench.analysis import Simulation, analyse_files, recorded_response
 from vibench.analysis.report import map_figure, write_report
-from vibench.analysis.report._report import laid_maps
+from vibench.analysis.report._report import draw_maps
 from vibench.sim.maps import Map, Range, solve_map
 
 
@@ -41,7 +41,7 @@ def test_a_report_lays_recordings_on_maps_over_frequency_and_amplitude_only(
 ):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
     other = solve_map(Map(model="linear", damping_time_s=Range(start=1e-5, stop=2e-5, points=2)))
-    on_it, beside = (each.figure for each in laid_maps(results, [small_map, other]))
+    on_it, beside = (each.figure for each in draw_maps(results, [small_map, other]))
     assert len([line for axes in on_it.axes for line in axes.get_lines()]) > 0
     assert beside.axes
     page = write_report(results, tmp_path / "report.html", maps=[small_map]).read_text("utf-8")

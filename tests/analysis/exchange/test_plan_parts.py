@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import validated
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping
-from vibench.analysis.exchange._import_recording import laid_parts
+from vibench.analysis.exchange._import_recording import place_parts
 
 NOISE = {
     "kind": "multisine_noise",
@@ -42,27 +42,27 @@ def ranges(parts):
 
 
 def test_realisations_follow_each_other_with_their_settling_between_them():
-    parts = laid_parts(mapped(NOISE, begins_s=0.5), 1000.0, 10_000)
+    parts = place_parts(mapped(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
 
 
 def test_the_steps_of_a_sweep_are_one_part():
-    (part,) = laid_parts(mapped(SWEEP), 1000.0, 30_000)
+    (part,) = place_parts(mapped(SWEEP), 1000.0, 30_000)
     assert (part.start, part.stop) == (2000, 22_000)
     assert part.segment.label == "sweep"
 
 
 def test_told_parts_take_the_plans_labels_in_order():
     told = [{"start_s": 1.0, "stop_s": 1.5}, {"start_s": 4.0, "stop_s": 4.5}]
-    parts = laid_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
+    parts = place_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
     assert ranges(parts) == [(1000, 1500), (4000, 4500)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1]
 
 
 def test_parts_behind_the_end_of_the_file_are_left_out():
-    assert len(laid_parts(mapped(NOISE), 1000.0, 3000)) == 2
-    (cut,) = laid_parts(mapped(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
+    assert len(place_parts(mapped(NOISE), 1000.0, 3000)) == 2
+    (cut,) = place_parts(mapped(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
     assert cut.start == 1000 < 3000 < cut.stop
 
 
@@ -78,4 +78,4 @@ def test_parts_behind_the_end_of_the_file_are_left_out():
 def test_parts_that_cannot_be_are_refused(told, said):
     parts = [{"start_s": start_s, "stop_s": stop_s} for start_s, stop_s in told]
     with pytest.raises(InvalidRequest, match=said):
-        laid_parts(mapped(NOISE, parts=parts), 1000.0, 10_000)
+        place_parts(mapped(NOISE, parts=parts), 1000.0, 10_000)

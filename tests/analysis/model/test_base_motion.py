@@ -8,7 +8,7 @@ from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.model.simulated_channels import (
-    advanced,
+    advance,
     lowest_frequency_hz,
     recorded_base_motion,
     shaken,
@@ -41,7 +41,7 @@ def test_a_hole_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_fil
 def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
     time = np.arange(512)
     shown = np.cos(2 * np.pi * 16 / 512 * (time - 0.3))
-    np.testing.assert_allclose(advanced(shown, 0.3), np.cos(2 * np.pi * 16 / 512 * time), atol=1e-12)
+    np.testing.assert_allclose(advance(shown, 0.3), np.cos(2 * np.pi * 16 / 512 * time), atol=1e-12)
 
 
 @pytest.mark.parametrize(

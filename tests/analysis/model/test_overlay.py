@@ -9,7 +9,7 @@ from vibench.acquisition import open_recording
 from vibench.analysis import analyse
 from vibench.analysis.model.ensemble import logarithmic_difference
 from vibench.analysis.model.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude
-from vibench.analysis.model.prediction import paper_amplitude_m, predicted
+from vibench.analysis.model.prediction import paper_amplitude_m, predict
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import base_transmissibility, gong2025
 
@@ -87,7 +87,7 @@ def test_another_specimen_can_be_laid_over(dwell_file):
 
 
 def test_a_prediction_below_the_gap_is_the_linear_one():
-    found = predicted(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
+    found = predict(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
     assert not found.is_colliding.any()
     # What is left of the transient from rest.
     np.testing.assert_allclose(found.response_ii, found.linear, rtol=1e-4)

@@ -14,7 +14,7 @@ from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures.dwells import dwells_figure
 from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.model.driven_rig import Driven
-from vibench.analysis.model.shaker_fit import fitted_shaker
+from vibench.analysis.model.shaker_fit import fit_shaker
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 
@@ -95,7 +95,7 @@ def test_json_and_figures_hold_the_draws(chaotic):
 
 def test_a_shaker_is_found_from_weak_noise_within_its_bounds(recordings):
     with open_recording(recordings / "noise.h5") as recording:
-        found = fitted_shaker(recording, analyse(recording), gong2025())
+        found = fit_shaker(recording, analyse(recording), gong2025())
     assert found.chi2 < 2
     for name, true in (
         ("moving_mass_kg", 0.127),
@@ -128,7 +128,7 @@ def test_a_dwell_of_an_unknown_shaker_says_why_the_base_drives_it(recordings):
         analysis = analyse(unsaid(recording))
         found = overlay(unsaid(recording), analysis)
         with open_recording(recordings / "noise.h5") as noise:
-            shaker = fitted_shaker(noise, analyse(noise), gong2025())
+            shaker = fit_shaker(noise, analyse(noise), gong2025())
         driven = overlay(unsaid(recording), analysis, shaker=shaker, draws=6)
     assert found.run.driven is Driven.BASE
     assert "describes no shaker" in found.run.why

@@ -8,7 +8,7 @@ import pytest
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEnoughData
 from vibench.analysis.frequency_response.results import FrequencyResponseSettings
-from vibench.analysis.model_updating.lines import as_described
+from vibench.analysis.model_updating.lines import own_response
 from vibench.analysis.model_updating.parameters import LINEAR, Parameter, parameter_value, with_values
 from vibench.analysis.model_updating.specimen_fit import fit_specimen
 from vibench.analysis.model_updating.suspects import Assumption
@@ -173,7 +173,7 @@ def test_what_is_not_free_stays_as_the_bench_says(true):
 
 
 def test_masses_in_series_are_the_specimen_s_own_transmissibility(true):
-    ours = as_described(true, LINES_HZ, np.zeros(0))
+    ours = own_response(true, LINES_HZ, np.zeros(0))
     assert ours == pytest.approx(base_transmissibility(true, LINES_HZ)[:, 0], rel=1e-10)
 
 

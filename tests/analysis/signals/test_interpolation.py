@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.signals.interpolation import REACH, interpolated
+from vibench.analysis.signals.interpolation import REACH, interpolate
 
 RNG = np.random.default_rng(5)
 SAMPLES = 3000
@@ -17,7 +17,7 @@ def tones(positions):
 
 def test_channels_together_have_the_values_of_the_signals_they_sample():
     positions = RNG.uniform(REACH, SAMPLES - 1 - REACH, 4000)
-    found = interpolated(tones(np.arange(SAMPLES)), positions)
+    found = interpolate(tones(np.arange(SAMPLES)), positions)
     assert found == pytest.approx(tones(positions), abs=2e-9)
 
 
@@ -25,8 +25,8 @@ def test_channels_together_have_the_values_of_the_signals_they_sample():
 def test_channels_together_are_each_alone_also_at_samples_and_beyond_the_ends(tiny):
     samples = tones(np.arange(SAMPLES))
     positions = np.concatenate([np.arange(-80.0, SAMPLES + 80) + tiny, RNG.uniform(-80, SAMPLES + 80, 300)])
-    together = interpolated(samples, positions)
-    assert np.array_equal(together, np.stack([interpolated(each, positions) for each in samples]))
+    together = interpolate(samples, positions)
+    assert np.array_equal(together, np.stack([interpolate(each, positions) for each in samples]))
     outside = (positions < -REACH - 1) | (positions > SAMPLES + REACH)
     assert not together[:, outside].any()
     inside = slice(80, 80 + SAMPLES)

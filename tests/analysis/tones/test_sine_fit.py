@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.tones.sine_fit import fitted_sine
+from vibench.analysis.tones.sine_fit import fit_sine
 
 RATE = 4096.0
 
@@ -14,7 +14,7 @@ RATE = 4096.0
 @given(frequency_hz=st.floats(100, 400), phase=st.floats(-3, 3), count=st.integers(2000, 6000))
 def test_a_sine_is_found_exactly(frequency_hz, phase, count):
     x = 0.3 + 0.02 * np.cos(2 * np.pi * frequency_hz * np.arange(count) / RATE + phase)
-    fit = fitted_sine(x, RATE, near_hz=frequency_hz * 1.05)
+    fit = fit_sine(x, RATE, near_hz=frequency_hz * 1.05)
     assert fit.frequency_hz == pytest.approx(frequency_hz, rel=1e-10)
     assert fit.amplitude == pytest.approx(0.02, rel=1e-9)
     assert np.angle(np.exp(1j * (fit.phase_rad - phase))) == pytest.approx(0, abs=1e-8)
@@ -23,7 +23,7 @@ def test_a_sine_is_found_exactly(frequency_hz, phase, count):
 def test_the_stated_spreads_are_the_scatter():
     rng = np.random.default_rng(1)
     clean = np.cos(2 * np.pi * 260.3 * np.arange(4096) / RATE + 0.5)
-    fits = [fitted_sine(clean + 0.3 * rng.standard_normal(4096), RATE, near_hz=260) for _ in range(200)]
+    fits = [fit_sine(clean + 0.3 * rng.standard_normal(4096), RATE, near_hz=260) for _ in range(200)]
     pairs = [
         ("frequency_hz", "sd_frequency_hz"),
         ("amplitude", "sd_amplitude"),
@@ -36,4 +36,4 @@ def test_the_stated_spreads_are_the_scatter():
 
 def test_noise_holds_no_sine():
     with pytest.raises(UnusableData, match="near 260 Hz"):
-        fitted_sine(np.random.default_rng(2).standard_normal(4096), RATE, near_hz=260)
+        fit_sine(np.random.default_rng(2).standard_normal(4096), RATE, near_hz=260)

@@ -15,7 +15,7 @@ from vibench.analysis.model.ensemble import EnsembleCurve
 from vibench.analysis.model.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
-from vibench.analysis.uncertainty.budget import Cause, Contribution, stated_of
+from vibench.analysis.uncertainty.budget import Cause, Contribution, stated_uncertainties
 from vibench.analysis.uncertainty.quantities import dwell_budgets, sd_of_largest, sweep_budgets
 
 DRAWS = 150
@@ -132,7 +132,7 @@ def test_what_is_not_stated_is_said_and_is_not_zero(weak):
 
 def test_calibration_source_and_date_reach_the_document(weak):
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
-    stated = stated_of(facts.bench)
+    stated = stated_uncertainties(facts.bench)
     assert stated.response[0].source == "vibrometer: certificate 17 (calibrated 2026-02-10)"
     tilts = np.radians([6.0, 3.0]) ** 2 / np.sqrt(20.0)
     assert stated.scale_sd == pytest.approx(np.linalg.norm([0.006, 0.01, 0.002, 0.003, *tilts]))

@@ -21,9 +21,9 @@ from .witnesses import (
     Divergence,
     SurrogateTest,
     ZeroOne,
+    delay_vectors,
     divergence,
-    embedded,
-    gaussianised,
+    normal_scores,
     surrogate_test,
     time_symmetry,
     zero_one,
@@ -341,7 +341,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
     bent_test = _bent_test(points, seed) if noise_test.rejects_linear_noise else noise_test
     parting = _parting(points)
-    return _judged(
+    return _verdict(
         replace(evidence, zero_one=test, surrogates=bent_test, divergence=parting),
         test,
         noise_test,
@@ -351,7 +351,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
     """Test for noise behind a static nonlinearity; a monotone one keeps ranks, any keeps symmetry in time."""
-    ranked = [surrogate_test(gaussianised(each), seed=seed) for each in points.value.T]
+    ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:
         return weakest
@@ -362,7 +362,7 @@ def _bent_test(points: Points, seed: int) -> SurrogateTest:
     return replace(max(in_time, key=lambda each: each.margin), least_margin=_ASYMMETRIC)
 
 
-def _judged(
+def _verdict(
     evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest, bent_test: SurrogateTest
 ) -> MotionVerdict:
     if not noise_test.is_valid:
@@ -406,7 +406,7 @@ def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
 
 
 def _parting(points: Points) -> Divergence | None:
-    space: Reals = embedded(points.value, _DELAYS)
+    space: Reals = delay_vectors(points.value, _DELAYS)
     try:
         return divergence(space, steps=_STEPS, noise=points.noise_level)
     except NotEnoughData:

@@ -14,7 +14,7 @@ _MOST_TRIED = 64
 """Neighbours looked at before a point is given up: those in its own time window do not count."""
 
 
-def embedded(series: Reals, delays: int) -> Reals:
+def delay_vectors(series: Reals, delays: int) -> Reals:
     """Put each value beside those before it.
 
     Parameters
@@ -351,7 +351,7 @@ def prediction_error(series: Reals) -> float:
     4.2), the mean over neighbours: far below 1 where the past decides the future, near 1 where it does not.
     One neighbour, and fewer delays, left more of the chaos among impacts undecided.
     """
-    pasts, next_values = embedded(series, _DELAYS)[:-1], series[_DELAYS:]
+    pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
     # Pasts that share values with the one in question are no neighbours of it.
     index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
     has = nearest.any(axis=1)
@@ -396,7 +396,7 @@ def surrogate_test(
     )
 
 
-def gaussianised(series: Reals) -> Reals:
+def normal_scores(series: Reals) -> Reals:
     """Replace values by normal ones of the same rank: this undoes a static, monotone nonlinearity of noise.
 
     Surrogates with the distorted values themselves match the spectrum only after iterations.

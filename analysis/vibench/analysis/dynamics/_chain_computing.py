@@ -219,14 +219,14 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
                 pass
             case ChainDrive.STEADY:
                 for frequency_hz in request.frequencies_hz:
-                    yield _timed(_steady, chain, request, Harmonic(frequency_hz, request.amplitude_m))
+                    yield _timed_run(_steady, chain, request, Harmonic(frequency_hz, request.amplitude_m))
             case ChainDrive.SWEPT:
                 sweep = LinearSweep(
                     request.start_hz, request.stop_hz, request.duration_s, request.amplitude_m
                 )
-                yield _timed(_swept, chain, request, sweep)
+                yield _timed_run(_swept, chain, request, sweep)
             case ChainDrive.RECORDED:
-                yield _timed(_recorded, chain, request, _base_of(request))
+                yield _timed_run(_run_under_recording, chain, request, _base_of(request))
 
 
 def chain_answer(request: ChainRequest) -> ChainAnswer:
@@ -239,7 +239,7 @@ def chain_answer(request: ChainRequest) -> ChainAnswer:
 Driven = TypeVar("Driven", Harmonic, LinearSweep, Sampled)
 
 
-def _timed(
+def _timed_run(
     run: Callable[[Chain, ChainRequest, Driven], ChainRun], chain: Chain, request: ChainRequest, drive: Driven
 ) -> ChainRun:
     began = time.perf_counter()
@@ -255,7 +255,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     whole_s = request.settle_s + request.duration_s
     found = chain_response(chain, drive, request.accuracy, whole_s, request.duration_s)
     if found.outcome is not Outcome.REACHED_END:
-        return _lost(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
+        return _lost_run(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
     after_s = min(request.duration_s, ENERGY_S)
     after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
     run = integrate_chain(
@@ -263,7 +263,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
     )  # fmt: skip
     if run.outcome is not Outcome.REACHED_END:
-        return _lost(chain, run.outcome, found.impacts, whole_s, drive.frequency_hz)
+        return _lost_run(chain, run.outcome, found.impacts, whole_s, drive.frequency_hz)
     exponent = error = math.nan
     if request.exponent_s > 0.0:
         growth = chain_lyapunov_exponent(
@@ -301,20 +301,20 @@ def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
         sample_rate_hz=_rate_hz(chain, drive.highest_hz, drive.duration_s),
     )  # fmt: skip
     if run.outcome is not Outcome.REACHED_END:
-        return _lost(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
+        return _lost_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.turns(run.time_s))
-    over_hz, ratio = _demodulated(run, drive)
+    over_hz, ratio = _component_over_time(run, drive)
     return _whole_run(chain, run, base, over_hz, ratio)
 
 
-def _recorded(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
+def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
     # A sample of the response beside each of the base, so that one estimator takes both.
     run = integrate_chain(
-        chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded(rate, chain, duration_s)
+        chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded_rate(rate, chain, duration_s)
     )
     if run.outcome is not Outcome.REACHED_END:
-        return _lost(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
+        return _lost_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.displacement_m[: len(run.time_s)]
     segment = max(16, len(run.time_s) // SEGMENTS)
     found = [
@@ -327,7 +327,7 @@ def _recorded(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     return _whole_run(chain, run, base, found[0].frequency_hz[is_shown], ratio[is_shown])
 
 
-def _lost(
+def _lost_run(
     chain: Chain,
     outcome: Outcome,
     impacts: NDArray[np.int64],
@@ -384,7 +384,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
     )
 
 
-def _demodulated(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
+def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
     """Component at the momentary frequency, by Hann-weighted means over equal stretches of time."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
@@ -412,10 +412,10 @@ def _base_of(request: ChainRequest) -> Sampled:
 def _rate_hz(chain: Chain, highest_hz: float, duration_s: float) -> float:
     """Choose samples per second that show the fastest motion, and fit into memory."""
     highest_hz = max(highest_hz, float(chain.natural_frequencies_hz[-1]))
-    return _bounded(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
+    return _bounded_rate(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
 
 
-def _bounded(rate_hz: float, chain: Chain, duration_s: float) -> float:
+def _bounded_rate(rate_hz: float, chain: Chain, duration_s: float) -> float:
     wanted = rate_hz * duration_s * chain.size * 2.0 * VX
     if wanted > MOST_NUMBERS:
         raise ValueError(

@@ -89,7 +89,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
         When the name is taken, or nothing can be written there.
 
     """
-    with _created(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
+    with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
             for name in _WORDS:
@@ -169,7 +169,7 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
         When the name is taken, or nothing can be written there.
 
     """
-    with _created(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
+    with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _SPECTRUM_UNITS.items():
             file.create_dataset(name, data=found.column(name)).attrs["units"] = units
         for name in _SPECTRUM_WORDS:
@@ -187,7 +187,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
         When the name is taken, or nothing can be written there.
 
     """
-    with _created(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
+    with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _LINEAR_UNITS.items():
             file.create_dataset(name, data=np.asarray(getattr(found, name))).attrs["units"] = units
         for number, run in enumerate(found.runs):
@@ -200,7 +200,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
 
 
 @contextmanager
-def _created(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
+def _new_file(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
     """Make a new file that says what it holds; nothing is left of one that failed."""
     with new_file(path) as unfinished, written_hdf5(unfinished, "x") as file:
         file.attrs["format"] = kind

@@ -49,7 +49,7 @@ _LONGEST_PAUSE = 10
 """Lost samples for each one that is kept; more is a wrong time."""
 
 
-def told_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]:
+def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]:
     """Return the sample rate that named numbers state, the nearest first, and why they cannot all be true.
 
     A number is a rate or an interval, with a unit behind its name: ``"dt_ms"``, ``"Sample rate [kHz]"``.

@@ -20,7 +20,7 @@ from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording
 
 from ..errors import InvalidRequest, NotEnoughData
-from ._excerpt import TransferObserver, unobserved
+from ._excerpt import TransferObserver, ignore_progress
 from ._export import new_file
 
 METADATA = "ro-crate-metadata.json"
@@ -53,7 +53,7 @@ def pack_folder(
     crate: Path,
     facts: CrateFacts,
     untrusted: Mapping[str, str],
-    observer: TransferObserver = unobserved,
+    observer: TransferObserver = ignore_progress,
 ) -> tuple[Path, ...]:
     """Pack everything in a folder, and its description, into a zip; give the files that were packed.
 
@@ -149,9 +149,9 @@ def _about(
         "description": "; ".join((described, *warned)),
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": {"@id": facts.licence},
-        **({"author": _unpacked(people)} if people else {}),
+        **({"author": _single_or_list(people)} if people else {}),
         **({"publisher": publisher} if publisher else {}),
-        "hasPart": _unpacked([{"@id": each["@id"]} for each in entities]),
+        "hasPart": _single_or_list([{"@id": each["@id"]} for each in entities]),
     }
     yield {
         "@id": facts.licence,
@@ -169,7 +169,7 @@ def _about(
         yield {**publisher, "@type": "Organization", "name": facts.organisation, **url}
 
 
-def _unpacked(entities: list[Entity]) -> list[Entity] | Entity:
+def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
     """Return one alone as itself: RO-Crate 1.1 recommends it (appendix on JSON-LD, compacted form)."""
     return entities[0] if len(entities) == 1 else entities
 

@@ -15,8 +15,8 @@ from typing import TextIO
 
 import numpy as np
 
-from ._alignment import told_rate_hz
-from ._excerpt import Excerpt, TransferObserver, unobserved
+from ._alignment import stated_rate_hz
+from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
 
 TIME_FORMAT = "%.9f"
@@ -25,7 +25,7 @@ VALUE_FORMAT = "%.10g"
 """One more digit than 2^-30 of the range needs; lost samples read ``nan``."""
 
 
-def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
+def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write time and channels, a block at a time."""
     headings = ["time [s]", *(f"{each.role} [{each.unit}]" for each in excerpt.channels)]
     row = ",".join([TIME_FORMAT, *(VALUE_FORMAT for _ in excerpt.channels)]) + "\n"
@@ -90,7 +90,7 @@ BLANK = " \t\r\n"
 
 
 @contextmanager
-def opened_csv(path: Path) -> Iterator[TableSource]:
+def open_csv(path: Path) -> Iterator[TableSource]:
     """Open a file whose columns are ``"1"``, ``"2"``, ... or what the line above them calls them.
 
     ValueError when no line of numbers begins within the first 200, or a later line has others.
@@ -105,7 +105,7 @@ def opened_csv(path: Path) -> Iterator[TableSource]:
             file.seek(0)
             raise ValueError(_what_is_wrong(file, first, layout) or str(error)) from error
     labels, units = _headings(head, layout)
-    rate, trouble = told_rate_hz(_statements(head))
+    rate, trouble = stated_rate_hz(_statements(head))
     yield TableSource(
         {
             SourceChannel(

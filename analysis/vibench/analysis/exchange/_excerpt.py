@@ -16,7 +16,7 @@ TransferObserver = Callable[[int], None]
 """Told how many values were written since it was last called."""
 
 
-def unobserved(_values: int) -> None:
+def ignore_progress(_values: int) -> None:
     """Watch nothing."""
 
 

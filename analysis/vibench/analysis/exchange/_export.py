@@ -19,7 +19,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.facts import require_intact
 from ..tables import Table, table, write_csv
 from ._csv import write_csv_samples
-from ._excerpt import Excerpt, TransferObserver, unobserved
+from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_path, write_facts
 from ._mat import require_small, write_mat
 from ._nexus import write_nexus
@@ -174,7 +174,7 @@ def export_samples(
     to: Format,
     path: Path,
     results: Results = Results.LEFT_OUT,
-    observer: TransferObserver = unobserved,
+    observer: TransferObserver = ignore_progress,
 ) -> tuple[Path, ...]:
     """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
 

@@ -31,7 +31,7 @@ from vibench.acquisition.recording import (
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Flags, Reals
 from ._alignment import Piece, align
-from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
+from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
 from ._mapping import ChannelMapping, ImportMapping
 from ._source import Source, channel_blocks, find_channel, opened_source
 from ._source_channel import SourceChannel
@@ -54,14 +54,14 @@ class _Planned:
     record_s: float
 
 
-def laid_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
+def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
     """Lay the plan's parts over the samples; parts past their end are left out, one across it is cut by it.
 
     Raises InvalidRequest when more parts are given than are planned, they overlap, or none lies inside the
     file.
     """
-    planned = list(_planned(mapping.measurement.excitation))
-    stretches = _told(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
+    planned = list(_recorded_steps(mapping.measurement.excitation))
+    stretches = _stated_times(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
     laid = [
         LaidPart(each.segment, round(start_s * sample_rate_hz), round(min(stop_s * sample_rate_hz, FARTHEST)))
         for each, (start_s, stop_s) in zip(planned, stretches, strict=False)
@@ -75,7 +75,7 @@ def laid_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> t
     return tuple(laid)
 
 
-def _planned(excitation: AbstractExcitation) -> Iterator[_Planned]:
+def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
     """Join the steps that are recorded as one, as a run does."""
     joined = 0
 
@@ -97,7 +97,7 @@ def _in_turn(begins_s: float, planned: Sequence[_Planned]) -> Iterator[tuple[flo
         yield start_s, now_s
 
 
-def _told(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple[float, float]]:
+def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple[float, float]]:
     parts = mapping.parts
     if len(parts) > len(planned):
         raise InvalidRequest(
@@ -144,7 +144,7 @@ class _Wanted:
 
 
 def import_recording(
-    path: Path, mapping: ImportMapping, out: Path, observer: TransferObserver = unobserved
+    path: Path, mapping: ImportMapping, out: Path, observer: TransferObserver = ignore_progress
 ) -> Path:
     """Make the recording ``out`` from a file, a block at a time.
 
@@ -173,7 +173,7 @@ def import_recording(
         aligned = align(found, mapping, path)
         samples, rate = aligned.places, aligned.rate_hz
         wanted = tuple(map(_Wanted, mapping.channels, found, aligned.pieces, aligned.late_s))
-        parts = laid_parts(mapping, rate, samples)
+        parts = place_parts(mapping, rate, samples)
         header = RecordingHeader(
             channels=tuple(_header(source, each) for each in wanted),
             sample_rate_hz=rate,

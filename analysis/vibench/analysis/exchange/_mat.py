@@ -21,10 +21,10 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._alignment import told_rate_hz
-from ._excerpt import Excerpt, TransferObserver, unobserved
+from ._alignment import stated_rate_hz
+from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
-from ._hdf5_source import Hdf5Source, opened_hdf5
+from ._hdf5_source import Hdf5Source, open_hdf5_source
 from ._source_channel import SourceChannel, TableSource
 
 # The elements of a MATLAB 5 file, looked at before they are read: scipy's reader crashes on wrong types.
@@ -72,7 +72,7 @@ def _look(content: memoryview, order: str, depth: int) -> None:
             case _ if kind == MATRIX:
                 _look(data, order, depth + 1)
             case _ if kind == COMPRESSED:
-                _look(memoryview(_unpacked(data)), order, depth + 1)
+                _look(memoryview(_decompressed(data)), order, depth + 1)
             case _:
                 _require_plain(kind)
         padding = 0 if kind == COMPRESSED else -size % TAG_BYTES
@@ -84,7 +84,7 @@ def _require_plain(kind: int) -> None:
         raise ValueError(f"an element of the unknown type {kind}")
 
 
-def _unpacked(data: memoryview) -> bytes:
+def _decompressed(data: memoryview) -> bytes:
     unpacking = zlib.decompressobj()
     found = unpacking.decompress(data, LARGEST_BYTES)
     if unpacking.unconsumed_tail:
@@ -113,7 +113,7 @@ def require_small(excerpt: Excerpt) -> None:
 
 
 def write_mat(
-    excerpt: Excerpt, path: Path, results: Mapping[str, Any], observer: TransferObserver = unobserved
+    excerpt: Excerpt, path: Path, results: Mapping[str, Any], observer: TransferObserver = ignore_progress
 ) -> None:
     """Write one variable after the other, so that one channel at a time is in memory.
 
@@ -187,13 +187,13 @@ FEWEST_SAMPLES = 2
 
 
 @contextmanager
-def opened_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
+def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     """Open a file; matrices and fields of structs are called ``"name"``, ``"struct.field"``, ``"name#2"``.
 
     ValueError when it is damaged.
     """
     if h5py.is_hdf5(path):
-        with opened_hdf5(path) as source:
+        with open_hdf5_source(path) as source:
             yield source
         return
     require_whole(path)
@@ -211,7 +211,7 @@ def _numbers(
     struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
 ) -> Iterator[tuple[SourceChannel, Any]]:
     facts = (*((name, value) for name, value in struct.items() if np.size(value) == 1), *around)
-    rate_hz, trouble = told_rate_hz(facts)
+    rate_hz, trouble = stated_rate_hz(facts)
     unit = struct.get("units", struct.get("unit", ""))
     for name, value in struct.items():
         match value:

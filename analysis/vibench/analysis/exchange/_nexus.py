@@ -11,13 +11,13 @@ import h5py
 from vibench.acquisition.recording import ChannelHeader
 from vibench.sim.hdf5_files.writing import written_hdf5
 
-from ._excerpt import BLOCK_SAMPLES, Excerpt, TransferObserver, unobserved
+from ._excerpt import BLOCK_SAMPLES, Excerpt, TransferObserver, ignore_progress
 
 ENTRY = "entry"
 SIGNAL, TIME = "values", "time"
 
 
-def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
+def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write channels one after the other, a block at a time; lost samples are NaN."""
     with written_hdf5(path, "x") as file:
         file.attrs.update({"NX_class": "NXroot", "default": ENTRY})

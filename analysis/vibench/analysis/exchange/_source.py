@@ -16,14 +16,14 @@ from vibench.sim.hdf5_files.door import system_error
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._alignment import TimeAxis, time_axis, time_unit
-from ._csv import opened_csv
+from ._csv import open_csv
 from ._excerpt import BLOCK_SAMPLES
-from ._hdf5_source import opened_hdf5
-from ._mat import opened_mat
+from ._hdf5_source import open_hdf5_source
+from ._mat import open_mat
 from ._source_channel import SourceChannel
-from ._tdms_source import opened_tdms
-from ._uff import opened_uff
-from ._wav import opened_wav
+from ._tdms_source import open_tdms
+from ._uff import open_uff
+from ._wav import open_wav
 
 
 class Source(Protocol):
@@ -38,18 +38,18 @@ class Source(Protocol):
 
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
-    ".uff": opened_uff,
-    ".unv": opened_uff,
-    ".ufb": opened_uff,
-    ".bunv": opened_uff,
-    ".h5": opened_hdf5,
-    ".hdf5": opened_hdf5,
-    ".mat": opened_mat,
-    ".nc": opened_hdf5,
-    ".tdms": opened_tdms,
-    ".wav": opened_wav,
-    ".csv": opened_csv,
-    ".txt": opened_csv,
+    ".uff": open_uff,
+    ".unv": open_uff,
+    ".ufb": open_uff,
+    ".bunv": open_uff,
+    ".h5": open_hdf5_source,
+    ".hdf5": open_hdf5_source,
+    ".mat": open_mat,
+    ".nc": open_hdf5_source,
+    ".tdms": open_tdms,
+    ".wav": open_wav,
+    ".csv": open_csv,
+    ".txt": open_csv,
 }
 DAMAGE = (
     OSError,
@@ -106,10 +106,10 @@ def opened_source(path: Path) -> Iterator[Source]:
                     f"has at most {MOST_CHANNELS} channels; export fewer of them"
                 )
         plain = _CheckedSource(path, source, {each: each for each in source.channels})
-        yield replace(plain, found=dict(zip(_timed(plain), source.channels, strict=True)))
+        yield replace(plain, found=dict(zip(_channels_with_times(plain), source.channels, strict=True)))
 
 
-def _timed(source: Source) -> Iterator[SourceChannel]:
+def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
     """Yield the channels with the times that stand beside them in the file."""
     axes: dict[SourceChannel, tuple[TimeAxis, str]] = {}
     for each in source.channels:
@@ -189,12 +189,12 @@ def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     if len(found) == 1:
         return found[0]
     many = "several channels" if found else "no channel"
-    named = [_shown(each) for each in source.channels[:CHANNELS_SHOWN]]
+    named = [_channel_in_words(each) for each in source.channels[:CHANNELS_SHOWN]]
     rest = len(source.channels) - len(named)
     held = ", ".join(named) + (f" and {rest} more" if rest else "")
     raise InvalidRequest(f"{path.name} has {many} {shortened(wanted, NAME_SHOWN)!r}; it has {held}")
 
 
-def _shown(channel: SourceChannel) -> str:
+def _channel_in_words(channel: SourceChannel) -> str:
     label = f" ({shortened(channel.label, NAME_SHOWN)})" if channel.label else ""
     return repr(shortened(channel.name, NAME_SHOWN)) + label

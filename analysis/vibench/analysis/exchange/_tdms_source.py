@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import told_rate_hz
+from ._alignment import stated_rate_hz
 from ._source_channel import SourceChannel
 
 SIGNATURE = b"TDSm"
@@ -40,7 +40,7 @@ class TdmsSource:
 
 
 @contextmanager
-def opened_tdms(path: Path) -> Iterator[TdmsSource]:
+def open_tdms(path: Path) -> Iterator[TdmsSource]:
     """Open a file.
 
     Raises InvalidRequest when npTDMS is not installed, and UnusableData when it is not TDMS.
@@ -80,7 +80,7 @@ def _channel(file: Any, channel: Any, origin: np.datetime64) -> SourceChannel:
         *file[channel.group_name].properties.items(),
         *file.properties.items(),
     ]
-    rate_hz, trouble = told_rate_hz(facts)
+    rate_hz, trouble = stated_rate_hz(facts)
     is_placed = START in own or OFFSET in own
     start = np.datetime64(own[START], "us") if START in own else origin
     return SourceChannel(

@@ -31,7 +31,7 @@ from vibench.acquisition.recording import ChannelHeader, Origin
 
 from ..errors import UnusableData
 from ..signals.arrays import Complexes, Reals
-from ._excerpt import Excerpt, TransferObserver, unobserved
+from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
 
 DELIMITER = "    -1"
@@ -70,7 +70,7 @@ def exact_rate_hz(line: str) -> float | None:
     return None if found is None else float(found[1])
 
 
-def told_origin(line: str) -> Origin | None:
+def read_origin(line: str) -> Origin | None:
     """Read back the origin that :func:`rate_line` wrote; None when somebody else wrote the line."""
     found = ORIGIN.search(line)
     return None if found is None else Origin(found[1])
@@ -86,7 +86,7 @@ SCALAR = 0
 """Direction of the response: the recording does not say how a sensor points."""
 
 
-def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
+def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write one dataset for each channel, a block at a time; lost samples are NaN."""
     with path.open("xb") as file:
         file.write(SI_UNITS.encode("ascii"))
@@ -188,7 +188,7 @@ class UffSource:
 
 
 @contextmanager
-def opened_uff(path: Path) -> Iterator[UffSource]:
+def open_uff(path: Path) -> Iterator[UffSource]:
     """Find the time responses of a file; ValueError when a dataset 58 is damaged."""
     with path.open("rb") as file:
         bodies = dict(_bodies(file))
@@ -266,7 +266,7 @@ def _channel(number: int, header: list[str]) -> SourceChannel:
         samples=int(header[6][10:20]),
         label="" if label == "NONE" else label,
         sample_rate_hz=rates[0] if rates else None,
-        origin=next(filter(None, map(told_origin, header[:5])), None),
+        origin=next(filter(None, map(read_origin, header[:5])), None),
         unit=header[8][46:66].strip().removesuffix("NONE"),
         rate_bounds_hz=_rate_bounds(header),
         start_s=start * second if start is not None and second is not None else None,
@@ -375,7 +375,7 @@ def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction]
 def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iterator[str]:
     recording = excerpt.recording
     lines_hz = function.frequency_hz
-    function, first, step = _spaced(function)
+    function, first, step = _with_spacing(function)
     hz = function.frequency_hz
     response, reference = function.response, function.reference
     yield DELIMITER
@@ -402,7 +402,7 @@ def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iter
     yield DELIMITER
 
 
-def _spaced(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
+def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
     """Return the function, its first line, and its spacing as six digits hold it (0: uneven)."""
     hz = function.frequency_hz
     if hz.size < 2:

@@ -19,7 +19,7 @@ from scipy.io import wavfile
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._excerpt import Excerpt, TransferObserver, unobserved
+from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel
 
 BYTES = 4
@@ -44,7 +44,7 @@ def require_sound(excerpt: Excerpt) -> None:
         )
 
 
-def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
+def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write all channels, a block at a time; lost samples are silent, and past full scale is full scale.
 
     Counts of a converter of up to 32 bits stay exact: only zeros are put behind them.
@@ -86,7 +86,7 @@ class WavSource:
 
 
 @contextmanager
-def opened_wav(path: Path) -> Iterator[WavSource]:
+def open_wav(path: Path) -> Iterator[WavSource]:
     """Open a file; ValueError when it is no WAV, or compressed, or cut off."""
     _require_whole(path)
     rate, data = _read(path)

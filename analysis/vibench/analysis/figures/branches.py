@@ -65,7 +65,7 @@ def branches_figure(
         figure = new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
         panels = figure.subplots(2 if holdable is None else 3, 1, sharex=True)
         for axes, (name, kind) in zip(panels[:2], _PANELS, strict=True):
-            _measured(axes, diagram, [each for each in measured if each.response is kind])
+            _draw_measured(axes, diagram, [each for each in measured if each.response is kind])
             for line in diagram.lines:
                 draw_line(axes, line, _place(diagram, line), getattr(line, name)[:, 0])
             magnitude_axis(axes)
@@ -174,7 +174,7 @@ def _events(axes: Axes, diagram: BranchDiagram) -> None:
             )
 
 
-def _measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> None:
+def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> None:
     if diagram.request.along is not Parameter.FREQUENCY:
         return
     for curve in curves:

@@ -108,11 +108,11 @@ def _map(
 
 def _draw(axes: Axes, results: MapResults, values: Reals, **style: Any) -> QuadMesh:
     first, second = results.plan.varied
-    (across, _), (up, _) = _scaled(results, first), _scaled(results, second)
+    (across, _), (up, _) = _axis_edges(results, first), _axis_edges(results, second)
     return axes.pcolormesh(across, up, values, rasterized=True, shading="flat", **style)
 
 
-def _scaled(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
+def _axis_edges(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
     """Return the edges of the cells along one axis, in the unit that reads best, and its label."""
     chosen = results.plan.range_of(quantity)
     edges = np.array(chosen.edges)
@@ -128,7 +128,7 @@ def _place(axes: Axes, results: MapResults) -> None:
         (first, axes.set_xlabel, partial(axes.set_xscale, "log")),
         (second, axes.set_ylabel, partial(magnitude_axis, axes)),
     ):
-        label(_scaled(results, quantity)[1])
+        label(_axis_edges(results, quantity)[1])
         if results.plan.range_of(quantity).spacing is Spacing.LOGARITHMIC:
             scale()
     axes.grid(visible=False)
@@ -186,8 +186,8 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     panels = figure.subplots(2, 1, sharex=True)
     quantity = results.plan.varied[0]
     values = np.array(results.plan.axes[-1].values)
-    _, label = _scaled(results, quantity)
-    factor = _scaled(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
+    _, label = _axis_edges(results, quantity)
+    factor = _axis_edges(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
     for index, start in enumerate(results.plan.start_labels):
         colour, said = _UP_AND_DOWN.get(start, (LEVELS[index % len(LEVELS)], f"from {start}"))
         dots = {"color": colour, "linestyle": "none", "marker": "."}

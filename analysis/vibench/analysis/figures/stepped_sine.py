@@ -122,13 +122,13 @@ def _responses(
             markersize=4,
         )
         if laid is not None:
-            _simulated(axes, along, chosen, laid, what, (marker, direction))
+            _draw_simulated(axes, along, chosen, laid, what, (marker, direction))
     for jump in noted_jumps(analysis.facts.feedback):
         axes.axvspan(jump.low_hz, jump.high_hz, color=MEASURED, alpha=0.3, linewidth=0)
     magnitude_axis(axes)
 
 
-def _simulated(
+def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
     """Mark the middle of the draws at every step of one direction, with the band of 95 % as a bar."""

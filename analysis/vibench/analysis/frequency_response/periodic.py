@@ -19,7 +19,7 @@ from scipy import fft
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Integers, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance
-from ..signals.interpolation import REACH, TRUSTED_BAND, interpolated
+from ..signals.interpolation import REACH, TRUSTED_BAND, interpolate
 from ..signals.window import Window
 from ..tables import Labelled
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
@@ -98,11 +98,11 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
     # Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches.
     size = samples.shape[-1]
     missing = max(0, int(np.ceil(periods * period_samples)) - size)
-    before = interpolated(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)
-    after = interpolated(samples, size + np.arange(REACH + missing, dtype=np.float64) - period_samples)
+    before = interpolate(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)
+    after = interpolate(samples, size + np.arange(REACH + missing, dtype=np.float64) - period_samples)
     start, extended = REACH, np.concatenate((before, samples, after), axis=-1)
     positions = start + np.arange(periods * points, dtype=np.float64) * (period_samples / points)
-    cut = interpolated(extended, positions).reshape(*samples.shape[:-1], periods, points)
+    cut = interpolate(extended, positions).reshape(*samples.shape[:-1], periods, points)
     lines = int(TRUSTED_BAND * period_samples) + 1
     return np.asarray(fft.rfft(cut, axis=-1)[..., :lines] * (2 / points))
 

@@ -74,9 +74,9 @@ def resonances(
     if band.steady_relative_sd is not None:
         band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
     for line, width in _significant_peaks(band):
-        together = _refitted(band, width, _fitted(band, line, width, 1))
+        together = _refit(band, width, _fit_peak(band, line, width, 1))
         found.append(tuple(each for each in together if low_hz <= each.frequency_hz <= high_hz))
-    return _jointly_fitted(band, _distinct(found))
+    return _fit_jointly(band, _distinct(found))
 
 
 def scattered_resonances(
@@ -108,15 +108,15 @@ def scattered_resonances(
             widened.append(
                 replace(
                     each,
-                    sd_frequency_hz=_moved(each, rest, "frequency_hz", len(without)),
-                    sd_damping_ratio=_moved(each, rest, "damping_ratio", len(without)),
-                    sd_peak_magnitude=_moved(each, rest, "peak_magnitude", len(without)),
+                    sd_frequency_hz=_largest_change(each, rest, "frequency_hz", len(without)),
+                    sd_damping_ratio=_largest_change(each, rest, "damping_ratio", len(without)),
+                    sd_peak_magnitude=_largest_change(each, rest, "peak_magnitude", len(without)),
                 )
             )
     return tuple(widened)
 
 
-def _moved(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
+def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
     """Return the largest of what the fit says, what realisations move, and what the choice of a fit moves.
 
     A fit of all modes together and one of this mode alone differ by more than a realisation moves either:
@@ -134,7 +134,7 @@ def _moved(found: Resonance, rest: Sequence[Resonance], name: str, realisations:
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     """Lines of peaks, and their half-power widths in lines."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
-    size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
+    size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
     # A rise of ln(magnitude) by less than this is noise, whatever the line.
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
@@ -148,7 +148,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     return result
 
 
-def _smoothed(size: Reals, spread: Reals) -> Reals:
+def _smooth(size: Reals, spread: Reals) -> Reals:
     """Average over the few lines that bring typical noise below a hundredth; a noise-free curve stays."""
     lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
     if lines <= 1:
@@ -164,7 +164,7 @@ def _half_power_lines(size: Reals, line: int) -> int:
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
 
 
-def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
+def _fit_peak(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
     """Fit the lines about a peak with one mode, or with as many as explain them, up to a number."""
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
@@ -180,10 +180,10 @@ def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> t
     start = np.array([[np.log(centre_hz), np.log(damping)]])
     for modes in range(1, most + 1):
         for degree in _BACKGROUND_DEGREES if modes == 1 else _BACKGROUND_DEGREES[1:2]:
-            for split in _split(start, modes):
+            for split in _split_poles(start, modes):
                 reaches = np.tile([span, _REACH_DAMPING], modes)
                 fit = modal_fit(band, lines, split, reaches, _powers(centre_hz, degree))
-                told = () if fit is None else _told(fit, lines)
+                told = () if fit is None else _determined_modes(fit, lines)
                 if fit is not None and told and fit.explains:
                     return told
                 first = told if modes == 1 and told else first
@@ -203,7 +203,7 @@ def _powers(centre_hz: float, degree: int) -> Background:
     return shapes
 
 
-def _split(poles: Reals, modes: int) -> Iterator[Reals]:
+def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
     """Start this many poles where one was: side by side, closer and farther, each narrower than it."""
     ((log_frequency, log_damping),) = poles
     if modes == 1:
@@ -229,9 +229,7 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
     return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
 
 
-def _refitted(
-    band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]
-) -> tuple[Resonance, ...]:
+def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]) -> tuple[Resonance, ...]:
     """Fit once more over the bandwidth found: the first width was read off single, noisy lines.
 
     What one mode does not describe is fitted over all its lines: a background follows fewer.
@@ -242,10 +240,10 @@ def _refitted(
     line = int(np.argmin(np.abs(band.frequency_hz - one.frequency_hz)))
     spacing_hz = float(np.median(np.diff(band.frequency_hz)))
     found = round(0.5 * one.half_power_bandwidth_hz / spacing_hz)
-    return _fitted(band, line, found if one.is_explained else max(found, half_width), _MOST_MODES) or first
+    return _fit_peak(band, line, found if one.is_explained else max(found, half_width), _MOST_MODES) or first
 
 
-def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
+def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
     """Fit all modes of a band at once, from the single fits; those stand where the modes do not explain it.
 
     H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
@@ -262,14 +260,14 @@ def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Re
         fit = _best(band, lines, starts)
         if fit is None or fit.chi_square * fit.freedom > last - _LEAST_GAIN:
             break
-        told = _told(fit, lines)
+        told = _determined_modes(fit, lines)
         best = told if fit.explains and told else best
         if best is told and max(each.reduced_chi_square for each in told) <= fit.chi_square:
             break
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        starts = [np.vstack((rest, two.reshape(2, 2))) for two in _split(poles[worst : worst + 1], 2)]
+        starts = [np.vstack((rest, two.reshape(2, 2))) for two in _split_poles(poles[worst : worst + 1], 2)]
     return best
 
 
@@ -281,7 +279,7 @@ def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> Mod
     return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi_square, default=None)
 
 
-def _told(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
+def _determined_modes(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
     """Return the modes of a fit that its lines determine, in the order of frequency."""
     told = (each for each in fit.resonances if _is_told(each, lines))
     return tuple(sorted(told, key=lambda one: one.frequency_hz))

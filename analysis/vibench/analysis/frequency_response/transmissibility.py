@@ -86,7 +86,7 @@ def _sizes(variance: Reals, shapes: Reals) -> Reals:
     return np.asarray(sizes * level / heights)[..., 0]
 
 
-def named_estimator(estimator: Estimator | str) -> Estimator:
+def estimator_by_name(estimator: Estimator | str) -> Estimator:
     """Turn a name into an estimator; raises InvalidRequest when no estimator has that name."""
     try:
         return Estimator(estimator)
@@ -208,7 +208,7 @@ class FrequencyResponseSums:
         confidence: float = DEFAULT_CONFIDENCE,
     ) -> None:
         self._settings = FrequencyResponseSettings(
-            estimator=named_estimator(estimator),
+            estimator=estimator_by_name(estimator),
             sample_rate_hz=sample_rate_hz,
             segment_samples=segment_samples,
             window=str(window),

@@ -169,14 +169,14 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
                 abs(impulse),
                 p,
                 float(np.sqrt(smoothed.variances[sample, 0])),
-                side * _extrapolated(rate, begin - 2, begin - 1, middle),
-                -side * _extrapolated(rate, end + 1, end, middle),
+                side * _extrapolate(rate, begin - 2, begin - 1, middle),
+                -side * _extrapolate(rate, end + 1, end, middle),
             )
         )
     return np.array(rows).reshape(-1, 7)
 
 
-def _extrapolated(values: Reals, far: int, near: int, place: float) -> float:
+def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
     """Carry a line through two samples of a flight on to the middle of the contact beside it."""
     return float(values[near] + (values[near] - values[far]) * (place - near) / (near - far))
 
@@ -415,7 +415,7 @@ def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiec
     return Collisions(*found.T)
 
 
-def joined_collisions(parts: list[Collisions]) -> Collisions:
+def join_collisions(parts: list[Collisions]) -> Collisions:
     """Put those of several pieces after one another."""
     names = [each.name for each in fields(Collisions)]
     return Collisions(

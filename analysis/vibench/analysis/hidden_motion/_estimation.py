@@ -244,10 +244,10 @@ def search_start(
         each: max(SEARCHES[each].least_sd, 3.0 * float(sd))
         for each, sd in zip(FITTED, numbers.sd, strict=True)
     }
-    return start, looked_for(described, near)
+    return start, searched_parameters(described, near)
 
 
-def looked_for(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
+def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
     """Leave out the gap of a side on which no stop is described."""
     return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 

@@ -135,7 +135,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
-        refined = _refined(described, motion, described, looked_for(described, NEAR))
+        refined = _refine(described, motion, described, looked_for(described, NEAR))
         if isinstance(refined, FoundSpecimen):
             return refined
     stretches = _stretches(motion)
@@ -145,14 +145,14 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
     if isinstance(first_look, Estimate):
         start = first_look.tracked
-    found = _refined(described, motion, start, near)
+    found = _refine(described, motion, start, near)
     for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
         # Move both gaps by the same number of standard deviations: without a contact model they err together.
         gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
         moved = with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
         looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
         held = next((each for each in looks if _is_held(each, motion)), None)
-        again = found if held is None else _refined(described, motion, held.tracked, near)
+        again = found if held is None else _refine(described, motion, held.tracked, near)
         if isinstance(again, FoundSpecimen):
             found = again
             break
@@ -169,7 +169,7 @@ def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estima
     return isinstance(answer, Estimate) and answer.followed_s > enough_s
 
 
-def _refined(
+def _refine(
     described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> FoundSpecimen | str:
     """Find parameters near a start, and again from the result while it moves."""
@@ -179,7 +179,7 @@ def _refined(
         if isinstance(good, str):
             return good
         independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
-        found = combined(good, described, independent)
+        found = combine(good, described, independent)
         narrow = np.array([near[each] * scale_of(start, each) for each in wanted])
         is_told = (found.sd < _TOLD * found.assumed) & (found.sd < _FAR * narrow)
         is_beyond = is_told & (found.beyond > _SETTLED * narrow)
@@ -190,7 +190,7 @@ def _refined(
             break
     shared = {} if all(map(isfinite, described.specimen.gaps_m)) else _ONE_SIDED_SD
     parameters = tuple(
-        _judged(
+        _parameter(
             what,
             found.values[n],
             float(np.hypot(found.half[n], _Z * shared.get(what, 0.0))),
@@ -243,7 +243,7 @@ class _Combined:
     """How far the values lie from where the filter looked."""
 
 
-def combined(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
+def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
     """Return the mean of restarts, and half the width of its bounds: from the larger of scatter and claims.
 
     Restarts over the same samples are not independent: their scatter tells what they have not forgotten.
@@ -252,7 +252,7 @@ def combined(found: list[Estimate], described: TrackedSpecimen, independent: flo
     wanted = found[0].wanted
     centre = np.array([value_of(described, each) for each in wanted])
     assumed = np.array([PRIOR_SD[each] * scale_of(described, each) for each in wanted])
-    freed = [_freed(each, centre, _WIDE * assumed) for each in found]
+    freed = [_without_prior(each, centre, _WIDE * assumed) for each in found]
     values = np.array([each[0] for each in freed])
     claimed = np.sqrt(np.mean([each[1] for each in freed], axis=0))
     half = _Z * np.sqrt(np.mean([each[2] for each in freed], axis=0))
@@ -267,7 +267,7 @@ def combined(found: list[Estimate], described: TrackedSpecimen, independent: flo
     return _Combined(values.mean(axis=0), half / np.sqrt(independent), sd, assumed, beyond)
 
 
-def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
+def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
     """Take back that parameters were looked for near the start alone: values, claimed and likely variances.
 
     The filter weighs the motion against a narrow prior, without which it loses its track. What a motion tells
@@ -292,7 +292,7 @@ def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, R
     return found.begun_at + found.prior_sd * moved, variance * scale, likely * scale
 
 
-def _judged(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
+def _parameter(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
     why = "" if is_told else "told by this motion no better than was assumed"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
@@ -304,7 +304,7 @@ def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) ->
     return FoundSpecimen(described, parameters, 0, searched)
 
 
-def not_believed(found: FoundSpecimen, why: str) -> FoundSpecimen:
+def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
     """Return what was found without its values, of which ``why`` says that they are not the specimen's."""
     nan = float("nan")
     parameters = tuple(

@@ -23,10 +23,10 @@ from ._contact_free import (
     collisions_of,
     free_gaps,
     free_motion,
-    joined_collisions,
+    join_collisions,
 )
 from ._filtering import motion_model
-from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, not_believed, with_unit
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit, without_values
 from ._parameters import Hidden, Numbers
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
 from ._tracking import NotFollowed, TrackedPiece, follow
@@ -250,10 +250,10 @@ def hidden_motion_of(
     """Go through a prepared motion both ways."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
-    followed = _tracked(motion, tracked, found, lambda sample: on_read(sample, motion.samples))
-    why_not = _why_not_believed(followed)
+    followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples))
+    why_not = _fault_of_numbers(followed)
     if found is not None and why_not:
-        found = not_believed(found, why_not)
+        found = without_values(found, why_not)
     on_free = stage(observer, f"{name}: hidden motion without a contact model")
     free = free_motion(model, motion, lambda sample: on_free(sample, motion.samples))
     found_motion = HiddenMotion(
@@ -282,7 +282,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 
 
-def _tracked(
+def _tracked_motion(
     motion: PreparedMotion, tracked: TrackedSpecimen, found: FoundSpecimen | None, told: Callable[[int], None]
 ) -> TrackedMotion:
     model = motion_model(tracked, motion)
@@ -310,13 +310,13 @@ def _tracked(
         p,
         rate,
         sd,
-        joined_collisions(collisions),
+        join_collisions(collisions),
         tuple(lost),
         level,
     )
 
 
-def _why_not_believed(tracked: TrackedMotion) -> str:
+def _fault_of_numbers(tracked: TrackedMotion) -> str:
     """Return why the numbers that a motion was tracked with are not its specimen's, or nothing."""
     told = ~np.isnan(tracked.p)
     held = float(np.mean(told[int(np.argmax(told)) :]))

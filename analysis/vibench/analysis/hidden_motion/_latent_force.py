@@ -67,14 +67,14 @@ def latent_motion(
     rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
     guess_n = max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
     variance = np.full(count, guess_n**2)
-    run, smoothed = _smoothed(free, motion, first, variance)
+    run, smoothed = _filter_and_smooth(free, motion, first, variance)
     # Whether m1 met a stop without light nobody saw.
-    is_dark = _widened(motion.is_dark[first + 1 : first + count + 1], motion.sample_rate_hz)
+    is_dark = _widen_marks(motion.is_dark[first + 1 : first + count + 1], motion.sample_rate_hz)
     windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz) | is_dark
     closed = (closed_share * guess_n) ** 2
     variance = np.where(windows, (6.0 * guess_n) ** 2, closed)
     for _ in range(_RERUNS):
-        run, smoothed = _smoothed(free, motion, first, variance)
+        run, smoothed = _filter_and_smooth(free, motion, first, variance)
         windows, surprised = _with_surprises(windows, run, motion.sample_rate_hz)
         following = _learnt(windows, smoothed.forces, guess_n, closed)
         settled = not surprised and np.allclose(following, variance, rtol=0.5)
@@ -93,14 +93,14 @@ def latent_start(first: int) -> FilterState:
     return FilterState(first, np.zeros(STATES), np.diag([place**2] * 3 + [rate**2] * 3 + [base**2, error**2]))
 
 
-def _smoothed(
+def _filter_and_smooth(
     model: MotionModel, motion: PreparedMotion, first: int, variance: Reals
 ) -> tuple[Filtered, Smoothed]:
     run = run_filter(model, motion, latent_start(first), variance.size, force_variance=variance)
     return run, smooth(model, run, variance)
 
 
-def _widened(marks: Flags, sample_rate_hz: float) -> Flags:
+def _widen_marks(marks: Flags, sample_rate_hz: float) -> Flags:
     width = 2 * max(1, round(_WINDOW_S * sample_rate_hz)) + 1
     return np.asarray(np.convolve(marks, np.ones(width), "same") > 0.5)
 
@@ -111,7 +111,7 @@ def _peaks(force: Reals, guess_n: float, sample_rate_hz: float) -> Flags:
     marks = np.zeros(size.size, dtype=np.bool_)
     inner = size[1:-1]
     marks[1:-1] = (inner > threshold) & (inner >= size[:-2]) & (inner > size[2:])
-    return _widened(marks, sample_rate_hz)
+    return _widen_marks(marks, sample_rate_hz)
 
 
 def _start_up(sample_rate_hz: float, count: int) -> int:
@@ -127,7 +127,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
     surprise[: _start_up(sample_rate_hz, surprise.size)] = False
     onsets = surprise & ~np.concatenate(([False], surprise[:-1]))
     earlier = np.concatenate((onsets[1:], [False]))
-    added = _widened(earlier, sample_rate_hz) & ~windows
+    added = _widen_marks(earlier, sample_rate_hz) & ~windows
     return np.asarray(windows | added), bool(added.any())
 
 

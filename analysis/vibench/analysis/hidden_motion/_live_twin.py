@@ -32,7 +32,7 @@ from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._parameters import Hidden, with_values
 from ._prepared_motion import ChannelNoise, PreparedMotion, dark_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
-from ._tracking import ACQUISITION_S, acquire, believed
+from ._tracking import ACQUISITION_S, acquire, reliable_samples
 from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 
 # Whether the specimen is what it was: innovations of a track against a baseline, block by block.
@@ -408,12 +408,12 @@ class LiveTwin:
         run = run_filter(self._model, self._motion, at, count, loss_limit=LOSS_LIMIT)
         kept = run.states.shape[0]
         if kept < count:
-            kept = believed(run, self._rate)
+            kept = reliable_samples(run, self._rate)
             self._at, self._is_out = None, True
             self._state, self._why = LiveState.LOST, "the motion does not fit the specimen's numbers"
             self._wait_longer()
         self._states[begin : begin + kept] = run.states[:kept]
-        self._squares.append(_counted(run))
+        self._squares.append(_clipped_innovations(run))
 
     def _wait_longer(self) -> None:
         """Try again at once, then less and less often: what does not fit costs no more than what does."""
@@ -510,7 +510,7 @@ class LiveTwin:
             self._forecast = self._forecaster.forecast(self._model, motion, at, states, frequency_hz)
 
 
-def _counted(run: Filtered) -> Reals:
+def _clipped_innovations(run: Filtered) -> Reals:
     """Return the squared innovations of flight, the largest clipped."""
     squared = run.squared
     return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))

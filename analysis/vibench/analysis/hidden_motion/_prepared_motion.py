@@ -108,7 +108,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
         end = min(begin + _PIECE, stop)
         first, last = begin - HALF_LENGTH, end + HALF_LENGTH
         raw = [recording.read(BASE, first, last), response.read(first, last)]
-        lost += _lost(*raw)
+        lost += _lost_samples(*raw)
         for row, values in zip(kept, correction.corrected(*raw), strict=True):
             row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]
     _require_finite(lost)
@@ -148,7 +148,7 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
     """Take samples whose sensors are taken out already; raises as `prepared_motion` does."""
     _require_rate(sample_rate_hz)
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
-    _require_finite(_lost(acceleration, velocity))
+    _require_finite(_lost_samples(acceleration, velocity))
     correction = ideal_sensors(sample_rate_hz)
     corrected = np.array(correction.corrected(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
     light = np.zeros(corrected.shape[1], dtype=np.bool_)
@@ -171,7 +171,7 @@ def _require_length(samples: int, sample_rate_hz: float) -> None:
         )
 
 
-def _lost(acceleration: Reals, velocity: Reals) -> int:
+def _lost_samples(acceleration: Reals, velocity: Reals) -> int:
     return int(np.count_nonzero(~np.isfinite(acceleration) | ~np.isfinite(velocity)))
 
 

@@ -121,7 +121,7 @@ def follow(
                 done = stop
             case FilterState():
                 began = start.sample
-                is_caught_up = _caught_up(model, motion, start, done)
+                is_caught_up = _advance_to(model, motion, start, done)
                 pieces = _pieces(model, motion, start) if is_caught_up else iter(())
                 piece = next(pieces, None)
                 if began > done:
@@ -141,7 +141,7 @@ def follow(
         yield NotFollowed(done, motion.samples, "too little was left to begin a track with")
 
 
-def _caught_up(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
+def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
     """Move a state on to a sample that it lies before; says whether it held."""
     count = sample - at.sample
     if count <= 0:
@@ -160,11 +160,11 @@ def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iter
         ahead = min(overlap, left - count)
         run = run_filter(model, motion, at, count, loss_limit=LOSS_LIMIT)
         is_lost = run.states.shape[0] < count
-        kept = believed(run, motion.sample_rate_hz) if is_lost else count
+        kept = reliable_samples(run, motion.sample_rate_hz) if is_lost else count
         whole = run
         if ahead and not is_lost:
             beyond = run_filter(model, motion, at.copy(), ahead)
-            whole = _joined(run, beyond)
+            whole = _join_runs(run, beyond)
         if kept:
             seen = whole.samples(0, kept) if is_lost else whole
             yield _piece(smooth(model, seen), run, kept)
@@ -184,12 +184,12 @@ def _piece(smoothed: Smoothed, run: Filtered, kept: int) -> TrackedPiece:
     )
 
 
-def _joined(one: Filtered, other: Filtered) -> Filtered:
+def _join_runs(one: Filtered, other: Filtered) -> Filtered:
     pairs = zip(one.arrays.values(), other.arrays.values(), strict=True)
     return Filtered(one.first, *(np.concatenate(pair) for pair in pairs))
 
 
-def believed(run: Filtered, sample_rate_hz: float) -> int:
+def reliable_samples(run: Filtered, sample_rate_hz: float) -> int:
     """Count the samples before a loss: up to where innovations over some milliseconds were good last."""
     squared = run.squared
     used = ~np.isnan(squared)

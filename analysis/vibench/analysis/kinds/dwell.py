@@ -72,7 +72,7 @@ def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellRes
     return Draw(found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
 
 
-def _compared(analysis: DwellAnalysis) -> tuple[Quantity, ...]:
+def _compared_quantities(analysis: DwellAnalysis) -> tuple[Quantity, ...]:
     towards_hz = bound_frequencies_hz(analysis.facts)
     return dwell_quantities(analysis.response, towards_hz, _endings(analysis.irregular))
 
@@ -81,7 +81,7 @@ DWELL = AnalysisKind(
     family="dwell",
     analyse=_analyse,
     draws=lambda analysis: partial(_draw, analysis),
-    compared=_compared,
+    compared=_compared_quantities,
     lay=lambda analysis, drawn: dwell_overlay(analysis, drawn, _endings(analysis.irregular)),
     curves=dwell_traces,
     budgets=dwell_budgets,

@@ -67,7 +67,7 @@ def _noise(
     )
 
 
-def _repeated_again(analysis: NoiseAnalysis) -> Estimate:
+def _estimate_for_draws(analysis: NoiseAnalysis) -> Estimate:
     """Return the estimate for draws: their drive is the recorded one, whose periods were measured with it."""
     found = analysis.response
     if found.periodic is None or found.left_out:
@@ -75,5 +75,5 @@ def _repeated_again(analysis: NoiseAnalysis) -> Estimate:
     return partial(repeated_response, repetitions=found.periodic.repetitions)
 
 
-REPEATED_NOISE = _noise(repeated_response, again=_repeated_again)
+REPEATED_NOISE = _noise(repeated_response, again=_estimate_for_draws)
 STREAMED_NOISE = _noise(streamed_response, again=lambda _: streamed_response)

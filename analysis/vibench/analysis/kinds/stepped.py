@@ -32,11 +32,11 @@ from .analysis_kind import AnalysisKind
 Setting = Callable[[Steps, Stretch], float]
 
 
-def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
+def _compared_quantities(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
     return stepped_quantities(analysis.response)
 
 
-def stepped(
+def stepped_analysis(
     setting_vpp: Setting,
     label: SegmentLabel = SegmentLabel.STEP,
     result: type[SteppedSineAnalysis] = SteppedSineAnalysis,
@@ -62,17 +62,17 @@ def stepped(
         family="stepped_sine",
         analyse=analyse,
         draws=lambda analysis: partial(draw, analysis),
-        compared=_compared,
+        compared=_compared_quantities,
         lay=stepped_overlay,
         curves=stepped_traces,
         budgets=stepped_budgets,
     )
 
 
-STEPPED_SINE = stepped(lambda plan, _: plan.amplitude_vpp)
-STEPPED_LEVEL = stepped(
+STEPPED_SINE = stepped_analysis(lambda plan, _: plan.amplitude_vpp)
+STEPPED_LEVEL = stepped_analysis(
     lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), result=SteppedLevelAnalysis
 )
 # With feedback the setting is not the plan's, and is known of no step.
-SETTLED_SINE = stepped(lambda *_: nan)
-RESONANCE_TRACKING = stepped(lambda *_: nan, SegmentLabel.RESONANCE)
+SETTLED_SINE = stepped_analysis(lambda *_: nan)
+RESONANCE_TRACKING = stepped_analysis(lambda *_: nan, SegmentLabel.RESONANCE)

@@ -142,7 +142,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     lowest, highest = low.copy(), high.copy()
     for row in np.ndindex(samples.shape[:-1]):
         reach = columns_around(samples[row], (low[row], high[row]))
-        lowest[row], highest[row] = widened(low[row], high[row], reach)
+        lowest[row], highest[row] = widen_extremes(low[row], high[row], reach)
     return lowest, highest
 
 
@@ -187,7 +187,7 @@ def period_of(samples: Samples, low: Samples, high: Samples) -> float:
     return low.size / turns if turns else inf
 
 
-def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
+def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
     """Return every column the extremes of this many columns around it."""
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
@@ -298,7 +298,7 @@ class RecordingOverview:
                 envelope(level.high[first:last], columns)[1],
             )
             reach = self._reach(role, first * bin_samples, last * bin_samples, low.size)
-            for edges, edge in zip((lows, highs), widened(low, high, reach), strict=True):
+            for edges, edge in zip((lows, highs), widen_extremes(low, high, reach), strict=True):
                 edges.append(edge)
         starts = first + column_starts(last - first, columns)
         time_s = starts.astype(np.float64) * (bin_samples / self.recording.sample_rate_hz)

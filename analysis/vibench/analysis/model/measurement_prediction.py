@@ -11,7 +11,7 @@ from vibench.acquisition.rig import Rig
 from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
 from .overlay import prediction_grid
-from .prediction import ResponsePrediction, predicted
+from .prediction import ResponsePrediction, predict
 
 MOST_POINTS = 60
 """Frequencies that are simulated: some seconds of work."""
@@ -60,11 +60,11 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
     approach = measurement.excitation.approach
     match approach:
         case Approach.REST:
-            grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
+            grid, each_s = _thin_grid(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
         case Approach.UP | Approach.DOWN:
             grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
     base = base_motion(measurement.excitation, rig, grid)
-    prediction = predicted(specimen, grid, base.amplitude_m, duration_s=each_s, approach=approach)
+    prediction = predict(specimen, grid, base.amplitude_m, duration_s=each_s, approach=approach)
     return MeasurementPrediction(measurement, prediction, base.basis, approach, rig.specimen.name)
 
 
@@ -78,6 +78,6 @@ def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float]
     return tuple((float(lows[a]), float(highs[b])) for a, b in zip(starts, ends, strict=True))
 
 
-def _thinned(grid: Reals) -> Reals:
+def _thin_grid(grid: Reals) -> Reals:
     step = -(-len(grid) // MOST_POINTS)
     return np.asarray(grid[::step])

@@ -38,7 +38,7 @@ from .ensemble import (
     escape_rate,
     logarithmic_difference,
 )
-from .prediction import ResponsePrediction, paper_amplitude_m, predicted
+from .prediction import ResponsePrediction, paper_amplitude_m, predict
 
 PREDICTION_STEP_HZ = 2.0
 _FINE_STEP_HZ = 0.25
@@ -175,7 +175,7 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> Noise
             measured.relative_sd_magnitude,
             (simulated.magnitude, simulated.relative_sd_magnitude),
         ),
-        prediction=predicted(specimen, prediction_grid(specimen, noise.band_start_hz, stop_hz), amplitude_m),
+        prediction=predict(specimen, prediction_grid(specimen, noise.band_start_hz, stop_hz), amplitude_m),
         amplitude_basis=basis,
     )
 
@@ -256,7 +256,7 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOv
         escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
         collisions=collisions(drawn.response),
         difference=_sine_difference(drawn, compared, measured, drawn.response),
-        prediction=predicted(specimen, grid, amplitude_m),
+        prediction=predict(specimen, grid, amplitude_m),
     )
 
 
@@ -305,7 +305,7 @@ def dwell_overlay(
         displacement=settled_envelope(drawn.response),
         terminal=terminal_levels(drawn.response, towards_hz),
         difference=_sine_difference(drawn, compared, measured, drawn.response),
-        prediction=predicted(
+        prediction=predict(
             drawn.run.specimen,
             np.array([measured.drive.frequency_hz]),
             measured.drive.amplitude_m,
@@ -332,7 +332,7 @@ def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]
         ensemble=ensemble_curves(compared, drawn.quantities),
         escape=None,
         difference=_sine_difference(drawn, compared, measured, drawn.response),
-        prediction=predicted(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
+        prediction=predict(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
     )
 
 

@@ -65,7 +65,7 @@ def ignore_points(done: int, asked: int) -> None:
     """Watch nothing."""
 
 
-def predicted(
+def predict(
     specimen: Specimen,
     frequency_hz: Reals,
     amplitude_m: Reals | float,
@@ -104,9 +104,9 @@ def predicted(
                     points.append(found)
                     progress(len(points), len(drives))
         case Approach.UP:
-            points = list(_followed(point, drives, duration_s, progress))
+            points = list(_follow_points(point, drives, duration_s, progress))
         case Approach.DOWN:
-            points = list(_followed(point, drives[::-1], duration_s, progress))[::-1]
+            points = list(_follow_points(point, drives[::-1], duration_s, progress))[::-1]
     ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
     return ResponsePrediction(
         specimen=specimen,
@@ -122,7 +122,7 @@ def predicted(
     )
 
 
-def _followed(
+def _follow_points(
     point: Callable[[Harmonic, Reals | None, float], Response],
     drives: Sequence[Harmonic],
     duration_s: float,

@@ -66,7 +66,7 @@ class FittedShaker:
         return _shaker(logarithms)
 
 
-def fitted_shaker(
+def fit_shaker(
     recording: Recording, analysis: NoiseAnalysis, specimen: Specimen, described: Shaker | None = None
 ) -> FittedShaker:
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.

@@ -63,7 +63,7 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
         high_hz=high_hz,
     )
     delay_s = recording.channel(BASE).delay_s
-    return RecordedBaseMotion(advanced(displacement.samples, delay_s * rate), rate, low_hz, high_hz, delay_s)
+    return RecordedBaseMotion(advance(displacement.samples, delay_s * rate), rate, low_hz, high_hz, delay_s)
 
 
 def lowest_frequency_hz(measurement: Measurement) -> float:
@@ -75,7 +75,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
     return float(min([*named, *(plan.get("frequencies_hz") or ())]))
 
 
-def advanced(samples: Reals, by_samples: float) -> Reals:
+def advance(samples: Reals, by_samples: float) -> Reals:
     """Shift a signal forward in time by a fraction of a sample or more, by the phase of its spectrum."""
     if by_samples == 0.0:
         return samples

@@ -17,7 +17,7 @@ from vibench.sim.background import Observer, stage
 from ..errors import AnalysisError
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
 from ..model.driven_rig import says_shaker
-from ..model.shaker_fit import FittedShaker, fitted_shaker
+from ..model.shaker_fit import FittedShaker, fit_shaker
 from ..results.campaign_results import CampaignResults
 from ..sine.dwell_analysis import DwellAnalysis
 from .specimen_fit import SpecimenFit
@@ -129,7 +129,7 @@ def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[Colli
         except AnalysisError as error:
             why.append(f"{each.name}: {error}")
             continue
-        refused = _refused(motion)
+        refused = _refusal(motion)
         if refused:
             why.append(f"{each.name}: {refused}")
         else:
@@ -158,7 +158,7 @@ def numbers_from_statistics(
         stage(observer, f"{each.name}: comparing its statistics with those of specimens drawn at random")
         try:
             with open_recording(each.path) as recording:
-                shaker = _fitted_shaker(recording, results, specimen)
+                shaker = _fit_shaker(recording, results, specimen)
                 found, distance = statistical_numbers(
                     recording, specimen, each.within(recording), each.drive_hz, shaker, linear
                 )
@@ -172,19 +172,19 @@ def numbers_from_statistics(
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 
-def _fitted_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
+def _fit_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
     if says_shaker(recording) or not results.noise:
         return None
     weakest = results.noise[0].analysis
     with open_recording(weakest.facts.path) as noise:
-        return fitted_shaker(noise, weakest, specimen)
+        return fit_shaker(noise, weakest, specimen)
 
 
 def _width(found: CollisionNumbers) -> float:
     return max((each.high - each.low) / each.value for each in found.gaps)
 
 
-def _refused(motion: HiddenMotion) -> str:
+def _refusal(motion: HiddenMotion) -> str:
     """Return why a motion's numbers are none, or nothing."""
     missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""

@@ -47,7 +47,7 @@ Model = Callable[[Specimen, Reals, Reals], Complexes]
 """m0 over base at frequencies, of a specimen and of further numbers."""
 
 
-def chained(
+def chained_response(
     specimen: Specimen, frequency_hz: Reals, extra_n_per_m: tuple[Complexes | float, ...]
 ) -> Complexes:
     """m0 over base of a specimen with more hung on its masses, shape (lines,).
@@ -63,9 +63,9 @@ def chained(
     return np.asarray(p0 / (p0 + m0 * s**2 + at_m0 + p2 * behind / (p2 + behind)))
 
 
-def as_described(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
+def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
     """Return the three masses alone."""
-    return chained(specimen, frequency_hz, (0.0, 0.0))
+    return chained_response(specimen, frequency_hz, (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Freedom:
     """What beside the usual parameters a fit may change."""
 
     parameters: tuple[Parameter, ...] = ()
-    model: Model = as_described
+    model: Model = own_response
     starts: tuple[tuple[float, ...], ...] = ((),)
     """Of the model's further numbers."""
     low: tuple[float, ...] = ()
@@ -181,7 +181,7 @@ def lines_of(
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz
-    size = measured if fitted is None else np.abs(as_described(fitted, frequency_hz, np.zeros(0)))
+    size = measured if fitted is None else np.abs(own_response(fitted, frequency_hz, np.zeros(0)))
     scatter = frequency_response.relative_sd_magnitude * measured
     usual = median_filter(np.where(np.isfinite(scatter), scatter, np.inf), _NEIGHBOURS, mode="nearest")
     used = frequency_response.is_significant & np.isfinite(scatter) & (size > _LEAST_CLEAR * usual)
@@ -206,7 +206,7 @@ def lines_of(
     )
 
 
-def descended(lines: Lines) -> Descended:
+def fit_lines(lines: Lines) -> Descended:
     """Fit from the description, and from stiffer and softer ones where that does not do."""
     usual = Freedom()
     best = _from(lines, usual, lines.start)
@@ -219,16 +219,16 @@ def descended(lines: Lines) -> Descended:
             f"the {lines.frequency_hz.size} lines of the transmission that stand clear of the scatter do not "
             f"tell {', '.join(lines.free)}; measure longer or with more drive"
         )
-    return _described(lines, usual, best)
+    return _fit_from_description(lines, usual, best)
 
 
-def descended_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
+def fit_lines_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
     """Fit with more freedom, from where a fit without it ended and from the description."""
     opened = replace(lines, free=(*lines.free, *allowed.parameters))
     begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
     ways = [(start, further) for start in begun for further in allowed.starts]
     found = [_from(opened, allowed, np.concatenate([start, further])) for start, further in ways]
-    return _described(opened, allowed, min(found, key=lambda each: each.cost))
+    return _fit_from_description(opened, allowed, min(found, key=lambda each: each.cost))
 
 
 def _stiffer(lines: Lines, scale: float) -> Reals:
@@ -278,7 +278,7 @@ def _descent(
     )
 
 
-def _described(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
+def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)

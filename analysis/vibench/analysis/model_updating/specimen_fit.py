@@ -13,7 +13,7 @@ from ..frequency_response.results import FrequencyResponse
 from ..signals.arrays import Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE
 from ..tables import Labelled
-from .lines import Lines, descended, lines_of
+from .lines import Lines, fit_lines, lines_of
 from .parameters import (
     ALSO_FREE,
     DAMPERS,
@@ -116,10 +116,10 @@ def fit_specimen(
             f"{', '.join(allowed)}, one mass at a time"
         )
     lines = lines_of(frequency_response, nominal, free, scale_sd)
-    found = descended(lines)
+    found = fit_lines(lines)
     clear = lines_of(frequency_response, nominal, free, scale_sd, found.specimen)
     if not np.array_equal(clear.frequency_hz, lines.frequency_hz):
-        lines, found = clear, descended(clear)
+        lines, found = clear, fit_lines(clear)
     chi_square = found.chi_square / lines.freedom
     fits = chi_square <= lines.limit
     covariance = found.covariance * max(1.0, chi_square) + _of_the_clock(free)

@@ -91,7 +91,7 @@ def posterior(
         if len(new):
             parameters = np.concatenate([parameters, new])
             statistics = np.concatenate([statistics, runs(new)])
-        middle, errors = _regressed(statistics, parameters, observed)
+        middle, errors = _regression(statistics, parameters, observed)
         reach = _MARGIN * np.abs(errors).max(axis=0)
         narrower = np.clip(np.stack([middle - reach, middle + reach], axis=1), box[:, :1], box[:, 1:])
         found = np.clip(middle + errors, box[:, 0], box[:, 1])
@@ -100,7 +100,7 @@ def posterior(
     return Posterior(found, _distance(guessed, statistics, observed))
 
 
-def _regressed(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
+def _regression(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
     """Give parameters (n,) of observed statistics, and errors of draws left out one at a time, (draws, n)."""
     middle, scale = statistics.mean(axis=0), statistics.std(axis=0) + 1e-12
     u, sizes, vt = np.linalg.svd((statistics - middle) / scale, full_matrices=False)
@@ -108,7 +108,7 @@ def _regressed(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[R
     mean = parameters.mean(axis=0)
     found, errors = np.empty(parameters.shape[1]), np.empty(parameters.shape)
     for n, target in enumerate((parameters - mean).T):
-        tried = [_left_out(u, sizes, target, ridge) for ridge in _RIDGES]
+        tried = [_leave_one_out_errors(u, sizes, target, ridge) for ridge in _RIDGES]
         best = int(np.argmin([np.sum(each**2) for each in tried]))
         errors[:, n] = tried[best]
         weight = sizes / (sizes**2 + _RIDGES[best])
@@ -116,7 +116,7 @@ def _regressed(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[R
     return found, errors
 
 
-def _left_out(u: Reals, sizes: Reals, target: Reals, ridge: float) -> Reals:
+def _leave_one_out_errors(u: Reals, sizes: Reals, target: Reals, ridge: float) -> Reals:
     """Errors of a ridge regression of draws that it does not know, in closed form."""
     shrunk = sizes**2 / (sizes**2 + ridge)
     fitted = (u * shrunk) @ (u.T @ target)
@@ -198,7 +198,7 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     return np.concatenate([*parts, *lines])
 
 
-def heard(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
+def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
     """Say which statistics are not those of a channel's own noise, whose spectrum nobody knows; same shape.
 
     Parameters
@@ -334,7 +334,7 @@ def statistical_numbers(
     if np.isnan(measured).any():
         raise UnusableData("samples were lost, and statistics of what is left are those of another window")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
-    made = _Runs(draws, specimen, linear, drive_hz, heard(observed, draws.noise_rms, rate_hz))
+    made = _Runs(draws, specimen, linear, drive_hz, above_sensor_noise(observed, draws.noise_rms, rate_hz))
     _require_likely(made, measured)
     reach = np.log(list(_AROUND.values()))
     found = posterior(made, observed[made.heard], np.stack([-reach, reach], axis=1), _SEED, rounds)
@@ -343,7 +343,7 @@ def statistical_numbers(
             f"its statistics are {found.distance:.2g} times as far from those of any specimen that was "
             "simulated as those are among themselves: something else of rig or specimen is not as described"
         )
-    return tuple(_told(found, specimen)), found.distance
+    return tuple(_determined_parameters(found, specimen)), found.distance
 
 
 class _Runs:
@@ -409,7 +409,7 @@ def _require_likely(made: _Runs, measured: Reals) -> None:
         )
 
 
-def _told(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
+def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
     described = tracked_specimen(specimen)
     parts = _relative(found.draws.T)
     lower, upper = specimen.gaps_m

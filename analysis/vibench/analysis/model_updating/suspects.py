@@ -10,7 +10,7 @@ import numpy as np
 from vibench.sim import Specimen
 
 from ..signals.arrays import Complexes, Reals
-from .lines import Descended, Freedom, Lines, as_described, chained, descended_further
+from .lines import Descended, Freedom, Lines, chained_response, fit_lines_further, own_response
 from .parameters import DAMPERS, MASSES, SHOWN, Parameter, parameter_value
 
 TOLD_APART = 2.0 * float(np.log(20.0))
@@ -77,7 +77,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
     """
     tried = []
     for assumption, allowed, told in _ways(lines, is_nonlinear=is_nonlinear):
-        found = descended_further(lines, allowed, usual)
+        found = fit_lines_further(lines, allowed, usual)
         parameters = len(allowed.parameters) + len(allowed.low)
         freedom = lines.freedom - parameters
         sentence = told(found.specimen, found.further)
@@ -119,7 +119,7 @@ def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumpti
         if is_nonlinear is not False:
             yield Assumption.FRICTION, Freedom((each,)), _rubs(lines.nominal, each)
     if not lines.scale_sd:
-        yield Assumption.SENSITIVITY, Freedom((), _scaled, ((0.0,),), (-1.0,), (1.0,)), _off
+        yield Assumption.SENSITIVITY, Freedom((), _response, ((0.0,),), (-1.0,), (1.0,)), _off
     top_hz = float(lines.frequency_hz.max())
     starts = (float(np.log(1.3 * top_hz)), float(np.log(2.5 * top_hz)))
     low_hz = float(lines.frequency_hz.min())
@@ -170,8 +170,8 @@ def _rubs(nominal: Specimen, damper: Parameter) -> _Told:
     return told
 
 
-def _scaled(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return np.asarray(np.exp(further[0]) * as_described(specimen, frequency_hz, further))
+def _response(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    return np.asarray(np.exp(further[0]) * own_response(specimen, frequency_hz, further))
 
 
 def _off(_: Specimen, further: Reals) -> str:
@@ -190,17 +190,21 @@ def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
 
 
 def _on_m0(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return chained(specimen, frequency_hz, (_absorber(specimen.masses[0], frequency_hz, further), 0.0))
+    return chained_response(
+        specimen, frequency_hz, (_absorber(specimen.masses[0], frequency_hz, further), 0.0)
+    )
 
 
 def _on_m2(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return chained(specimen, frequency_hz, (0.0, _absorber(specimen.masses[2], frequency_hz, further)))
+    return chained_response(
+        specimen, frequency_hz, (0.0, _absorber(specimen.masses[2], frequency_hz, further))
+    )
 
 
 def _under_foot(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
     own_hz, damping = np.exp(further)
     ratio = frequency_hz / own_hz
-    return np.asarray(as_described(specimen, frequency_hz, further) / (1 - ratio**2 + 2j * damping * ratio))
+    return np.asarray(own_response(specimen, frequency_hz, further) / (1 - ratio**2 + 2j * damping * ratio))
 
 
 def _resonates(where: str) -> _Told:

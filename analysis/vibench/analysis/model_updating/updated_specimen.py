@@ -16,11 +16,11 @@ from ..frequency_response.distortion import scatters_beyond_noise
 from ..frequency_response.noise_response import NoiseAnalysis
 from ..kinds.analysis_kind import NoiseResult
 from ..model.driven_rig import described_shaker
-from ..model.shaker_fit import fitted_shaker
+from ..model.shaker_fit import fit_shaker
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Labelled, columns, plain, plus_minus
-from ..uncertainty.budget import stated_of
+from ..uncertainty.budget import stated_uncertainties
 from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 from .gap_fit import bracketed_gap, fit_gap
 from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
@@ -79,7 +79,7 @@ def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None
         described = described_shaker(recording)
         if described is None:
             return None
-        found = fitted_shaker(recording, analysis, specimen, described)
+        found = fit_shaker(recording, analysis, specimen, described)
     mass = found.shaker.moving_mass_kg
     relative = float(np.hypot(found.relative_sd["moving_mass_kg"], _LEAST_RELATIVE_SD))
     return TableFit(mass, relative * mass, described.moving_mass_kg, found.chi2)
@@ -127,7 +127,7 @@ class UpdatedSpecimen(Labelled):
         """Assumptions that a recording contradicts, of each recording the likeliest first."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
-        return (*linear, *table, *_contradicted(self.collisions))
+        return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     @property
     def description(self) -> SpecimenDescription:
@@ -193,7 +193,7 @@ class UpdatedSpecimen(Labelled):
 
 
 def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
-    yield from (_said(each) for each in updated.values)
+    yield from (_in_words(each) for each in updated.values)
     if updated.collisions is not None:
         yield from updated.collisions.sentences
     linear, table = updated.linear, updated.table
@@ -207,7 +207,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
         yield table.sentence
         if table.suspects:
             yield f"The table does not fit: {culprits_text(table.suspects)}."
-    contradicted = _contradicted(updated.collisions)
+    contradicted = _contradictory_suspects(updated.collisions)
     if contradicted:
         yield f"Collisions contradict the description: {culprits_text(contradicted)}."
     yield from updated.not_told
@@ -227,14 +227,14 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     return f"{choice}{named}" if choice else f"what would mend it is {named}"
 
 
-def _contradicted(found: CollisionNumbers | None) -> tuple[Suspect, ...]:
+def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ...]:
     if found is None or not found.contradicted:
         return ()
     sentence = " and ".join(found.contradicted)
     return (Suspect(Assumption.GAPS, sentence, found.misfit, mends=True, behind=0.0),)
 
 
-def _said(found: FittedValue) -> str:
+def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
     # Two digits of the interval, so that it is an interval on paper too.
@@ -314,7 +314,7 @@ def _linear(
             weakest.frequency_response,
             nominal,
             free,
-            scale_sd=stated_of(results.noise[0].analysis.facts.bench).scale_sd,
+            scale_sd=stated_uncertainties(results.noise[0].analysis.facts.bench).scale_sd,
             is_nonlinear=is_nonlinear,
         )
     except NotEnoughData as error:

@@ -70,12 +70,12 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         _stretches(facts),
         _overloads(facts),
         *_dropouts(facts),
-        _lost(facts),
+        _lost_samples_check(facts),
         *_drive(facts),
         *_late(facts),
         *_ranges(facts),
         _rates(facts),
-        *_imported_time(facts),
+        *_import_time_checks(facts),
         _calibrations(facts),
         _bench_check(facts),
     )
@@ -150,7 +150,7 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
         yield Check("Drop-outs", Verdict.WARNING if often else Verdict.NOTE, text)
 
 
-def _lost(facts: RecordingFacts) -> Check:
+def _lost_samples_check(facts: RecordingFacts) -> Check:
     if facts.lost_samples == 0:
         return Check("Lost samples", Verdict.PASSED, "none")
     text = f"{facts.lost_samples} samples were lost; what touches them is left out"
@@ -208,7 +208,7 @@ def _rates(facts: RecordingFacts) -> Check:
     return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
 
 
-def _imported_time(facts: RecordingFacts) -> Iterator[Check]:
+def _import_time_checks(facts: RecordingFacts) -> Iterator[Check]:
     remarks = facts.bench.get("imported", {}).get("time", ())
     if remarks:
         yield Check("Time of the imported file", Verdict.NOTE, "; ".join(remarks))

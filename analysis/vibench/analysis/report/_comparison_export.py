@@ -65,7 +65,7 @@ def write_comparison(
     except ValueError as unknown:
         allowed = ", ".join(f".{each.value}" for each in ExportKind)
         raise InvalidRequest(f"{path.name!r} was given; its ending must be one of {allowed}") from unknown
-    target = unused(path)
+    target = first_free_path(path)
     match kind:
         case ExportKind.HTML:
             _report(target, recordings)
@@ -111,7 +111,7 @@ def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
     return tuple(float(value) if np.isfinite(value) else "" for value in values)
 
 
-def unused(path: Path) -> Path:
+def first_free_path(path: Path) -> Path:
     """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that no file has."""
     if not path.exists():
         return path

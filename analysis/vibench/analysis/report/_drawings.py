@@ -230,7 +230,7 @@ def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult
                 break
 
 
-def _budgeted(result: AnyResult) -> Iterator[tuple[str, str]]:
+def _budget_numbers(result: AnyResult) -> Iterator[tuple[str, str]]:
     return ((each.quantity, each.text) for each in budgets_of(result))
 
 
@@ -248,7 +248,7 @@ def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
     """Yield where collisions begin, and the budgets."""
     for region in sweep.analysis.collisions.regions[:1]:
         yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
-    amplitude, *largest = _budgeted(sweep)
+    amplitude, *largest = _budget_numbers(sweep)
     yield from (*largest, amplitude)
 
 
@@ -256,7 +256,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
     """Yield the first resonance tracked, if any, the budgets, and the level of the base."""
     for each in tracked_resonances(stepped.analysis.facts.feedback)[:1]:
         yield "phase resonance", f"{plus_minus(each.frequency_hz, 2 * each.u_frequency_hz)} Hz"
-    yield from _budgeted(stepped)
+    yield from _budget_numbers(stepped)
     found = stepped.analysis.response
     if found.response_ii.size:
         top = int(np.argmax(found.response_ii))
@@ -285,7 +285,7 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
         Family.DWELL: Drawing(
             lambda dwell: _dwell_figures((dwell,)),
             dwell_findings,
-            _budgeted,
+            _budget_numbers,
             (dwell_table, line_table),
             _dwell_levels,
         ),

@@ -115,14 +115,14 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
     environment = Environment(
         loader=PackageLoader("vibench.analysis.report", "."),
         autoescape=True,
-        finalize=_shown,
+        finalize=_escape,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     text = environment.get_template("report.html.j2").render(
         page=page,
-        embedded={each: _embedded(number, each, figures_folder) for number, each in enumerate(figures, 1)},
+        embedded={each: _embed(number, each, figures_folder) for number, each in enumerate(figures, 1)},
         is_long=len(page.cards) > MOST_OPEN_CARDS,
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         version=version("vibench"),
@@ -141,12 +141,12 @@ def _figures(page: Page) -> Iterator[DrawnFigure]:
         yield from fold.figures
 
 
-def _shown(content: object) -> object:
+def _escape(content: object) -> object:
     """Write control characters of names and texts as escapes; Markup is of the template itself."""
     return printable(content) if type(content) is str else content
 
 
-def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
+def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
     if folder is not None:
         drawn.save(folder)
     svg = drawn.svg

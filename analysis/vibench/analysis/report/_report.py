@@ -83,10 +83,10 @@ def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
     kept = [each.frequency_hz for each in after if each.frequency_hz not in new]
     if len(gone) == len(before) > 1:
         others = "another appears" if len(new) == 1 else f"{_number(len(new))} others appear"
-        yield f"At {_level(strong)} they are gone and {others} at {_listed(new)} Hz."
+        yield f"At {_level(strong)} they are gone and {others} at {_list_hz(new)} Hz."
         return
     parts = [
-        f"{_listed(some)} Hz {one if len(some) == 1 else several}"
+        f"{_list_hz(some)} Hz {one if len(some) == 1 else several}"
         for some, one, several in (
             (kept, "remains", "remain"),
             (gone, "is gone", "are gone"),
@@ -102,7 +102,7 @@ def _resonances(result: NoiseResult) -> str:
     if not found:
         return f"At {_level(result)} no resonance stands above its uncertainty."
     verb = "is" if len(found) == 1 else "are"
-    return f"At {_level(result)} there {verb} {_count(len(found), 'resonance')}, {_listed(found)} Hz."
+    return f"At {_level(result)} there {verb} {_count(len(found), 'resonance')}, {_list_hz(found)} Hz."
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
@@ -113,8 +113,8 @@ def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
         levels = kinds.setdefault(verdict_text(each.analysis.motion.verdict), [])
         levels.append(f"{each.analysis.excitation.amplitude_vpp:g}")
     for frequency_hz, kinds in by_place.items():
-        said = [f"{kind} at {_joined(levels)} Vpp" for kind, levels in kinds.items()]
-        yield f"At {frequency_hz:g} Hz the motion is {_joined(said)}."
+        said = [f"{kind} at {_join(levels)} Vpp" for kind, levels in kinds.items()]
+        yield f"At {frequency_hz:g} Hz the motion is {_join(said)}."
 
 
 def _agreement(verdicts: Sequence[Agreement]) -> str:
@@ -135,7 +135,7 @@ def _agreement(verdicts: Sequence[Agreement]) -> str:
         )
     ]
     parts = [f"{text} {_number(count)}" for text, count in counts if count]
-    return f"Of {_count(len(verdicts), 'recording')}, the simulation {_joined(parts)}."
+    return f"Of {_count(len(verdicts), 'recording')}, the simulation {_join(parts)}."
 
 
 def _level(result: NoiseResult) -> str:
@@ -153,11 +153,11 @@ def _is_one_specimen(results: Sequence[AnyResult]) -> bool:
     return all(each == first for each in others)
 
 
-def _listed(values_hz: Sequence[float]) -> str:
-    return _joined([f"{each:.1f}" for each in values_hz])
+def _list_hz(values_hz: Sequence[float]) -> str:
+    return _join([f"{each:.1f}" for each in values_hz])
 
 
-def _joined(parts: Sequence[str]) -> str:
+def _join(parts: Sequence[str]) -> str:
     *first, last = parts
     return f"{', '.join(first)} and {last}" if first else last
 
@@ -170,10 +170,10 @@ def _count(count: int, noun: str) -> str:
     return f"{_number(count)} {noun}{'' if count == 1 else 's'}"
 
 
-def laid_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
+def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
     """Draw each map, with the levels and Responses I of everything that was measured under many sines."""
     levels = [
-        RecordedLevel(each.analysis.facts.name, level, tuple(_measured(each, CurveKind.RESPONSE_I)))
+        RecordedLevel(each.analysis.facts.name, level, tuple(_measured_curves(each, CurveKind.RESPONSE_I)))
         for each in results.in_order
         if len(level := drive_level(each)) > 1
     ]
@@ -182,30 +182,30 @@ def laid_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[
         yield replace(drawn, name=f"map_{number}")
 
 
-def _measured(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
+def _measured_curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
     measured = ANALYSES[result.kind].curves(
         result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
     )
     return (curve for curve in measured if not kinds or curve.response in kinds)
 
 
-def laid_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
+def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
     """Draw each diagram along frequency over everything that was measured under sines of many frequencies."""
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
-            yield replace(_laid_backbone(results, diagram), name=f"branches_{number}")
+            yield replace(_backbone(results, diagram), name=f"branches_{number}")
             continue
         if diagram.request.along is not Parameter.FREQUENCY or not levels:
             yield replace(branches_figure(diagram), name=f"branches_{number}")
             continue
-        curves = [curve for result, _ in levels for curve in _measured(result)]
+        curves = [curve for result, _ in levels for curve in _measured_curves(result)]
         drawn = branches_figure(diagram, curves)
         said = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
         yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {said}")
 
 
-def _laid_backbone(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
+def _backbone(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
     """Draw a phase resonance beneath those that were tracked around it."""
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]
@@ -282,7 +282,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
     ]
     rows += [(name, str(value)) for name, value in facts.confirmations.items()]
     rows += [
-        (part, _named(facts.bench[part]))
+        (part, _part_name(facts.bench[part]))
         for part in ("amplifier", "shaker", "vibrometer", "accelerometer")
         if part in facts.bench
     ]
@@ -317,7 +317,7 @@ def bench_check_text(facts: RecordingFacts) -> str:
     return ": ".join([head, "; ".join(odd)]) if odd else head
 
 
-def _named(part: Mapping[str, Any]) -> str:
+def _part_name(part: Mapping[str, Any]) -> str:
     plain = [f"{key} = {value}" for key, value in part.items() if isinstance(value, (int, float))]
     head = f"{part.get('model', '')}, serial {part.get('serial') or 'not given'}"
     return ", ".join([head, *plain])
@@ -414,7 +414,11 @@ def write_report(
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
     failed = {each.name.removesuffix(".part").removesuffix(".h5"): each for each in results.failures}
     cards = [_card(each, failed) for each in results.in_order]
-    together = [*figures_together(results), *laid_branches(results, diagrams), *laid_maps(results, maps)]
+    together = [
+        *figures_together(results),
+        *draw_branches(results, diagrams),
+        *draw_maps(results, maps),
+    ]
     together += [draw(each) for each in hidden for draw in (hidden_motion_figure, hidden_impacts_figure)]
     first = together.pop(0) if len(cards) > 1 and together else next((each.figure for each in cards), None)
     page = Page(

@@ -191,13 +191,13 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
         bias,
         second.text,
         verdict_text(result.analysis.motion.verdict),
-        *_simulated(laid, RESPONSE_I),
-        *_simulated(laid, RESPONSE_II),
+        *_simulated_response(laid, RESPONSE_I),
+        *_simulated_response(laid, RESPONSE_II),
         ABSENT if laid is None else f"{laid.run.impact_rate_hz:.0f}",
     )
 
 
-def _simulated(laid: DwellOverlay | None, name: str) -> tuple[str, str]:
+def _simulated_response(laid: DwellOverlay | None, name: str) -> tuple[str, str]:
     """Say one response of the draws with the band of 95 %, and the measured one's place in it."""
     found = None if laid is None else laid.quantity(name)
     if laid is None or found is None:

@@ -21,7 +21,7 @@ from ..kinds.noise import NOISE_FAMILY
 from ..model.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
 from ..model.driven_rig import says_shaker
 from ..model.overlay import AbstractOverlay, Simulation
-from ..model.shaker_fit import FittedShaker, fitted_shaker
+from ..model.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..sine.dwell_analysis import DwellAnalysis
@@ -67,7 +67,7 @@ def overlay(
         to weak noise, and the base drives where that is not possible either: ``run.driven`` and ``run.why``
         of the result say so.
     shaker
-        As `fitted_shaker` found it in another recording; taken where the bench configuration describes none.
+        As `fit_shaker` found it in another recording; taken where the bench configuration describes none.
     draws
         How many runs of a colliding motion are made from slightly different starts under the voltage.
     stage
@@ -97,7 +97,7 @@ def _source(
     if simulation is Simulation.UNDER_VOLTAGE:
         try:
             if shaker is None and isinstance(analysis, NoiseAnalysis) and not says_shaker(recording):
-                shaker = fitted_shaker(recording, analysis, model)
+                shaker = fit_shaker(recording, analysis, model)
             return voltage_source(recording, model, None if says_shaker(recording) else shaker, draws)
         except UnusableData as error:
             why = str(error)
@@ -206,7 +206,7 @@ def analyse_files(
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
-    shaker = _shared_shaker(paths, specimen) if simulation is Simulation.UNDER_VOLTAGE else None
+    shaker = _fit_common_shaker(paths, specimen) if simulation is Simulation.UNDER_VOLTAGE else None
     results: list[AnyResult] = []
     failures: list[AnalysisFailure] = []
     for path in paths:
@@ -223,7 +223,7 @@ def analyse_files(
     return CampaignResults(name, tuple(results), tuple(failures))
 
 
-def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
+def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
     """Fit a shaker to the weakest noise that allows it, if any recording needs one; else None."""
     unknown: list[tuple[float, Path]] = []
     needed = False
@@ -242,7 +242,7 @@ def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedSh
         try:
             with open_recording(path) as recording:
                 analysis: NoiseAnalysis = analyse(recording)  # type: ignore[assignment]
-                return fitted_shaker(recording, analysis, specimen or specimen_of(recording.bench))
+                return fit_shaker(recording, analysis, specimen or specimen_of(recording.bench))
         except (AnalysisError, RecordingError):
             continue
     return None
@@ -311,10 +311,10 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:
         raise NotEnoughData(f"{folder} holds no recording (.h5 or .h5.part); give a folder that does")
-    return tuple(sorted(found, key=lambda path: (_started(path), path.name)))
+    return tuple(sorted(found, key=lambda path: (_start_time(path), path.name)))
 
 
-def _started(path: Path) -> str:
+def _start_time(path: Path) -> str:
     """Start of a recording; one that cannot be opened comes last and is named as a failure later."""
     last = "~"
     try:

@@ -52,7 +52,7 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
 
     """
     require_checked(excerpt.recording)
-    played = _played(excerpt)
+    played = _played_parts(excerpt)
     densities = tuple(_density(played, channel) for channel in excerpt.channels)
     kind = present_word(excerpt.recording.plan.get("excitation", {}).get("kind", ""))
     if kind not in ANALYSES or ANALYSES[kind].family != NOISE_FAMILY:
@@ -97,7 +97,7 @@ class _Played:
         return f"over {seconds:.6g} s of {' and '.join(self.labels)}"
 
 
-def _played(excerpt: Excerpt) -> _Played:
+def _played_parts(excerpt: Excerpt) -> _Played:
     """Find the parts of the plan; a recording without named parts is one."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz

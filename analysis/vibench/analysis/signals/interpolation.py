@@ -36,7 +36,7 @@ def _weights_of_phases() -> Reals:
 _WEIGHTS = _weights_of_phases()
 
 
-def interpolated(samples: Reals, positions: Reals) -> Reals:
+def interpolate(samples: Reals, positions: Reals) -> Reals:
     """Evaluate a signal at fractional sample positions by a Kaiser-windowed sinc.
 
     Parameters

@@ -42,10 +42,10 @@ def taper(window: Window | str, samples: int) -> Reals:
 
 def cosine_weights(window: Window | str) -> tuple[float, ...]:
     """Return the weights of 1, cos, cos of twice the angle, ... that a window is the sum of."""
-    return _COSINES[named_window(window)]
+    return _COSINES[window_by_name(window)]
 
 
-def named_window(window: Window | str) -> Window:
+def window_by_name(window: Window | str) -> Window:
     """Turn a name into a window; raises InvalidRequest when no window has that name."""
     try:
         return Window(window)

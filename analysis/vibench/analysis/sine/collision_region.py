@@ -124,8 +124,8 @@ def collisions(sweep: SweptMotion) -> Collisions:
     is_known = bool(np.isfinite(sweep.linear_residual).all())
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
-    for run in _merged(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
-        first, last = _trimmed(above, *run, votes)
+    for run in _merge_runs(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
+        first, last = _trim_run(above, *run, votes)
         if is_known or np.mean(impacts[first : last + 1]) >= _ENOUGH:
             regions.append(_region(sweep, residual / threshold, first, last))
             inside[first : last + 1] = True
@@ -160,7 +160,7 @@ def _runs(flags: Flags) -> list[tuple[int, int]]:
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _merged(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+def _merge_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
     merged: list[tuple[int, int]] = []
     for first, last in runs:
         if merged and first - merged[-1][1] <= gap:
@@ -170,7 +170,7 @@ def _merged(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
     return merged
 
 
-def _trimmed(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
+def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
     """Move the ends of a run, which the vote blurs, to the split that misjudges the fewest intervals."""
     half = votes // 2 + 1
     begin = _best_split(above, max(0, first - half), min(first + half, last))

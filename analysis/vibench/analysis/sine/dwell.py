@@ -73,7 +73,7 @@ def silence_before(channels: Channels) -> Reals:
     return NOTHING
 
 
-def heard_in(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:
+def background_in_silence(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:
     """Return what a silence holds in a band, as displacement; NaN where it is too short for its low end."""
     source = "silence before the check"
     if 2 * velocity.size < rate_hz / band_hz[0]:
@@ -86,7 +86,7 @@ def heard_in(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> B
     return Background(float(rms_m), float(np.sqrt(fast / slow) / (2 * np.pi)) if slow else 0.0, source)
 
 
-def left_between(rest: Reals, rate_hz: float) -> Background:
+def background_between_lines(rest: Reals, rate_hz: float) -> Background:
     """Return what a displacement holds without all that repeats with the drive."""
     rms_m = float(np.std(rest))
     turns = float(np.std(np.diff(rest))) * rate_hz / (2 * np.pi)
@@ -171,7 +171,7 @@ def slow_change(parts: Complexes | Reals) -> float:
     return _BEYOND * sd if sd <= STEADY else float("nan")
 
 
-def demodulated(samples: Reals, cycles_per_sample: float, window_samples: int) -> Complexes:
+def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) -> Complexes:
     """Return the complex amplitude at the drive frequency in blocks of a tenth of the window."""
     block = max(window_samples // _BLOCKS_OF_WINDOW, round(_LEAST_CYCLES / cycles_per_sample))
     taper = np.hanning(block)
@@ -355,9 +355,9 @@ def dwell_response(
     of_base_m = float(np.hypot(level.sd_amplitude_m, base_change * level.amplitude_m))
     level = replace(level, sd_amplitude_m=of_base_m)
     noise_density, sensor = _sensor_noise(response, displacement)
-    silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
+    silent = background_in_silence(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
     repeated = np.asarray(np.real(repeating.value[:, 0] @ order_turns(phase, orders)))
-    rest = left_between(motion - repeated, sample_rate_hz)
+    rest = background_between_lines(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
     most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
@@ -441,7 +441,7 @@ def _slow_changes(
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (
-        demodulated(each[settled], drive_hz / rate, round(window_s * rate)) for each in (response, base)
+        demodulate(each[settled], drive_hz / rate, round(window_s * rate)) for each in (response, base)
     )
     return slow_change(np.abs(shook)), slow_change(moved / shook)
 

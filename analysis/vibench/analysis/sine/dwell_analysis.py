@@ -16,11 +16,11 @@ from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..signals.arrays import Reals
 from ..signals.envelope import Envelope, envelope
-from ..signals.interpolation import REACH, interpolated
+from ..signals.interpolation import REACH, interpolate
 from ..signals.quantity import Quantity, converted_signal
 from ..spectra.spectra import spectral_density
 from ..tables import Labelled
-from ..tones.sine_fit import fitted_sine
+from ..tones.sine_fit import fit_sine
 from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 # How the motion of a dwell repeats: its points at the drive's phase, and the verdict on them.
@@ -84,7 +84,7 @@ def stroboscope(
     """
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
-    sine = fitted_sine(drive, sample_rate_hz, near_hz)
+    sine = fit_sine(drive, sample_rate_hz, near_hz)
     band = {"low_hz": _LOWEST_ORDER * near_hz, "high_hz": BAND_ABOVE * sample_rate_hz}
     displacement = converted_signal(
         response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.DISPLACEMENT, **band
@@ -107,7 +107,7 @@ def stroboscope(
         )
     positions = (turns - offset) / per_sample + delay
     inside = slice(first, last + 1)
-    motion = interpolated(np.stack([displacement.samples, velocity.samples]), positions)
+    motion = interpolate(np.stack([displacement.samples, velocity.samples]), positions)
     return Section(
         drive_hz=sine.frequency_hz,
         phase_rad=phase_rad,

@@ -286,14 +286,14 @@ def hysteresis(
     if low >= high:
         raise InvalidRequest("the two sweeps share no frequency; compare sweeps of the same range")
     frequency_hz = np.linspace(low, high, _POINTS)
-    curves = [_read(each, frequency_hz) for each in (up, down)]
+    curves = [_response_near(each, frequency_hz) for each in (up, down)]
     apart_db = _PER_BEL_DB * np.log10(curves[0] / curves[1])
     together = uniform_filter1d(apart_db, _SMOOTHED_POINTS, mode="nearest")
     differs = np.asarray(np.abs(together) > _APART_DB)
     return Hysteresis(frequency_hz, curves[0], curves[1], differs, _pairs(up_jumps, down_jumps))
 
 
-def _read(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
+def _response_near(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
     order = np.argsort(sweep.frequency_hz)
     return np.asarray(np.interp(frequency_hz, sweep.frequency_hz[order], sweep.response_ii[order]))
 

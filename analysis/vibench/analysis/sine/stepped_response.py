@@ -118,7 +118,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
     # What came before and after was at another frequency or level, and integration would bring it in.
-    places = _continued(data, rate / near_hz, edge)
+    places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     bridged = channels.bridged(stretch.start, stretch.stop)[places]
     if np.mean(clear_of_dropouts(bridged, rate, near_hz)[edge:-edge]) < LEAST_CLEAR:
@@ -137,7 +137,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     )
 
 
-def _continued(data: Reals, period_samples: float, edge: int) -> Integers:
+def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
     """Return the samples with which to go on at both ends, shape (samples + 2 edge,).
 
     The last row, the response, tells how far: whole drive periods, those after which it repeats best.
@@ -301,7 +301,7 @@ class TrackedResonance:
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
     """Return the levels at which the resonance was found, weakest first; where it was lost is left out."""
-    return tuple(sorted(_found(notes), key=lambda each: each.base_m_per_s2))
+    return tuple(sorted(_found_levels(notes), key=lambda each: each.base_m_per_s2))
 
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
@@ -310,7 +310,7 @@ def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
     return tuple(sorted(each.asked_m_per_s2 for each in lost))
 
 
-def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
+def _found_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
     for each in notes:
         if not isinstance(each, ResonanceNote) or each.frequency_hz is None or each.frequency_u_hz is None:
             continue

@@ -78,7 +78,7 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
             "check the channel and the frequencies"
         )
     analytic = fft.ifft(kept, overwrite_x=True)[: drive.size]
-    phase = _continued(np.unwrap(np.angle(analytic)), edge)
+    phase = _continue_phase(np.unwrap(np.angle(analytic)), edge)
     return DrivePhase(
         phase_rad=phase,
         frequency_hz=np.gradient(phase) * (sample_rate_hz / (2 * np.pi)),
@@ -92,7 +92,7 @@ def _band(frequency_hz: Reals, low_hz: float, high_hz: float) -> Reals:
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(np.minimum(rise, fall), 0.0, 1.0)))
 
 
-def _continued(phase: Reals, edge: int) -> Reals:
+def _continue_phase(phase: Reals, edge: int) -> Reals:
     """Replace the ends, where the filter misses past or future, by the parabola of what lies next to them."""
     if edge == 0:
         return phase

@@ -99,9 +99,9 @@ def measured_sweep(
     highest_hz = min(_SPECTROGRAM_ORDER * max(sweep.start_hz, sweep.stop_hz), 0.5 * channels.sample_rate_hz)
     picture = SpectrogramSums(channels.sample_rate_hz, stretch.samples, highest_hz=highest_hz)
     sums = _sums(sweep, channels, None)
-    first = _read(channels, sums, picture.add)
+    first = _read_sweep(channels, sums, picture.add)
     found = sums.response(delay_s=channels.response_delay_s, linear=_without_contact(specimen))
-    return _seen(found, channels, first), picture.spectrogram()
+    return _corrected(found, channels, first), picture.spectrogram()
 
 
 class SweepDraws:
@@ -114,10 +114,10 @@ class SweepDraws:
     def motion(self, channels: Channels) -> SweptMotion:
         """Analyse a draw like `measured_sweep`; the first one measures the drive."""
         sums = _sums(self._sweep, channels, self._clock)
-        first = _read(channels, sums, lambda _: None)
+        first = _read_sweep(channels, sums, lambda _: None)
         found = sums.motion(delay_s=channels.response_delay_s, linear=_without_contact(self._specimen))
         self._clock = sums.clock
-        return _seen(found, channels, first)
+        return _corrected(found, channels, first)
 
 
 def _sums(sweep: Sweep, channels: Channels, clock: DrivePhase | None) -> SweepSums:
@@ -129,7 +129,7 @@ def _without_contact(specimen: Specimen | None) -> Transmission | None:
     return None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
 
 
-def _read(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
+def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
     """Add the sweep and what lies beside it, and show its velocity; gives where the sums begin [s]."""
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     rate = channels.sample_rate_hz
@@ -158,7 +158,7 @@ def _read(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) ->
     return (start - stretch.start) / rate
 
 
-def _seen(found: M, channels: Channels, first_s: float) -> M:
+def _corrected(found: M, channels: Channels, first_s: float) -> M:
     """Count time from the sweep's first sample, and take the sensors' gains out."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(

@@ -12,7 +12,7 @@ from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, chi_square_bounds
 from ..signals.quantity import Quantity, derivative_factor
-from ..signals.window import Window, effective_averages, hop_samples, named_window, taper
+from ..signals.window import Window, effective_averages, hop_samples, taper, window_by_name
 from ..tables import Labelled
 
 _BATCH_SAMPLES = 1 << 19
@@ -64,7 +64,7 @@ class SegmentSpectra:
     ) -> None:
         if segment_samples < 2:
             raise InvalidRequest(f"a segment of {segment_samples} samples has no spectrum; use at least 2")
-        self._window = named_window(window)
+        self._window = window_by_name(window)
         self._overlap = overlap
         self._hop = hop_samples(segment_samples, overlap)
         self._taper = taper(self._window, segment_samples)
@@ -292,7 +292,7 @@ def amplitude_spectrum(
     count = samples.size
     if count < 2:
         raise InvalidRequest(f"a spectrum of {count} samples was asked for; it needs at least 2")
-    chosen = named_window(window)
+    chosen = window_by_name(window)
     values = taper(chosen, count)
     spectrum = fft.rfft((samples - np.mean(samples)) * values)
     scale = np.full(spectrum.size, 2 / np.sum(values))

@@ -64,11 +64,11 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
         )
     found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]
-    placed = (_placed(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])])
+    placed = (_peak_at(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])])
     return tuple(islice((peak for peak in placed if peak.amplitude > _LEAST_RATIO * peak.floor), count))
 
 
-def _placed(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
+def _peak_at(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
     side = 1 if amplitude[line + 1] >= amplitude[line - 1] else -1
     ratio = amplitude[line + side] / amplitude[line]
     offset = (2 * ratio - 1) / (ratio + 1)
@@ -108,7 +108,7 @@ class FittedSine:
     residual_rms: float
 
 
-def fitted_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
+def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
     """Fit a sine and an offset by least squares, frequency included (IEEE Std 1057, four parameters).
 
     Raises UnusableData when no line stands above the noise there.
@@ -207,7 +207,7 @@ class NoiseDriveLevel:
 
 def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: float) -> DriveLevel:
     """Measure A0 of a dwell from drive voltage and base acceleration [m/s2], each of shape (samples,)."""
-    sine = fitted_sine(drive, sample_rate_hz, near_hz)
+    sine = fit_sine(drive, sample_rate_hz, near_hz)
     phase = steady_phase(base.size, sine.frequency_hz / sample_rate_hz, sine.phase_rad)
     whole = tracked_orders(base, phase, interval_samples=base.size, orders=_ORDERS)
     parts = tracked_orders(base, phase, interval_samples=base.size // _SCATTER_BLOCKS, orders=_ORDERS)
@@ -295,7 +295,7 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     near = size[size > top - 2 * _REACH_SD * noise_sd]
     low = max(0.0, top - _REACH_SD * noise_sd)
     level = np.linspace(low, top + _REACH_SD * noise_sd, _GRID)
-    near, counts = _binned(near, noise_sd)
+    near, counts = _merge_close_values(near, noise_sd)
     above = (level[:, np.newaxis] - near) / noise_sd
     below = (-level[:, np.newaxis] - near) / noise_sd
     # ln(F(above) - F(below)) without losing the small tail.
@@ -309,7 +309,7 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     return NoiseLift(bias, float(np.sqrt(max(square, bias**2))))
 
 
-def _binned(values: Reals, noise_sd: float) -> tuple[Reals, Reals]:
+def _merge_close_values(values: Reals, noise_sd: float) -> tuple[Reals, Reals]:
     """Merge values much closer together than the noise, so that long windows cost no more than short ones."""
     step = noise_sd / 20
     places, counts = np.unique(np.round(values / step), return_counts=True)

@@ -59,7 +59,7 @@ class Contribution:
             )
 
 
-def scattered(cause: Cause, sd: float, value: float, source: str) -> Contribution:
+def from_scatter(cause: Cause, sd: float, value: float, source: str) -> Contribution:
     """Return what a standard deviation adds to a value; not stated where their ratio says nothing."""
     with np.errstate(all="ignore"):
         relative = float(np.divide(sd, abs(value)))
@@ -175,7 +175,7 @@ class Stated:
         return (Contribution(Cause.CLOCK, relative, self.clock.source),)
 
 
-def stated_of(bench: Mapping[str, Any]) -> Stated:
+def stated_uncertainties(bench: Mapping[str, Any]) -> Stated:
     """Read what the bench configuration in a recording states.
 
     A calibration is normal with its coverage factor. An alignment within an angle scales by its cosine: the

@@ -33,7 +33,7 @@ from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Labelled
-from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, Stated, stated_of
+from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, Stated, stated_uncertainties
 from .quantities import of_one_draw
 
 STEADY = 1e-4
@@ -206,7 +206,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
         What it is played on: its specimen, and what it states of sensors and noise.
 
     """
-    stated = stated_of(rig.model_dump(mode="json"))
+    stated = stated_uncertainties(rig.model_dump(mode="json"))
     match measurement.excitation:
         case Dwell(frequency_hz=at_hz) | HeldDwell(frequency_hz=at_hz):
             return tuple(_of_sine(measurement, rig, stated, at_hz))

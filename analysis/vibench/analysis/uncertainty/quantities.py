@@ -17,7 +17,7 @@ from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
-from .budget import Budget, Cause, Contribution, Stated, scattered, stated_of
+from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Parts of a window whose maxima tell how that of a whole one scatters."""
@@ -36,7 +36,7 @@ _FEWEST_PERIODS = 20.0
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
     """Return frequency, damping ratio and transmissibility of every resonance."""
-    stated = stated_of(analysis.facts.bench)
+    stated = stated_uncertainties(analysis.facts.bench)
     found = analysis.response
     chance = _chance_share(found)
     return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance))
@@ -48,7 +48,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[B
     def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
         parts = ((Cause.NOISE, 1.0 - chance), (Cause.CHANCE, chance))
         return tuple(
-            scattered(cause, sd * float(np.sqrt(part)), value, "scatter of the lines")
+            from_scatter(cause, sd * float(np.sqrt(part)), value, "scatter of the lines")
             for cause, part in parts
             if part > 0.0
         )
@@ -89,12 +89,12 @@ def _chance_share(found: NoiseResponse) -> float:
 
 def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
     """Return base amplitude and both responses of a dwell."""
-    stated, found = stated_of(analysis.facts.bench), analysis.response
+    stated, found = stated_uncertainties(analysis.facts.bench), analysis.response
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
-    of_base = scattered(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
-    noise = scattered(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
+    of_base = from_scatter(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
+    noise = from_scatter(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
     return (
         _amplitude(drive.amplitude_m, stated, of_base),
         Budget(
@@ -115,7 +115,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
             "",
             (
                 *_ratio(stated),
-                scattered(scatter, found.sd_response_ii, found.response_ii, "tenths of the window"),
+                from_scatter(scatter, found.sd_response_ii, found.response_ii, "tenths of the window"),
             ),
         ),
     )
@@ -132,19 +132,19 @@ def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
     """Return what the scatter of A0 adds to a maximum that is checked against it."""
-    return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
+    return from_scatter(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
 def _of_change(relative: float) -> tuple[Contribution, ...]:
     """Return what slow change over the record adds to a maximum; nothing where there is none."""
     if relative == 0.0:
         return ()
-    return (scattered(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
+    return (from_scatter(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
 
 
 def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
     """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
-    drawn = _drawn(laid, RESPONSE_I, 0)
+    drawn = _scatter(laid, RESPONSE_I, 0)
     return (of_one_draw(analysis.response) if drawn is None else drawn,)
 
 
@@ -160,7 +160,7 @@ def of_one_draw(found: DwellResponse) -> Contribution:
     if largest.size < _FEWEST_BLOCKS:
         return Contribution(Cause.CHANCE, None, "drop-outs leave too little of the window to tell")
     source = f"largest |x| of {largest.size} parts of the window"
-    return scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
+    return from_scatter(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
 
 
 def sd_of_largest(maxima: Reals) -> float:
@@ -194,9 +194,9 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
     top = found.largest(found.response_ii)
     # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
-    stated = stated_of(analysis.facts.bench)
+    stated = stated_uncertainties(analysis.facts.bench)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
-    scatter = _UNTOLD if collides[top] else scattered(Cause.NOISE, sd_m, value_m, "parts of the window")
+    scatter = _UNTOLD if collides[top] else from_scatter(Cause.NOISE, sd_m, value_m, "parts of the window")
     amplitude = _amplitude(value_m, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
     return amplitude, *_largest(analysis.facts, found, collides, laid)
 
@@ -216,7 +216,7 @@ def _largest(
     collides: Flags,
     laid: AbstractOverlay[Any] | None,
 ) -> Iterator[Budget]:
-    stated = stated_of(facts.bench)
+    stated = stated_uncertainties(facts.bench)
     rate = f", swept at {abs(found.sweep_rate_hz_per_s):.3g} Hz/s" if isinstance(found, SweepResponse) else ""
     error, sd = found.noise_error_i, found.sd_response_ii
     for name, values, scatter, source in (
@@ -225,7 +225,7 @@ def _largest(
     ):
         top = found.largest(values) if isinstance(found, SweepResponse) else int(np.argmax(values))
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
-        own = [scattered(Cause.NOISE, float(scatter[top]), value, source)]
+        own = [from_scatter(Cause.NOISE, float(scatter[top]), value, source)]
         if isinstance(found, SweepResponse):
             is_hidden = ~found.is_clear | np.isnan(found.response_i)
             if np.any(found.response_ii[is_hidden] > found.response_ii[top]):
@@ -233,7 +233,7 @@ def _largest(
         if collides[top]:
             is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
             of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
-            own = [_drawn(laid, name, top) or of_window]
+            own = [_scatter(laid, name, top) or of_window]
         elif name == RESPONSE_I and isinstance(found, SteppedResponse):
             own += _of_change(float(found.slow_change[top]))
         if not collides[top] and name == RESPONSE_I:
@@ -243,10 +243,10 @@ def _largest(
         yield Budget(f"largest {name}, at {at}{rate}", value, "", (*_ratio(stated), *own))
 
 
-def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
+def _scatter(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
     """Give how one value scatters over draws of the twin of the measured kind of motion; None below five."""
     curve = None if laid is None else laid.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
     source = f"{int(curve.count[place])} simulated draws"
-    return scattered(Cause.CHANCE, float(curve.relative_sd[place]), 1.0, source)
+    return from_scatter(Cause.CHANCE, float(curve.relative_sd[place]), 1.0, source)
