@@ -23,7 +23,7 @@ import numpy as np
 from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
 from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
-from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_strobed, follow_together
+from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_together, follow_with_section
 from vibench.sim.scene.solve import Question, solve_scenes
 from vibench.sim.study import ExistingStudy, executor_of, store_of
 
@@ -146,7 +146,7 @@ def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | N
     """Follow the same ones after the other."""
     twins = [each.apart(tolerance) for each in runs]
     return [
-        follow_strobed(each, (each.periods + count) / each.drive.frequency_hz)
+        follow_with_section(each, (each.periods + count) / each.drive.frequency_hz)
         for each, count in zip(twins, periods, strict=True)
     ]
 

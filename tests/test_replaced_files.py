@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 SHEET = """
 from datetime import UTC, datetime
@@ -53,7 +53,7 @@ def test_a_refused_file_leaves_the_older_one_as_it_was(tmp_path, writer, error):
 def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path):
     (tmp_path / "target").write_text("first")
     (tmp_path / "link").symlink_to(tmp_path / "target")
-    with replaced(tmp_path / "link") as coming:
+    with replace_file(tmp_path / "link") as coming:
         coming.write_text("second")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "target").read_text() == "second"

@@ -210,14 +210,14 @@ def change(name: str, value: Any) -> Alternative:
 def case_with(options: FigureOptions, given: Sequence[str]) -> Case:
     """Return the defaults of a page: options, and changes given as NAME=VALUE.
 
-    Raises InvalidRequest as `option_named` does.
+    Raises InvalidRequest as `parse_option` does.
     """
-    named = [option_named(each) for each in given]
+    named = [parse_option(each) for each in given]
     case = Case(**vars(options), changed=tuple(each.name for each in named))
     return replace(case, **together(*named).changes)
 
 
-def option_named(text: str) -> Alternative:
+def parse_option(text: str) -> Alternative:
     """Read NAME=VALUE.
 
     Raises InvalidRequest for a name that is not in `OPTIONS`, or a value that it does not take.

@@ -193,13 +193,13 @@ def finding(asked: Claim, evidence: Evidence, case: Case) -> Finding:
     From rest alone under an alternative that does not uphold it there: then not every start upholds it.
     Raises InvalidRequest when the measure returns another count of numbers than the claim wants.
     """
-    draws = [_measured(asked, evidence, case)]
+    draws = [_measure(asked, evidence, case)]
     if asked.is_met_by(draws[0]) or case.name == AS_CHOSEN:
-        draws += [_measured(asked, evidence, replace(case, draw=number)) for number in range(1, asked.draws)]
+        draws += [_measure(asked, evidence, replace(case, draw=number)) for number in range(1, asked.draws)]
     return Finding(case, tuple(draws), sum(asked.is_met_by(values) for values in draws))
 
 
-def _measured(asked: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
+def _measure(asked: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
     values = tuple(float(each) for each in asked.measure(Reading(evidence, case)))
     if len(values) != len(asked.wanted):
         raise InvalidRequest(

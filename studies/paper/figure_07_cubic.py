@@ -7,7 +7,7 @@ from vibench.sim.study import Study, StudyResults
 
 from .options import AMPLITUDES_M, FigureOptions
 from .responses import Reals, finish, responses, shade
-from .similarity_rates import RESPONSES, compared, definition, similarity_study
+from .similarity_rates import RESPONSES, compare_model, definition, similarity_study
 
 _MODEL = "power:3"
 _STYLES = {
@@ -29,7 +29,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         panels = figure.subplots(4, 2, sharex=True, sharey=True)
         for number, (row, amplitude_m) in enumerate(zip(panels, AMPLITUDES_M, strict=True), 1):
             for axes, (what, heading) in zip(row, RESPONSES.items(), strict=True):
-                found = compared(options, results, _MODEL, amplitude_m, what)
+                found = compare_model(options, results, _MODEL, amplitude_m, what)
                 shade(axes, found.frequency_hz, found.is_similar, "similar")
                 for model, (colour, line, label) in _STYLES.items():
                     values = getattr(responses(results, model=model, amplitude=amplitude_m), what)

@@ -22,7 +22,7 @@ def similarity_study(options: FigureOptions, models: tuple[str, ...]) -> Study:
     return options.study(("hertz", *models), AMPLITUDES_M, frequencies_hz=options.similarity_frequencies_hz)
 
 
-def compared(
+def compare_model(
     options: FigureOptions, results: StudyResults, model: str, amplitude_m: float, what: str
 ) -> Similarity:
     """Compare one continuous model with the piece-wise one at one amplitude."""
@@ -45,7 +45,7 @@ def rates_figure(
             for place, (model, colour, line) in enumerate(
                 zip(models, report.LEVELS, report.LEVEL_STYLES, strict=False)
             ):
-                found = [compared(options, results, model, each, what) for each in AMPLITUDES_M]
+                found = [compare_model(options, results, model, each, what) for each in AMPLITUDES_M]
                 _draw_rates(axes, found, place - 0.5 * (len(models) - 1), colour, line, model)
                 short = f"{what}_{model.removeprefix('power:').replace('+', '_')}"
                 for part in ("rate", "low", "high"):

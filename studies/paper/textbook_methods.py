@@ -101,7 +101,7 @@ def textbook_states(
     """
     states = np.array(initial_states, dtype=np.float64).T
     drives = [drive] * states.shape[1]
-    ends, _ = _marched(states[:, np.newaxis], duration_s, duration_s, specimen, drives, method)
+    ends, _ = _march(states[:, np.newaxis], duration_s, duration_s, specimen, drives, method)
     return ends[:, 0].T
 
 
@@ -120,7 +120,7 @@ def textbook_exponents(
     """
     states = np.zeros((6, 2, len(drives)))
     states[:, 1] = APART_M / math.sqrt(6.0) * _scales(drives)
-    return _marched(states, settle_s + duration_s, settle_s, specimen, drives, method)[1]
+    return _march(states, settle_s + duration_s, settle_s, specimen, drives, method)[1]
 
 
 def _scales(drives: Sequence[Harmonic]) -> Reals:
@@ -145,7 +145,7 @@ def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMe
     return np.where(error <= method.relative, longer, shorter * step_s)
 
 
-def _marched(
+def _march(
     states: Reals,
     until_s: float,
     settle_s: float,

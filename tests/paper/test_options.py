@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis import InvalidRequest
-from vibench.cli.paper.case import CLOSEST, OPTIONS, Case, case_with, option_named
+from vibench.cli.paper.case import CLOSEST, OPTIONS, Case, case_with, parse_option
 from vibench.cli.paper.claim import at_least, claim, costly_claim
 from vibench.cli.paper.collision_claims import sweep_of
 from vibench.cli.paper.options import FigureOptions
@@ -103,14 +103,14 @@ def test_the_sum_and_the_logarithm_and_the_gap_are_taken_over():
 
 def test_every_option_takes_its_own_example():
     for name, option in OPTIONS.items():
-        assert option_named(f"{name}={option.example}").of(CASE).name
+        assert parse_option(f"{name}={option.example}").of(CASE).name
 
 
 @pytest.mark.parametrize("name", ["zeta", "gap", "fit", "compared", "sweep-amplitude", "sweep-falls"])
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "", "much"])
 def test_a_number_that_is_not_allowed_is_one_sentence_that_names_it(name, value):
     with pytest.raises(InvalidRequest) as refused:
-        option_named(f"{name}={value}")
+        parse_option(f"{name}={value}")
     said = str(refused.value)
     assert value in said
     assert "\n" not in said
@@ -128,7 +128,7 @@ def test_a_number_that_is_not_allowed_is_one_sentence_that_names_it(name, value)
 )
 def test_a_word_that_is_not_known_is_answered_with_those_that_are(said, answer):
     with pytest.raises(InvalidRequest, match=answer):
-        option_named(said)
+        parse_option(said)
 
 
 def test_claims_are_set_side_by_side_and_those_that_hold_everywhere_are_only_counted():

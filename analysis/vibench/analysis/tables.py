@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from .errors import InvalidRequest
 
@@ -137,7 +137,7 @@ def write_csv(content: Table, path: Path) -> Path:
     """Write a table: headings in the first row, points as decimal marks, empty cells where a column ends."""
     headings = [heading for heading, _ in content.columns]
     rows = zip_longest(*(values for _, values in content.columns), fillvalue="")
-    with replaced(path) as coming, coming.open("w", newline="", encoding="utf-8") as file:
+    with replace_file(path) as coming, coming.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(headings)
         writer.writerows([_text(cell) for cell in row] for row in rows)

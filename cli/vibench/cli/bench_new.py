@@ -33,7 +33,7 @@ from vibench.acquisition.first_day.configured import (
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
 from vibench.sim import toml_table
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from .output import console, paragraph
 
@@ -169,7 +169,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     console.print()
     page = _day(rig, target, operator, given)
     kept = _free(target.with_suffix(".first_day.md"))
-    with replaced(kept) as coming:
+    with replace_file(kept) as coming:
         coming.write_text(page.text, encoding="utf-8")
     console.print(paragraph(page.text))
     console.print(f"kept: {kept}")

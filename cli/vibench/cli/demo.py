@@ -23,7 +23,7 @@ from vibench.analysis import (
     merged_results,
 )
 from vibench.sim.background import Pool, Progress
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from .analyse import complain_about
 from .exit_code import ExitCode
@@ -129,7 +129,7 @@ def demo(
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     summary = campaign_summary(results)
-    with replaced(folder / "results.json") as coming:
+    with replace_file(folder / "results.json") as coming:
         coming.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     console.print()
     console.print("The report:", bold(report.resolve()))

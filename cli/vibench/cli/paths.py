@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vibench.acquisition import ConfigurationError, named
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from .options import option
 
@@ -38,9 +38,9 @@ def external_data(allowed: bool) -> AbstractContextManager[None]:
     """Allow it while inside, if the user said so."""
     if not allowed:
         return nullcontext()
-    from vibench.sim.hdf5_files.door import external_data_allowed
+    from vibench.sim.hdf5_files.door import allow_external_data
 
-    return external_data_allowed()
+    return allow_external_data()
 
 
 def bench_path(given: Path | None) -> Path:
@@ -107,5 +107,5 @@ def unused(path: Path) -> Path:
 
 def copy_file(source: str | Path, target: str | Path) -> None:
     """Copy a file; ``target`` is whole, or as it was."""
-    with replaced(Path(target)) as coming:
+    with replace_file(Path(target)) as coming:
         shutil.copyfile(source, coming)

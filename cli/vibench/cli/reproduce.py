@@ -8,7 +8,7 @@ from rich.table import Table
 
 from vibench.analysis.report import ImageKind
 from vibench.sim import Accuracy
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from .options import option
 from .output import bold, console, leave_output_to_json, print_json, print_table
@@ -64,7 +64,7 @@ def reproduce(
     for drawn in (score, levels):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
         pictures.append((drawn.title, Path(os.path.relpath(image, page.parent)).as_posix()))
-    with replaced(page) as coming:
+    with replace_file(page) as coming:
         coming.write_text(reproduction_document(found, pictures), encoding="utf-8")
     report = write_page(reproduction_page(found, levels, score), out / "report.html")
     _tell(found)

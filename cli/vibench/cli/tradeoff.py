@@ -22,7 +22,7 @@ from vibench.sim.accuracy_benchmark.figures import (
     MotionBenchmark,
 )
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 from vibench.sim.study import Study
 
 from .options import Fields, RequestOptions, option, validated
@@ -145,7 +145,7 @@ def _save(benchmark: AccuracyBenchmark, folder: Path, markdown: Path | None) -> 
     paths = tradeoff_figure(benchmark).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
-        with replaced(markdown) as coming:
+        with replace_file(markdown) as coming:
             coming.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
 
 

@@ -49,7 +49,7 @@ Cancelled = Callable[[], bool]
 """Whether to end early; called several times a second, in the thread that does the work."""
 
 
-def unobserved(progress: Progress) -> None:
+def ignore_progress(progress: Progress) -> None:
     """Observe nothing."""
 
 
@@ -289,7 +289,7 @@ def _serve(connection: Any) -> None:
                 dropped.set()
                 continue
             dropped = Event()
-            done = executor.submit(_packed_answer, work, partial(_tell, connection), dropped.is_set)
+            done = executor.submit(_pack_answer, work, partial(_tell, connection), dropped.is_set)
             done.add_done_callback(partial(_send_answer, connection))
     os._exit(0)  # what is under way would reach nobody
 
@@ -298,7 +298,7 @@ def _tell(connection: Any, part: object) -> None:
     connection.send(("part", part))
 
 
-def _packed_answer(work: Callable[..., Any], *asker: Callable[..., Any]) -> bytes:
+def _pack_answer(work: Callable[..., Any], *asker: Callable[..., Any]) -> bytes:
     return pickle.dumps(("answer", work(*asker)))
 
 

@@ -26,7 +26,7 @@ from vibench.analysis.exchange import (
     import_recording,
     opened_source,
 )
-from vibench.sim.hdf5_files.door import external_data_allowed
+from vibench.sim.hdf5_files.door import allow_external_data
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000
@@ -582,7 +582,7 @@ def test_a_file_that_points_into_another_one_is_read_only_when_that_is_allowed(t
         file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
     with pytest.raises(UnusableData, match=r"/elsewhere points into another file \(b.h5\).*--allow-external"):
         opened_source(tmp_path / "a.h5").__enter__()
-    with external_data_allowed(), opened_source(tmp_path / "a.h5") as source:
+    with allow_external_data(), opened_source(tmp_path / "a.h5") as source:
         assert [each.name for each in source.channels] == ["/v"]
 
 

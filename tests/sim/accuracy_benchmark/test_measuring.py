@@ -6,7 +6,7 @@ import pytest
 from vibench.sim import Accuracy, integrate
 from vibench.sim.accuracy_benchmark.figures import MOTIONS, Motion, Regime
 from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark.measuring import SOLVERS, Thoroughness, measured_motion, settled_state
+from vibench.sim.accuracy_benchmark.measuring import SOLVERS, Thoroughness, measure_motion, settled_state
 from vibench.sim.model.modes import modal_form
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
@@ -67,7 +67,7 @@ def test_every_level_keeps_its_promise_over_two_seconds(motion):
 
 
 def test_a_periodic_motion_buys_digits_and_chaos_buys_none():
-    periodic = measured_motion(MOTIONS[1], SHORT)
+    periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error
     assert quick.response_i_error > reference.response_i_error == 0.0
@@ -77,7 +77,7 @@ def test_a_periodic_motion_buys_digits_and_chaos_buys_none():
 
 
 def test_in_chaos_the_start_matters_more_than_the_level():
-    chaotic = measured_motion(MOTIONS[-1], SHORT)
+    chaotic = measure_motion(MOTIONS[-1], SHORT)
     for level in chaotic.levels:
         assert level.state_error is None
         assert level.response_i_scatter > 0.005

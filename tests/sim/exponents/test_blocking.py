@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.sim.exponents.tangent_run import blocked_mean
+from vibench.sim.exponents.tangent_run import block_mean
 
 
 def autoregression(memory, count, seed):
@@ -17,7 +17,7 @@ def autoregression(memory, count, seed):
 @pytest.mark.parametrize("memory", [-0.5, 0.0, 0.6, 0.95])
 def test_the_error_is_the_closed_form_of_an_autoregression(memory):
     count = 1 << 14
-    found = [blocked_mean(autoregression(memory, count, seed)) for seed in range(12)]
+    found = [block_mean(autoregression(memory, count, seed)) for seed in range(12)]
     exact = 1.0 / (1.0 - memory) / np.sqrt(count)
     assert np.mean([each.standard_error for each in found]) == pytest.approx(exact, rel=0.2)
     assert all(each.is_long_enough for each in found)
@@ -26,38 +26,38 @@ def test_the_error_is_the_closed_form_of_an_autoregression(memory):
 
 
 def test_means_scatter_as_their_errors_say():
-    means = [blocked_mean(autoregression(0.8, 4096, seed)) for seed in range(150)]
+    means = [block_mean(autoregression(0.8, 4096, seed)) for seed in range(150)]
     scores = [each.mean / each.standard_error for each in means]
     assert 0.8 < np.std(scores) < 1.3
     assert np.mean(np.abs(scores) > 2.0) < 0.12
 
 
 def test_a_series_shorter_than_its_memory_is_not_trusted():
-    assert not blocked_mean(autoregression(0.999, 512, 1)).is_long_enough
-    assert not blocked_mean(np.arange(64.0)).is_long_enough
+    assert not block_mean(autoregression(0.999, 512, 1)).is_long_enough
+    assert not block_mean(np.arange(64.0)).is_long_enough
 
 
 def test_blocks_are_as_long_as_the_memory_and_no_longer():
-    short = blocked_mean(autoregression(0.0, 4096, 3)).block_length
-    long = blocked_mean(autoregression(0.97, 4096, 3)).block_length
+    short = block_mean(autoregression(0.0, 4096, 3)).block_length
+    long = block_mean(autoregression(0.97, 4096, 3)).block_length
     assert short <= 2
     assert 16 <= long <= 512
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=60), st.floats(-10.0, 10.0))
 def test_a_shifted_series_has_a_shifted_mean_and_the_same_error(values, shift):
-    one, other = blocked_mean(values), blocked_mean(np.asarray(values) + shift)
+    one, other = block_mean(values), block_mean(np.asarray(values) + shift)
     assert other.mean == pytest.approx(one.mean + shift, abs=1e-9)
     if one.block_length == other.block_length:
         assert other.standard_error == pytest.approx(one.standard_error, rel=1e-6, abs=1e-9)
 
 
 def test_equal_values_have_no_error_and_one_value_has_none_that_is_known():
-    assert blocked_mean([2.5] * 40).standard_error == 0.0
-    assert np.isnan(blocked_mean([2.5]).standard_error)
+    assert block_mean([2.5] * 40).standard_error == 0.0
+    assert np.isnan(block_mean([2.5]).standard_error)
 
 
 @pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0, 2.0]]])
 def test_what_has_no_mean_is_refused(values):
     with pytest.raises(ValueError, match="has no mean here"):
-        blocked_mean(values)
+        block_mean(values)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
 from vibench.sim.engine.run import MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, most_impacts, start_motion
 from vibench.sim.exponents.lyapunov import intervals_to_skip
-from vibench.sim.exponents.tangent_run import BlockedMean, blocked_mean, interval_for
+from vibench.sim.exponents.tangent_run import BlockedMean, block_mean, interval_for
 from vibench.sim.model.specimen import energy_metric
 from vibench.sim.model.state import Floats
 
@@ -80,5 +80,5 @@ def two_trajectory_exponent(
         first.place(here)
         second.place(here + apart * size / distance)
     rates = growth / interval.length_s
-    mean = blocked_mean(rates[skipped:])
+    mean = block_mean(rates[skipped:])
     return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome.REACHED_END)

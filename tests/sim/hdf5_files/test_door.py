@@ -2,7 +2,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.sim.hdf5_files.door import UnsafeHdf5, external_data_allowed, open_hdf5, walk
+from vibench.sim.hdf5_files.door import UnsafeHdf5, allow_external_data, open_hdf5, walk
 
 
 def external_storage(file):
@@ -45,7 +45,7 @@ def test_a_file_that_gives_out_other_files_is_refused_unless_that_is_allowed(mak
     path = make(fill)
     with pytest.raises(UnsafeHdf5, match=r"/x points into another file.*--allow-external"):
         open_hdf5(path)
-    with external_data_allowed(), open_hdf5(path) as file:
+    with allow_external_data(), open_hdf5(path) as file:
         assert list(file["own"]) == [0, 1, 2]
     with pytest.raises(UnsafeHdf5):
         open_hdf5(path)

@@ -9,9 +9,9 @@ from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
-from vibench.sim.model.contact_law import CONTACT_LAWS, ContactLaw, model_named
-from vibench.sim.model.linear_gap import fitted_linear_gap
-from vibench.sim.model.power_law import fitted_power_law
+from vibench.sim.model.contact_law import CONTACT_LAWS, ContactLaw, law_by_name
+from vibench.sim.model.linear_gap import fit_linear_gap
+from vibench.sim.model.power_law import fit_power_law
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6
@@ -50,16 +50,16 @@ def test_a_high_power_neither_overflows_at_its_reference_nor_pushes_far_below_it
         ("hertz", HERTZ),
         ("linear", NoContact()),
         ("linear_gap:2e6", LinearGap(2e6)),
-        ("linear_gap", fitted_linear_gap(HERTZ.stiffness)),
+        ("linear_gap", fit_linear_gap(HERTZ.stiffness)),
         ("hunt_crossley:0.3", HuntCrossley(HERTZ.stiffness, 0.3)),
         ("rigid:0.8", RigidStops(0.8)),
-        ("power:5", fitted_power_law([5], HERTZ.stiffness, GAP)),
-        ("power:7+3", fitted_power_law([3, 7], HERTZ.stiffness, GAP)),
-        ("power:3@0.25+7@0.75", fitted_power_law([3, 7], HERTZ.stiffness, GAP, shares=[0.25, 0.75])),
+        ("power:5", fit_power_law([5], HERTZ.stiffness, GAP)),
+        ("power:7+3", fit_power_law([3, 7], HERTZ.stiffness, GAP)),
+        ("power:3@0.25+7@0.75", fit_power_law([3, 7], HERTZ.stiffness, GAP, shares=[0.25, 0.75])),
     ],
 )
 def test_a_name_gives_its_law(text, law):
-    assert model_named(text, HERTZ.stiffness, GAP) == law
+    assert law_by_name(text, HERTZ.stiffness, GAP) == law
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_name_gives_its_law(text, law):
 )
 def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
     with pytest.raises(ValueError, match=sentence):
-        model_named(text, HERTZ.stiffness, GAP)
+        law_by_name(text, HERTZ.stiffness, GAP)
 
 
 @pytest.mark.parametrize(

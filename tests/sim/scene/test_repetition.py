@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from vibench.sim.scene.prediction import MotionKind
-from vibench.sim.scene.repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
+from vibench.sim.scene.repetition import Growth, Repetition, Sharpness, kind_of, longest_section, repetition
 
 OMEGA = 600.0
 SHARP = Sharpness(tolerance=1e-6, noise=1e-10)
 FORGETTING = 10.0
-COUNT = section_needed(FORGETTING)
+COUNT = longest_section(FORGETTING)
 
 
 def section_of(values):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.sim.study import frequency_range
-from vibench.sim.study._study import listed
+from vibench.sim.study._study import expand_ranges
 
 
 def test_a_range_includes_its_stop_when_it_is_hit():
@@ -36,16 +36,16 @@ def test_a_range_of_too_many_values_is_refused_before_it_is_made():
 
 def test_ranges_and_numbers_mix_and_overlaps_count_once():
     given = [3, {"start": 1, "stop": 3, "step": 1}, {"start": 2.0, "stop": 2.5, "step": 0.25}]
-    assert listed(given) == [1.0, 2.0, 2.25, 2.5, 3]
+    assert expand_ranges(given) == [1.0, 2.0, 2.25, 2.5, 3]
 
 
 def test_what_is_no_range_is_left_to_its_validator():
-    assert listed("all") == "all"
-    assert listed({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
-    assert listed([1.0, "two"]) == [1.0, "two"]
+    assert expand_ranges("all") == "all"
+    assert expand_ranges({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
+    assert expand_ranges([1.0, "two"]) == [1.0, "two"]
 
 
 @pytest.mark.parametrize("start", ["true", None, "20"])
 def test_a_range_takes_three_numbers(start):
     with pytest.raises(ValueError, match="give three numbers"):
-        listed({"start": start, "stop": 2.0, "step": 1.0})
+        expand_ranges({"start": start, "stop": 2.0, "step": 1.0})

@@ -15,7 +15,7 @@ from typing import assert_never
 
 from pydantic import ValidationError
 
-from vibench.sim.operating_system.this import replaced, state_folder
+from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..bench.bench import Bench, BenchKind
 from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest
@@ -92,7 +92,7 @@ def _write(result: CheckResult, *, passed: bool) -> Path:
     try:
         path = archive_path(result.rig, passed=passed)
         path.parent.mkdir(parents=True, exist_ok=True)
-        with replaced(path) as coming:
+        with replace_file(path) as coming:
             coming.write_text(result.model_dump_json(indent=2), encoding="utf-8")
     except OSError as error:
         raise RecordingError(

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..bench.bench import Bench
 from ..bench.instrument_list import InstrumentList
@@ -316,7 +316,7 @@ def _write(target: Path, text: str) -> None:
     try:
         if target.exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
-        with replaced(target) as coming:
+        with replace_file(target) as coming:
             coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error

@@ -16,7 +16,7 @@ from vibench.sim import (
     fault_in_words,
     toml_table,
 )
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..errors import ConfigurationError
 from .printable import shortened
@@ -240,7 +240,7 @@ def save_toml(model: BaseModel, path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         schema = schema_line(model, shipped_folder("schemas"))
-        with replaced(path) as coming:
+        with replace_file(path) as coming:
             coming.write_text(schema + toml_text(model), encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(

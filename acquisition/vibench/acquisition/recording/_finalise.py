@@ -17,7 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files.writing import written_hdf5
+from vibench.sim.hdf5_files.writing import open_hdf5_to_write
 from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
@@ -213,7 +213,7 @@ def discard(part: Path) -> None:
 
 
 def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str] | None) -> None:
-    with h5py.File(part, "r", locking=False) as source, written_hdf5(tmp, "x", layout.LIBVER) as copy:
+    with h5py.File(part, "r", locking=False) as source, open_hdf5_to_write(tmp, "x", layout.LIBVER) as copy:
         samples = int(source[layout.N_VALID][0])
         state, reason = tables.ending(source)
         if state is RecordingState.RECORDING:

@@ -18,7 +18,7 @@ from typing import TypeVar
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files.writing import written_hdf5
+from vibench.sim.hdf5_files.writing import open_hdf5_to_write
 from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
@@ -80,7 +80,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     made = layout.tmp_of(path)
     try:
         meet_trouble()
-        with written_hdf5(made, "x", layout.LIBVER) as file:
+        with open_hdf5_to_write(made, "x", layout.LIBVER) as file:
             places = _write_layout(file, header, capacity, reserved)
         _claim(made, places)
         rename(made, part)
@@ -221,7 +221,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                 try:
                     shutil.copyfile(path, tmp)
                     shutil.copymode(path, tmp)
-                    with written_hdf5(tmp, "r+", layout.LIBVER) as file:
+                    with open_hdf5_to_write(tmp, "r+", layout.LIBVER) as file:
                         answer = change(file)
                     sync_file(tmp)
                     if _fingerprint(path) == before:

@@ -11,7 +11,7 @@ from typing import Protocol, cast
 
 from pydantic import AwareDatetime, Field
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..errors import CheckFailed, CheckStopped, ConfigurationError
 from ..host.toml_file import FrozenModel, load_toml
@@ -257,7 +257,7 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
     )
     text = f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
     try:
-        with replaced(path) as coming:
+        with replace_file(path) as coming:
             coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(

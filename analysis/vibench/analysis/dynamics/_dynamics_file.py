@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from pydantic import ValidationError
 
-from vibench.sim.hdf5_files.writing import written_hdf5
+from vibench.sim.hdf5_files.writing import open_hdf5_to_write
 from vibench.sim.study import software
 
 from ..comparison.curve import Curve
@@ -202,7 +202,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
 @contextmanager
 def _new_file(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
     """Make a new file that says what it holds; nothing is left of one that failed."""
-    with new_file(path) as unfinished, written_hdf5(unfinished, "x") as file:
+    with new_file(path) as unfinished, open_hdf5_to_write(unfinished, "x") as file:
         file.attrs["format"] = kind
         file.attrs["format_version"] = FORMAT_VERSION
         file.attrs["request"] = request

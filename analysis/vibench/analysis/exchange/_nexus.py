@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 
 from vibench.acquisition.recording import ChannelHeader
-from vibench.sim.hdf5_files.writing import written_hdf5
+from vibench.sim.hdf5_files.writing import open_hdf5_to_write
 
 from ._excerpt import BLOCK_SAMPLES, Excerpt, TransferObserver, ignore_progress
 
@@ -19,7 +19,7 @@ SIGNAL, TIME = "values", "time"
 
 def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write channels one after the other, a block at a time; lost samples are NaN."""
-    with written_hdf5(path, "x") as file:
+    with open_hdf5_to_write(path, "x") as file:
         file.attrs.update({"NX_class": "NXroot", "default": ENTRY})
         entry = _group(file, ENTRY, "NXentry")
         entry["title"] = f"{excerpt.name}: {excerpt.recording.plan.get('name', '')}".removesuffix(": ")

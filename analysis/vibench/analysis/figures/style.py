@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLocator
 
 from vibench.acquisition import printable
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..figure_choices import ImageKind
 from ..tables import Table, write_tables
@@ -201,7 +201,7 @@ class DrawnFigure:
         drawn = []
         for kind in kinds:
             path = folder / f"{self.name}.{kind.value}"
-            with replaced(path) as coming:
+            with replace_file(path) as coming:
                 coming.write_bytes(getattr(self, kind.value))
             drawn.append(path)
         return (*drawn, *write_tables(self.tables, folder))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from vibench.acquisition.recording import Recording, ResultArray
 from vibench.sim import Specimen
-from vibench.sim.background import Observer, stage, unobserved
+from vibench.sim.background import Observer, ignore_progress, stage
 
 from ..errors import InvalidRequest
 from ..recordings.channels import BASE, RESPONSE
@@ -151,7 +151,7 @@ def hidden_motion(
     start_s: float = 0.0,
     stop_s: float | None = None,
     numbers: Numbers = Numbers.FOUND,
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
 ) -> HiddenMotion:
     """Tell the relative motion of m1 and its collisions from base acceleration and m0's velocity.
 
@@ -245,7 +245,7 @@ def hidden_motion_of(
     tracked: TrackedSpecimen,
     found: FoundSpecimen | None,
     name: str,
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
 ) -> HiddenMotion:
     """Go through a prepared motion both ways."""
     model = motion_model(tracked, motion)

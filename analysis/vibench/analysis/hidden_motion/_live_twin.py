@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from vibench.acquisition.recording import DROPOUTS_TOLD_AFTER_S, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import FrozenModel, Specimen
-from vibench.sim.operating_system.this import replaced, state_folder
+from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..recordings.channels import BASE, RESPONSE
 from ..signals.arrays import Reals
@@ -109,7 +109,7 @@ def kept_baseline(path: Path) -> Baseline | None:
 def keep_baseline(baseline: Baseline, path: Path) -> None:
     """Keep a baseline in the place of the last one; raises OSError when the folder cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replaced(path) as coming:
+    with replace_file(path) as coming:
         coming.write_text(baseline.model_dump_json(indent=2), encoding="utf-8")
 
 

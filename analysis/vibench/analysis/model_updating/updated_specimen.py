@@ -9,7 +9,7 @@ import numpy as np
 
 from vibench.acquisition import open_recording
 from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
-from vibench.sim.background import Observer, unobserved
+from vibench.sim.background import Observer, ignore_progress
 
 from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response.distortion import scatters_beyond_noise
@@ -248,7 +248,7 @@ def _in_words(found: FittedValue) -> str:
 def update_model(
     results: CampaignResults,
     also_free: Sequence[Parameter | str] = (),
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
 ) -> UpdatedSpecimen:
     """Fit a specimen to recordings, or say which assumption of the model they contradict.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..comparison.curve import Curve, curve_difference
 from ..errors import InvalidRequest
@@ -73,7 +73,7 @@ def write_comparison(
             write_csv(comparison_table(target.stem, curves, pair), target)
         case _:
             drawn = comparison_figure(target.stem, curves, pair, markers_hz)
-            with replaced(target) as coming:
+            with replace_file(target) as coming:
                 coming.write_bytes(getattr(drawn, kind.value))
     return target
 

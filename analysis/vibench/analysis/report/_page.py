@@ -12,7 +12,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vibench.acquisition import printable
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..figures.style import DrawnFigure
 
@@ -128,7 +128,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
         version=version("vibench"),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replaced(path) as coming:
+    with replace_file(path) as coming:
         coming.write_text(text, encoding="utf-8")
     return path
 

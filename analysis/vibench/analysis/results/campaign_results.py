@@ -10,7 +10,7 @@ from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
-from vibench.sim.background import Observer, Progress, unobserved
+from vibench.sim.background import Observer, Progress, ignore_progress
 
 from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
@@ -172,7 +172,7 @@ def analyse_files(
     name: str,
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
     specimen: Specimen | None = None,
     draws: int = DRAWS,
 ) -> CampaignResults:
@@ -270,7 +270,7 @@ def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
     specimen: Specimen | None = None,
     *,
     shaker: FittedShaker | None = None,

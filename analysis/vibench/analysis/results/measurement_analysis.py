@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from vibench.acquisition.recording import Recording, open_recording
-from vibench.sim.background import Observer, stage, unobserved
+from vibench.sim.background import Observer, ignore_progress, stage
 
 from ..errors import AnalysisError, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST
@@ -24,7 +24,7 @@ CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueErr
 def analyse(
     recording: Recording | Path | str,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: Observer = unobserved,
+    observer: Observer = ignore_progress,
 ) -> AbstractAnalysis[Any, Any]:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMessageBox
 
-from vibench.sim.operating_system.this import replaced
+from vibench.sim.operating_system.this import replace_file
 
 from ..widgets.boxes import new_path, plain_tip
 
@@ -70,7 +70,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
         case ending:
             if not plot.grab().save(memory, ending.removeprefix(".")):
                 raise OSError(0, "give an ending: .png, .svg or .csv")
-    with replaced(path) as coming:
+    with replace_file(path) as coming:
         coming.write_bytes(memory.data().data())
 
 

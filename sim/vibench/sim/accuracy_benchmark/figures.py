@@ -81,15 +81,15 @@ class LotteryFigures:
     """Of the answer over that of one without a budget."""
 
 
-def measured_lottery(lottery: Lottery, starts: int) -> LotteryFigures:
+def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
     """Answer a scene, and follow many more starts of it.
 
     Raises ArithmeticError when its start is not forgotten.
     """
     scene = lottery.scene
     solve_scene(replace(scene, budget_s=0.0))
-    alone_s, _ = _timed(lambda: solve_scene(replace(scene, budget_s=0.0)))
-    taken_s, answered = _timed(lambda: solve_scene(scene))
+    alone_s, _ = _time_run(lambda: solve_scene(replace(scene, budget_s=0.0)))
+    taken_s, answered = _time_run(lambda: solve_scene(scene))
     many = solve_ensemble(scene, starts, SEED)
     if answered.ensemble is None or many is None:
         raise ArithmeticError(f"{lottery.name} is called a lottery, but its start is {answered.memory}")
@@ -108,7 +108,7 @@ def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
     return one.period == other.period and is_near
 
 
-def _timed(run: Callable[[], ScenePrediction]) -> tuple[float, ScenePrediction]:
+def _time_run(run: Callable[[], ScenePrediction]) -> tuple[float, ScenePrediction]:
     before = time.thread_time()
     found = run()
     return time.thread_time() - before, found

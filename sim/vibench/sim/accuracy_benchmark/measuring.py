@@ -34,7 +34,7 @@ from .figures import (
     Regime,
     SolverFigures,
     TransientFigures,
-    measured_lottery,
+    measure_attractors,
 )
 from .independent_solution import (
     STATE_UNITS,
@@ -98,19 +98,19 @@ def measure_accuracy(
     found: list[MotionBenchmark] = []
     for motion in motions:
         step(motion.name)
-        found.append(measured_motion(motion, thoroughness))
+        found.append(measure_motion(motion, thoroughness))
     drawn = []
     for lottery in lotteries:
         step(lottery.name)
-        drawn.append(measured_lottery(lottery, thoroughness.starts))
+        drawn.append(measure_attractors(lottery, thoroughness.starts))
     from_rest: list[TransientFigures] = []
     for motion in transients:
         step(f"from rest: {motion.name}")
-        from_rest += measured_transient(motion)
+        from_rest += measure_transient(motion)
     return AccuracyBenchmark(tuple(found), _machine(), software(), tuple(drawn), tuple(from_rest))
 
 
-def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
+def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
     """Measure the trade on one motion, from its settled state."""
     start = settled_state(motion)
     span_s = _whole(thoroughness.span_s, motion)
@@ -126,7 +126,7 @@ def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchma
     return MotionBenchmark(motion, span_s, solver_span_s, levels, solvers)
 
 
-def measured_transient(motion: Motion) -> tuple[TransientFigures, ...]:
+def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
     """Measure what every level errs by from rest, and what its answers say of it."""
     rest = np.zeros(6)
     truth = independent_state(motion.specimen, motion.drive, TRANSIENT_S, rest)
@@ -179,7 +179,7 @@ def _truth(motion: Motion, span_s: float, start: Floats) -> Floats:
     return independent_state(motion.specimen, motion.drive, span_s, start)
 
 
-def _timed(run: Callable[[], object]) -> float:
+def _run_time_s(run: Callable[[], object]) -> float:
     before = time.thread_time()
     run()
     return time.thread_time() - before
@@ -190,7 +190,7 @@ def _costs(motion: Motion, start: Floats) -> dict[Accuracy, float]:
     best = dict.fromkeys(LEVELS, math.inf)
     for repeat in range(REPEATS + 1):
         for level in LEVELS:
-            taken = _timed(lambda level=level: _follow(motion, level, start, TIMED_S))  # type: ignore[misc]
+            taken = _run_time_s(lambda level=level: _follow(motion, level, start, TIMED_S))  # type: ignore[misc]
             if repeat > 0:
                 best[level] = min(best[level], taken / TIMED_S)
     return best
@@ -253,7 +253,7 @@ def _solver(
         )
         ends.append(found.y[:, -1])
 
-    cost = _timed(run) / span_s
+    cost = _run_time_s(run) / span_s
     return SolverFigures(name, cost, None if truth is None else state_error(ends[0], truth))
 
 

@@ -165,7 +165,7 @@ def shot_branches(
             yield _start(orbit, BranchOrigin.SEARCH)
 
     def leaving(found: FoundBranch) -> Iterator[BranchStart[PeriodicOrbit]]:
-        return _switched(found, specimen, path, (low, high), search)
+        return _branch_switches(found, specimen, path, (low, high), search)
 
     def follow(start: BranchStart[PeriodicOrbit]) -> FoundBranch:
         branch = periodic_branch_within(start.motion, path, low, high, steps)
@@ -181,7 +181,7 @@ def _start(orbit: PeriodicOrbit, origin: BranchOrigin) -> BranchStart[PeriodicOr
     return BranchStart(orbit, origin, orbit.drive, orbit_states(orbit))
 
 
-def _switched(
+def _branch_switches(
     found: FoundBranch,
     specimen: Specimen,
     path: DrivePath,

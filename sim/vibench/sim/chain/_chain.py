@@ -57,12 +57,12 @@ class Chain:
     @property
     def stiffness_matrix(self) -> Matrix:
         """K without contact, shape (3 cells, 3 cells) [N/m]."""
-        return _assembled([cell.stiffnesses for cell in self.cells])
+        return _assemble([cell.stiffnesses for cell in self.cells])
 
     @property
     def damping_matrix(self) -> Matrix:
         """C, shape (3 cells, 3 cells) [N s/m]."""
-        return _assembled([cell.dampings for cell in self.cells])
+        return _assemble([cell.dampings for cell in self.cells])
 
     @property
     def natural_frequencies_hz(self) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
     return Chain((specimen,) * cells)
 
 
-def _assembled(links: list[Triple]) -> Matrix:
+def _assemble(links: list[Triple]) -> Matrix:
     """Symmetric matrix of springs (or dampers): links 0, 1, 2 of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))

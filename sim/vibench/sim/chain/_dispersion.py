@@ -59,7 +59,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
 
 def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
     """Return what a cell makes of displacement and force, shape (n, 2, 2)."""
-    outer, pushed, _, _ = seen_from_outside(cell, omega)
+    outer, pushed, _, _ = reduce_to_m0(cell, omega)
     one = np.ones_like(outer)
     return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
 
@@ -77,7 +77,7 @@ class SeenFromOutside(NamedTuple):
     """z over x."""
 
 
-def seen_from_outside(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
+def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
     """Reduce a cell without contact to its m0; finite where m1 alone resonates, too."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
@@ -164,7 +164,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
         msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
         raise ValueError(msg)
-    cells = [seen_from_outside(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
+    cells = [reduce_to_m0(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
     # From the free end: what a cell is, and what hangs on it, as one stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):

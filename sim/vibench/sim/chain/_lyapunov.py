@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import MAX_IMPACT_RATE_HZ
-from ..exponents.tangent_run import BlockedMean, blocked_mean
+from ..exponents.tangent_run import BlockedMean, block_mean
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
@@ -117,7 +117,7 @@ def chain_lyapunov_exponent(
         return run.motion, run.impacts, outcome
 
     first = settled.final_state
-    second = _put_near(chain, first, first + np.random.default_rng(seed).normal(size=first.shape), drive)
+    second = _rescale(chain, first, first + np.random.default_rng(seed).normal(size=first.shape), drive)
     growths, impacts, outcome = [], 0, settled.outcome
     for index in range(intervals if outcome is Outcome.REACHED_END else 0):
         start_s = settle_s + index * interval_s
@@ -128,10 +128,10 @@ def chain_lyapunov_exponent(
         if outcome is not Outcome.REACHED_END:
             break
         growths.append(math.log(_size(chain, second - first) / before) / interval_s)
-        second = _put_near(chain, first, second, drive)
+        second = _rescale(chain, first, second, drive)
         impacts += struck
     local = np.asarray(growths)
-    blocks = blocked_mean(local) if outcome is Outcome.REACHED_END else None
+    blocks = block_mean(local) if outcome is Outcome.REACHED_END else None
     return ChainExponent(
         drive=drive,
         accuracy=accuracy,
@@ -146,7 +146,7 @@ def chain_lyapunov_exponent(
     )
 
 
-def _put_near(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
+def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
     """Move the second motion along the line to the first, to the small distance from it."""
     apart = second - first
     # A chain at rest under a drive is as large as the drive would move it.

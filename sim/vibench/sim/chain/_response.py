@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, Watch
-from ..exponents.tangent_run import blocked_mean
+from ..exponents.tangent_run import block_mean
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
@@ -253,7 +253,7 @@ def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> M
         Displacement of the base, shape (n,) or one number [m].
 
     """
-    found = [blocked_mean(row) for row in chain_energies(chain, states, base_m).T]
+    found = [block_mean(row) for row in chain_energies(chain, states, base_m).T]
     return MeanEnergies(
         np.array([each.mean for each in found]), np.array([each.standard_error for each in found])
     )

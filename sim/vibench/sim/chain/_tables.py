@@ -222,7 +222,7 @@ def pieces_between(
     while True:
         stop = count if isinstance(drive, Sampled) else min(begin + BATCH, count)
         until = end_s if stop == count else min(end_s, stop * interval)
-        yield Pieces(_cut(drive, first, interval, begin, stop), begin * interval, interval), until
+        yield Pieces(_force_table(drive, first, interval, begin, stop), begin * interval, interval), until
         if until >= end_s:
             return
         begin = stop
@@ -249,7 +249,7 @@ def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
             return drive.duration_s / count, count
 
 
-def _cut(drive: BaseDrive, first: Specimen, interval: float, begin: int, stop: int) -> Table:
+def _force_table(drive: BaseDrive, first: Specimen, interval: float, begin: int, stop: int) -> Table:
     """Coefficients of the force on every piece, in powers of the time since it began, shape (pieces, 8)."""
     spring, damper = first.stiffnesses[0], first.dampings[0]
     match drive:

@@ -107,11 +107,11 @@ def collision_shapes() -> tuple[Table, Table]:
     # Without a press: 2.943 long, and close to half a sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
     for softer in np.linspace(0.0, SOFTEST, SHAPES):
-        depths, duration, _ = _solved(depths, duration, float(softer))
+        depths, duration, _ = _solve_collision(depths, duration, float(softer))
     times = np.append(HEIGHTS, 1.0)
     for place in range(SHAPES):
         press = SOFTEST + SPACING * place
-        depths, duration, slopes = _solved(depths, duration, press)
+        depths, duration, slopes = _solve_collision(depths, duration, press)
         answer = np.linalg.inv(slopes)
         forces = HALF_FORCE * np.maximum(depths, 0.0) ** 1.5
         changes = answer @ -np.transpose(
@@ -138,7 +138,7 @@ def _deepest(press: float) -> float:
     return depth
 
 
-def _solved(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
+def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
     """Newton's method to rounding."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)

@@ -31,7 +31,7 @@ from .tangent_run import (
     Interval,
     Settling,
     TangentRun,
-    blocked_mean,
+    block_mean,
     interval_for,
     run_with_tangent,
     settling,
@@ -87,7 +87,7 @@ class Precision:
         """Return whether the mean of local exponents, shape (n,), is known so well."""
         if len(exponents) < FEWEST_INTERVALS:
             return False
-        found = blocked_mean(exponents)
+        found = block_mean(exponents)
         allowed = max(self.absolute_per_s, self.relative * abs(found.mean))
         return found.is_long_enough and found.standard_error <= allowed
 
@@ -187,9 +187,9 @@ def lyapunov_exponent(
         None if precision is None else enough,
     )
     if run.outcome is not Outcome.REACHED_END:
-        return _described(drive, accuracy, run, Settling(FinalMotion.THROUGHOUT, 0), _LOST)
+        return _estimate(drive, accuracy, run, Settling(FinalMotion.THROUGHOUT, 0), _LOST)
     end = settling(run, state_scales(specimen, drive))
-    return _described(drive, accuracy, run, end, _taken(specimen, drive, run, end, skipped))
+    return _estimate(drive, accuracy, run, end, _exponent(specimen, drive, run, end, skipped))
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
@@ -223,7 +223,7 @@ class _Exponent:
 _LOST = _Exponent(math.nan, math.nan, Source.AVERAGE, 0)
 
 
-def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, skipped: int) -> _Exponent:
+def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, skipped: int) -> _Exponent:
     """Take the exponent from what says most about the final motion."""
     match end.motion:
         case FinalMotion.QUIET:
@@ -234,7 +234,7 @@ def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, 
             return _Exponent(mean, error, Source.MULTIPLIERS, end.since)
         case FinalMotion.SETTLED | FinalMotion.THROUGHOUT:
             since = max(skipped, end.since)
-            blocks = blocked_mean(run.rates[since:, 0])
+            blocks = block_mean(run.rates[since:, 0])
             return _Exponent(blocks.mean, blocks.standard_error, Source.AVERAGE, since, blocks)
 
 
@@ -251,7 +251,7 @@ def _from_multipliers(
     return 0.5 * (found[0] + found[1]), 0.5 * abs(found[0] - found[1])
 
 
-def _described(
+def _estimate(
     drive: Harmonic, accuracy: Accuracy, run: TangentRun, end: Settling, taken: _Exponent
 ) -> LyapunovEstimate:
     length = run.interval.length_s
@@ -299,7 +299,7 @@ def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None
-    mean = blocked_mean(before)
+    mean = block_mean(before)
     if not mean.mean > SURE * mean.standard_error:
         return None
     return ChaoticTransient(

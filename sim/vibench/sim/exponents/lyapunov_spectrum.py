@@ -27,7 +27,7 @@ from .tangent_run import (
     BlockedMean,
     FinalMotion,
     TangentRun,
-    blocked_mean,
+    block_mean,
     interval_for,
     run_with_tangent,
     settling,
@@ -131,7 +131,7 @@ def lyapunov_spectrum(
             0,
         )
     else:
-        parts = _taken(specimen, drive, run, skipped)
+        parts = _exponents_of_run(specimen, drive, run, skipped)
     since = parts.since
     lasting = (len(run.growth) - since) * length
     return LyapunovSpectrum(
@@ -169,7 +169,7 @@ class _Taken(NamedTuple):
     since: int
 
 
-def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:
+def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:
     end = settling(run, state_scales(specimen, drive))
     if end.motion is FinalMotion.QUIET:
         system, _ = state_matrix(specimen)
@@ -201,7 +201,7 @@ def _mean(rates: Floats) -> BlockedMean:
     """Mean of local exponents with its error; minus infinity where the direction was lost."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
-    return blocked_mean(rates)
+    return block_mean(rates)
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
@@ -214,7 +214,7 @@ def _dimension_error(rates: Floats, exponents: Floats) -> float:
         return 0.0
     total, next_one = float(np.sum(exponents[:kept])), float(exponents[kept])
     moved = -rates[:, :kept].sum(axis=1) / next_one + total * rates[:, kept] / next_one**2
-    return blocked_mean(moved).standard_error
+    return block_mean(moved).standard_error
 
 
 def kaplan_yorke(exponents: Floats) -> float:

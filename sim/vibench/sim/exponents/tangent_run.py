@@ -55,7 +55,7 @@ class BlockedMean:
     """The series holds `FEWEST_BLOCKS` independent blocks or more: else the error is a lower bound."""
 
 
-def blocked_mean(values: ArrayLike) -> BlockedMean:
+def block_mean(values: ArrayLike) -> BlockedMean:
     """Average a series of evenly spaced values, shape (n,), n >= 1.
 
     Raises ValueError when there is no value, or one is not finite.
@@ -301,7 +301,7 @@ def _change_of_sign(growth: Floats) -> int | None:
     before, after = sums[places - 1] / places, (sums[-1] - sums[places - 1]) / (count - places)
     # The split that leaves the least scatter about the two means.
     place = int(places[np.argmax((before - after) * np.sqrt(places * (count - places)))])
-    head, tail = blocked_mean(growth[:place]), blocked_mean(growth[place:])
+    head, tail = block_mean(growth[:place]), block_mean(growth[place:])
     is_falling = head.mean > SURE * head.standard_error and tail.mean <= SURE * tail.standard_error
     apart = CHANGED * math.hypot(head.standard_error, tail.standard_error)
     return place if is_falling and head.mean - tail.mean > apart else None

@@ -42,7 +42,7 @@ _SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
 """In errors of HDF5; 22 means an address that cannot be, so that the file is wrong."""
 
 _allowances: list[None] = []
-"""One for each `external_data_allowed` that is on in this process, whichever thread asks."""
+"""One for each `allow_external_data` that is on in this process, whichever thread asks."""
 
 
 class UnsafeHdf5(ValueError):
@@ -57,7 +57,7 @@ def system_error(error: BaseException) -> str:
 
 
 @contextmanager
-def external_data_allowed() -> Iterator[None]:
+def allow_external_data() -> Iterator[None]:
     """Let every file that this process opens inside hand out the bytes of other files, as HDF5 does."""
     _allowances.append(None)
     try:

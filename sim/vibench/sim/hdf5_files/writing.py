@@ -38,7 +38,7 @@ class _Disk(FileIO):
 
 
 @contextmanager
-def written_hdf5(
+def open_hdf5_to_write(
     path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
     """Create (``x``) or change (``r+``) a file; raises OSError where the disk refuses any of it."""

@@ -72,7 +72,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     if len(kept) < FEWEST_SIZES or kept[-1] < SPREAD * kept[0]:
         return None
     slopes = np.array(
-        [_slope(kept, [_left_out(uncertain[step], part) for step in kept]) for part in range(BLOCKS**2)]
+        [_slope(kept, [_share_without(uncertain[step], part) for step in kept]) for part in range(BLOCKS**2)]
     )
     whole = [float(uncertain[step].mean()) for step in kept]
     exponent = _slope(kept, whole)
@@ -93,7 +93,7 @@ def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.b
     return np.asarray(np.any([each != here for each in beside], axis=0))
 
 
-def _left_out(uncertain: NDArray[np.bool_], part: int) -> float:
+def _share_without(uncertain: NDArray[np.bool_], part: int) -> float:
     """Return the share of uncertain starts with one part of the map left out."""
     rows, columns = (np.arange(length) * BLOCKS // length for length in uncertain.shape)
     is_in = (rows[:, None] * BLOCKS + columns) != part
@@ -152,13 +152,13 @@ def kick_stability(
         for number, motion in enumerate(results.motions):
             point = results.example(number)
             for size in sizes:
-                scenes = _kicked(results, point, size, kicks, seed)
+                scenes = _kick_scenes(results, point, size, kicks, seed)
                 back = sum(_is_same(motion, each) for each in pool.map(settle_scene, scenes))
                 found.append(KickStability(number, size, wilson_share(back, kicks)))
     return tuple(found)
 
 
-def _kicked(results: MapResults, point: int, size: float, kicks: int, seed: int) -> list[Scene]:
+def _kick_scenes(results: MapResults, point: int, size: float, kicks: int, seed: int) -> list[Scene]:
     scene = results.plan.scene(results.plan.grid.place(point))
     scene = replace(scene, drive=replace(scene.drive, phase_rad=results.phase_after(point)))
     state: Floats = results.arrays["final_state"][point].astype(np.float64)

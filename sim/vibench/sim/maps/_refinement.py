@@ -93,10 +93,10 @@ def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
             return RefinementPlan(np.flatnonzero(missing), fine)
         step = fine
     steps = [coarse >> k for k in range(coarse.bit_length() - 1)]
-    return _audited(sketch, tuple(sketch.filling(step // 2, step) for step in steps), seed)
+    return _audit_plan(sketch, tuple(sketch.filling(step // 2, step) for step in steps), seed)
 
 
-def _audited(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> RefinementPlan:
+def _audit_plan(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> RefinementPlan:
     nothing = np.zeros(0, dtype=np.int64)
     filled = np.concatenate([nothing, *(each.cells for each in fillings)])
     donors = np.concatenate([nothing, *(each.donors for each in fillings)])

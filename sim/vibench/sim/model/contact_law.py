@@ -31,7 +31,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
 """By the kind of each law, which is the word of a command line or a file too."""
 
 
-def model_named(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
+def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
     """Turn a model's name, ``hertz`` or ``rigid:0.8`` for example, into its law.
 
     Raises ValueError when the name is not one of the forms, or its numbers are not allowed.

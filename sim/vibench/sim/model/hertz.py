@@ -30,12 +30,12 @@ class Hertz:
         return Stops(contact_stiffness=float(self.stiffness))
 
 
-def _made(detail: str, reference: Reference) -> Hertz:
+def _parse(detail: str, reference: Reference) -> Hertz:
     require_nothing(detail)
     return Hertz(reference.stiffness)
 
 
-HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz", _made)
+HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz", _parse)
 
 
 @dataclass(frozen=True)

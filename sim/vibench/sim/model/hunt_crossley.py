@@ -40,10 +40,10 @@ class HuntCrossley:
         return Stops(contact_stiffness=float(self.stiffness), loss=float(self.loss))
 
 
-def _made(detail: str, reference: Reference) -> HuntCrossley:
+def _parse(detail: str, reference: Reference) -> HuntCrossley:
     return HuntCrossley(reference.stiffness, number_in(detail))
 
 
 HUNT_CROSSLEY = LawWord(
-    "hunt_crossley:s/m", "hertz with a loss that grows with the speed", "hunt_crossley:2", _made
+    "hunt_crossley:s/m", "hertz with a loss that grows with the speed", "hunt_crossley:2", _parse
 )

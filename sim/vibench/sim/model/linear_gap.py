@@ -30,14 +30,14 @@ class LinearGap:
         return Stops(linear_stiffness=float(self.stiffness))
 
 
-def fitted_linear_gap(contact_stiffness: float, indentation_m: float = PAPER_INDENTATION_M) -> LinearGap:
+def fit_linear_gap(contact_stiffness: float, indentation_m: float = PAPER_INDENTATION_M) -> LinearGap:
     """Fit springy stops to a Hertz contact of k [N/m^1.5]: equal force at the given indentation."""
     require_positive("Indentation of the fit", indentation_m, "m")
     return LinearGap(contact_stiffness * math.sqrt(indentation_m))
 
 
-def _made(detail: str, reference: Reference) -> LinearGap:
-    return LinearGap(number_in(detail)) if detail else fitted_linear_gap(reference.stiffness)
+def _parse(detail: str, reference: Reference) -> LinearGap:
+    return LinearGap(number_in(detail)) if detail else fit_linear_gap(reference.stiffness)
 
 
-LINEAR_GAP = LawWord("linear_gap[:N/m]", "stops that are springs", "linear_gap", _made)
+LINEAR_GAP = LawWord("linear_gap[:N/m]", "stops that are springs", "linear_gap", _parse)

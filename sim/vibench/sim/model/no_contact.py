@@ -22,9 +22,9 @@ class NoContact:
         return Stops()
 
 
-def _made(detail: str, _reference: Reference) -> NoContact:
+def _parse(detail: str, _reference: Reference) -> NoContact:
     require_nothing(detail)
     return NoContact()
 
 
-LINEAR = LawWord("linear", "no stops", "linear", _made)
+LINEAR = LawWord("linear", "no stops", "linear", _parse)

@@ -67,7 +67,7 @@ class PowerLaw:
         return Stops()
 
 
-def fitted_power_law(
+def fit_power_law(
     exponents: Sequence[int],
     contact_stiffness: float,
     gap_m: float,
@@ -99,7 +99,7 @@ def fitted_power_law(
     return PowerLaw(gap_m + indentation_m, tuple(terms))
 
 
-def _made(detail: str, reference: Reference) -> PowerLaw:
+def _parse(detail: str, reference: Reference) -> PowerLaw:
     """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; behind a colon the indentation."""
     powers, _, indentation = detail.partition(":")
     terms = [term.partition("@") for term in powers.split("+")]
@@ -110,9 +110,9 @@ def _made(detail: str, reference: Reference) -> PowerLaw:
     is_equal = all(share == "" for _, _, share in terms)
     shares = None if is_equal else [number_in(share) for _, _, share in terms]
     at_m = number_in(indentation) if indentation else PAPER_INDENTATION_M
-    return fitted_power_law(exponents, reference.stiffness, reference.gap_m, at_m, shares)
+    return fit_power_law(exponents, reference.stiffness, reference.gap_m, at_m, shares)
 
 
 POWER = LawWord(
-    "power:3+5+7 or power:3@0.2+7@0.8[:M]", "odd powers of p instead of stops, with shares", "power:5", _made
+    "power:3+5+7 or power:3@0.2+7@0.8[:M]", "odd powers of p instead of stops, with shares", "power:5", _parse
 )

@@ -29,8 +29,8 @@ class RigidStops:
         return Stops(restitution=float(self.restitution))
 
 
-def _made(detail: str, _reference: Reference) -> RigidStops:
+def _parse(detail: str, _reference: Reference) -> RigidStops:
     return RigidStops(number_in(detail))
 
 
-RIGID = LawWord("rigid:0..1", "stops that do not yield, with a restitution", "rigid:0.8", _made)
+RIGID = LawWord("rigid:0..1", "stops that do not yield, with a restitution", "rigid:0.8", _parse)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from .contact_law import ContactLaw, model_named
+from .contact_law import ContactLaw, law_by_name
 from .drive import Harmonic
 from .hertz import Elasticity, hertz_stiffness
 from .state import Floats
@@ -191,7 +191,7 @@ def gong2025(
         msg = f"Gap {gap_m} m is not allowed: give one clearance, or (lower, upper)."
         raise ValueError(msg)
     lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
-    law = model_named(contact, stiffness, upper if lower is None else min(lower, upper))
+    law = law_by_name(contact, stiffness, upper if lower is None else min(lower, upper))
     m0, m1, m2 = PAPER_MASSES
     f0, f1, f2 = PAPER_FREQUENCIES_HZ
     k0, k1, k2 = (m * (2.0 * math.pi * f) ** 2 for m, f in ((m0, f0), (m1, f1), (m2, f2)))

@@ -31,7 +31,7 @@ from pydantic import (
     model_validator,
 )
 
-from .contact_law import model_named
+from .contact_law import law_by_name
 from .frozen_model import FrozenModel
 from .hertz import Elasticity, hertz_stiffness
 from .specimen import Gaps, Specimen, Triple
@@ -99,7 +99,7 @@ class SphereOnPlane(_Described):
 
 
 def _known_law(word: str) -> str:
-    model_named(word, 1.0, _ANY_GAP_M)
+    law_by_name(word, 1.0, _ANY_GAP_M)
     return word
 
 
@@ -245,7 +245,7 @@ class SpecimenDescription(_Described):
             stiffnesses=self.stiffnesses,
             dampings=self._dampings(damping_time_s),
             gap_m=upper,
-            contact=model_named(self.contact if contact is None else contact, self.hertz_k, nearest),
+            contact=law_by_name(self.contact if contact is None else contact, self.hertz_k, nearest),
             lower_gap_m=lower,
         )
 
@@ -310,7 +310,7 @@ def load_specimen(specimen: str | Path) -> SpecimenDescription:
 
 def shipped_specimens() -> Mapping[str, SpecimenDescription]:
     """Return the specimens that come with vibench, by the names that may stand for a file."""
-    return {name: SpecimenDescription.model_validate(name) for name in _shipped()}
+    return {name: SpecimenDescription.model_validate(name) for name in _shipped_texts()}
 
 
 def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
@@ -320,9 +320,9 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     if depth > DEEPEST:
         raise ValueError(f"a specimen starts from {table[BASE]!r}, which comes back to it; name another one")
     specimen = str(table.pop(BASE))
-    known = _shipped()
+    known = _shipped_texts()
     if specimen in known:
-        return _laid_over(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
+        return _merge(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
     names, called = ", ".join(known), reprlib.repr(specimen)
     if folder is None:
         raise ValueError(f"no specimen that comes with vibench is called {called}; there are {names}")
@@ -336,7 +336,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
             f"no specimen is called {called}, and there is no such file; give the path of a TOML file, "
             f"or one of {names}"
         )
-    return _laid_over(_complete(_of_this_version(path), path.parent, depth + 1), table)
+    return _merge(_complete(_of_this_version(path), path.parent, depth + 1), table)
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
@@ -352,7 +352,7 @@ def _of_this_version(path: Path) -> dict[str, Any]:
 
 
 @cache
-def _shipped() -> Mapping[str, str]:
+def _shipped_texts() -> Mapping[str, str]:
     """Text of each specimen that comes with vibench, by its name."""
     found = [each for each in (files("vibench.sim") / "specimens").iterdir() if each.name.endswith(SUFFIX)]
     return {
@@ -361,7 +361,7 @@ def _shipped() -> Mapping[str, str]:
     }
 
 
-def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
     """Replace what is said again; the other of two keys that say the same goes, and so do its sources."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     kept = {key: value for key, value in base.items() if key not in replaced}
@@ -383,15 +383,15 @@ def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Map
         old, new = getattr(before, name), getattr(now, name)
         if not (said.keys() & {kept, direct} or np.allclose(old, new, rtol=1e-4, atol=0.0)):
             warnings.warn(
-                f"{made['name']}: {name} changed from {_listed(old)} to {_listed(new)}, because {kept} was "
-                f"kept; give {direct} = {_listed(old)} to keep them, or {kept} = {made[kept]} to confirm "
+                f"{made['name']}: {name} changed from {_join(old)} to {_join(new)}, because {kept} was "
+                f"kept; give {direct} = {_join(old)} to keep them, or {kept} = {made[kept]} to confirm "
                 "the change",
                 SpecimenWarning,
                 stacklevel=2,
             )
 
 
-def _listed(numbers: Triple) -> str:
+def _join(numbers: Triple) -> str:
     return f"[{', '.join(f'{each:.6g}' for each in numbers)}]"
 
 

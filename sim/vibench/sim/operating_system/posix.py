@@ -136,7 +136,7 @@ def process_start(pid: int) -> str | None:
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except FileNotFoundError:
-        return None if Path("/proc/self/stat").exists() else _told_by_ps(pid)
+        return None if Path("/proc/self/stat").exists() else _start_by_ps(pid)
     except ProcessLookupError:
         return None
     # The name before the last bracket may hold anything; proc(5) counts the state as 3 and the start as 22.
@@ -154,7 +154,7 @@ def _here() -> str:
         return "unknown"
 
 
-def _told_by_ps(pid: int) -> str | None:
+def _start_by_ps(pid: int) -> str | None:
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -134,7 +134,7 @@ def sync_file(path: Path) -> None:
 
 
 @contextmanager
-def replaced(path: Path) -> Iterator[Path]:
+def replace_file(path: Path) -> Iterator[Path]:
     """Yield a name to write to; the file then replaces an older one, which stays if there is an error."""
     target = path.resolve()  # a link stays one
     if target.exists():

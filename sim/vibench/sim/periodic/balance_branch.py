@@ -131,7 +131,7 @@ def balance(
         problem = BalanceProblem(structure, spring, harmonics)
         seed = problem.packed(with_harmonics(guess.relative, guess.harmonics, harmonics))
         unknowns, is_solved = newton(problem, seed, omega, amplitude_m)
-        found = described(problem, unknowns, frequency_hz, amplitude_m, options.tolerance)
+        found = balance_of_solution(problem, unknowns, frequency_hz, amplitude_m, options.tolerance)
         enough = is_solved and found.outcome is BalanceEnd.CONVERGED
         if enough or highest == options.most:
             return found if is_solved else replace(found, outcome=BalanceEnd.NO_SOLUTION)
@@ -140,7 +140,7 @@ def balance(
         highest = min(2 * highest + 1, options.most)
 
 
-def described(
+def balance_of_solution(
     problem: BalanceProblem, unknowns: np.ndarray, frequency_hz: float, amplitude_m: float, tolerance: float
 ) -> Balance:
     """Turn a solution of the equations into motions of every mass, and judge what was left out."""
@@ -149,7 +149,7 @@ def described(
     seen = condense(problem.structure, omega, harmonics)
     force = force_harmonics(problem.spring, phasors, harmonics, omega).force
     drive = np.where(harmonics == 1, -1j * amplitude_m, 0.0)
-    left_out = _left_out(problem, phasors, omega)
+    left_out = _truncation_error(problem, phasors, omega)
     return Balance(
         frequency_hz=frequency_hz,
         amplitude_m=amplitude_m,
@@ -161,7 +161,7 @@ def described(
     )
 
 
-def _left_out(problem: BalanceProblem, phasors: Complex, omega: float) -> float:
+def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -> float:
     highest = int(problem.harmonics[-1])
     lines = force_tail(problem.spring, phasors, problem.harmonics, omega)
     beyond = np.arange(highest + 1, min(TAIL * highest, len(lines) - 1) + 1)
@@ -201,7 +201,7 @@ class BalanceFamily:
     def report(self, point: Vector) -> OrbitReport:
         """Responses, multipliers and contacts."""
         frequency, amplitude = self.drive(point)
-        found = described(self.problem, point[:-1], frequency, amplitude, self.tolerance)
+        found = balance_of_solution(self.problem, point[:-1], frequency, amplitude, self.tolerance)
         return OrbitReport(
             frequency_hz=found.frequency_hz,
             amplitude_m=found.amplitude_m,

@@ -228,11 +228,11 @@ def follow(
             return _branch(gathered, parameter, end)
         refined = family.refined(last.point, last.tangent)
         if refined is None:
-            return _lost(gathered, parameter)
+            return _end_branch(gathered, parameter)
         finer, guess, normal = refined
         point, iterations = correct(finer, guess, normal / np.linalg.norm(normal), steps.tolerance)
         if iterations == 0:
-            return _lost(gathered, parameter)
+            return _end_branch(gathered, parameter)
         family, start, toward = finer, point, float(last.tangent[-1])
 
 
@@ -240,7 +240,7 @@ NEARLY_GRAZING = 0.01
 """A branch lost with a contact this close to beginning or ending, over the gap, is lost by grazing."""
 
 
-def _lost(gathered: _Gathered, parameter: Parameter) -> Branch:
+def _end_branch(gathered: _Gathered, parameter: Parameter) -> Branch:
     """End a branch that no step goes on from; at a rigid stop grazing does that, and is named."""
     if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
         gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
@@ -257,10 +257,10 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
         whole = onward or back
         assert whole is not None
         return replace(whole, begin=ArcEnd.REACHED_BOUND)
-    return _joined(back, onward)
+    return _join_branches(back, onward)
 
 
-def _joined(back: Branch, onward: Branch) -> Branch:
+def _join_branches(back: Branch, onward: Branch) -> Branch:
     """Turn one branch round and put it before another that begins at the same point."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
@@ -294,7 +294,7 @@ def _follow_at(
             return None, here
         report = family.report(here.point)
         if is_joined(signs, report.signs) and not here.is_fold:
-            _add_joined(family, before, here, signs, steps, gathered)
+            _add_simpler_end(family, before, here, signs, steps, gathered)
             return ArcEnd.JOINED, here
         if here.is_fold:
             gathered.add_event(BifurcationKind.FOLD, report)
@@ -304,7 +304,7 @@ def _follow_at(
         if here.end is ArcEnd.TOO_MANY_POINTS:
             return here.end, here
         for kind in bifurcations_between(signs, report.signs):
-            _add_located(family, before, here, kind, signs, steps, gathered)
+            _add_event(family, before, here, kind, signs, steps, gathered)
         gathered.reports.append(report)
         if here.end is not None:
             return here.end, here
@@ -312,7 +312,7 @@ def _follow_at(
     return ArcEnd.TOO_MANY_POINTS, before
 
 
-def _add_joined(
+def _add_simpler_end(
     family: Family,
     before: ArcPoint,
     after: ArcPoint,
@@ -336,7 +336,7 @@ def _add_joined(
     gathered.reports.append(report)
 
 
-def _add_located(
+def _add_event(
     family: Family,
     before: ArcPoint,
     after: ArcPoint,

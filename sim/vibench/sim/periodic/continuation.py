@@ -167,7 +167,7 @@ def trace(
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
             if ahead is None:
-                yield _ended(here, ArcEnd.STEP_TOO_SHORT)
+                yield _arc_end(here, ArcEnd.STEP_TOO_SHORT)
                 return
             if ahead.tangent[-1] * here.tangent[-1] < 0.0:
                 yield ArcPoint(here.point, here.tangent, here.arc, is_fold=True)
@@ -188,7 +188,7 @@ def trace(
             return
         yield ahead
         here = ahead
-    yield _ended(here, ArcEnd.TOO_MANY_POINTS)
+    yield _arc_end(here, ArcEnd.TOO_MANY_POINTS)
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
@@ -331,10 +331,10 @@ def _at_bound(
     across[-1] = 1.0
     point, iterations = correct(curve, guess, across, steps.tolerance)
     if iterations == 0:
-        return _ended(before, ArcEnd.STEP_TOO_SHORT)
+        return _arc_end(before, ArcEnd.STEP_TOO_SHORT)
     arc = before.arc + float(np.linalg.norm(point - before.point))
     return ArcPoint(point, tangent_at(curve, point, before.tangent), arc, end=ArcEnd.REACHED_BOUND)
 
 
-def _ended(here: ArcPoint, why: ArcEnd) -> ArcPoint:
+def _arc_end(here: ArcPoint, why: ArcEnd) -> ArcPoint:
     return ArcPoint(here.point, here.tangent, here.arc, here.is_fold, why)

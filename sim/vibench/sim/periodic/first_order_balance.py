@@ -41,13 +41,13 @@ def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
     Shape (n,), n < m; a double zero is given once.
 
     """
-    kept, powers = _gathered(
+    kept, powers = _sum_equal_exponents(
         np.asarray(coefficients, dtype=np.float64), np.asarray(exponents, dtype=np.float64)
     )
     return np.exp(np.array(_zeros(kept, powers), dtype=np.float64))
 
 
-def _gathered(coefficients: Floats, exponents: Floats) -> tuple[Floats, Floats]:
+def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Floats, Floats]:
     """Sum equal exponents, drop zeros, sort."""
     powers, place = np.unique(exponents, return_inverse=True)
     sums = np.zeros(len(powers))
@@ -149,7 +149,7 @@ def first_order_states(
     drive = -1j * amplitude_m
     alone = seen.linear * drive
     compliance = complex(seen.compliance[0])
-    coefficients, exponents = _squared_balance(compliance, spring)
+    coefficients, exponents = _balance_squared(compliance, spring)
     target = abs(alone / spring.length) ** 2
     sizes = positive_zeros(np.append(coefficients, -target), np.append(exponents, 0.0))
     slopes = [_slope_sign(size, coefficients, exponents) for size in sizes]
@@ -178,7 +178,7 @@ def _describing(size: float, spring: PowerSpring) -> float:
         )
 
 
-def _squared_balance(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
+def _balance_squared(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
     """|P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
     weights = np.array([fundamental_share(n) * f / spring.length for n, f in spring.terms])
     powers = np.array([float(n) for n, _ in spring.terms])

@@ -74,7 +74,7 @@ def transition(
             result = scipy.linalg.expm(system * length) @ result
             continue
         marks = _marks(start, stop, fastest * length, spring, int(motion.harmonics[-1]))
-        result = _crossed(system, spring_in, structure, spring, motion, marks) @ result
+        result = _transitions(system, spring_in, structure, spring, motion, marks) @ result
     return np.asarray(result)
 
 
@@ -133,7 +133,7 @@ def _marks(start: float, stop: float, turn: float, spring: RestoringForce, highe
     return np.linspace(start, stop, steps + 1)
 
 
-def _crossed(
+def _transitions(
     system: Floats,
     spring_in: Floats,
     structure: LinearStructure,

@@ -190,10 +190,10 @@ def force_harmonics(
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     with np.errstate(over="ignore", invalid="ignore"):
-        return _brought_back(spring, p, rate, harmonics, omega)
+        return _force_harmonics(spring, p, rate, harmonics, omega)
 
 
-def _brought_back(
+def _force_harmonics(
     spring: RestoringForce, p: Floats, rate: Floats, harmonics: Harmonics, omega: float
 ) -> ForceHarmonics:
     samples = len(p)

@@ -22,7 +22,7 @@ from .branch_following import (
     range_scale,
 )
 from .continuation import ArcSteps
-from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, described_orbit
+from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, describe_orbit
 
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
 """A residual below 1e-9 of the gap: what the flow at reference accuracy allows."""
@@ -83,7 +83,7 @@ class OrbitFamily:
         """Responses, multipliers and contacts."""
         state, drive = self.state_at(point), self.drive_at(point)
         gone = (self.mapping.image(state, drive) - state) / state_scales(self.mapping.specimen, drive)
-        orbit = described_orbit(self.mapping, drive, state, gone)
+        orbit = describe_orbit(self.mapping, drive, state, gone)
         return OrbitReport(
             frequency_hz=orbit.drive.frequency_hz,
             amplitude_m=orbit.drive.amplitude_m,

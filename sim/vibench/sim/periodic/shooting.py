@@ -249,13 +249,13 @@ def periodic_orbit(
         if not bool(np.all(np.isfinite(slope))):
             break
         step = np.linalg.lstsq(slope, gone)[0] * scales
-        state, gone, is_better = _damped(mapping, drive, state, step, gone)
+        state, gone, is_better = _damped_step(mapping, drive, state, step, gone)
         if not is_better:
             break
-    return described_orbit(mapping, drive, state, gone)
+    return describe_orbit(mapping, drive, state, gone)
 
 
-def _damped(
+def _damped_step(
     mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
 ) -> tuple[Vector, Vector, bool]:
     """Halve the step until the motion comes back closer; gives the state, how far it goes, and success."""
@@ -273,7 +273,7 @@ def _size(values: Vector) -> float:
     return size if math.isfinite(size) else math.inf
 
 
-def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
+def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
     """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
     moved = run.states[: mapping.periods * SAMPLES]

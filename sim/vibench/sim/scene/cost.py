@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Self
 
 from ..engine.library import physics_digest
-from ..operating_system.this import replaced, state_folder, state_place
+from ..operating_system.this import replace_file, state_folder, state_place
 from .plan import ScenePlan, plan_scene
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
@@ -124,7 +124,7 @@ class CostLedger:
             text = json.dumps({kind: asdict(known) for kind, known in sorted(self._kinds.items())}, indent=1)
         with contextlib.suppress(OSError):
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            with replaced(self._path) as coming:
+            with replace_file(self._path) as coming:
                 coming.write_text(text, encoding="utf-8")
 
 
@@ -192,7 +192,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     Raises ValueError when the specimen cannot be followed in time.
     """
     plan = plan_scene(scene)
-    return _expected(plan, solver, plan.planned_s).time_s
+    return _expected_cost(plan, solver, plan.planned_s).time_s
 
 
 def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
@@ -201,10 +201,10 @@ def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     Raises ValueError when the specimen cannot be followed in time.
     """
     plan = plan_scene(scene)
-    return _expected(plan, solver, plan.longest_planned_s).time_s
+    return _expected_cost(plan, solver, plan.longest_planned_s).time_s
 
 
-def _expected(plan: ScenePlan, solver: Solver, planned_s: float) -> Expected:
+def _expected_cost(plan: ScenePlan, solver: Solver, planned_s: float) -> Expected:
     """Go by what a solver's runs took, or else by those of `solve_scene`, which takes longest."""
     own = cost_ledger().expected(_kind(plan, solver), planned_s)
     return own if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s)

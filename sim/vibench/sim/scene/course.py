@@ -20,7 +20,7 @@ from .followed_run import (
     ObservedWindow,
     Stretch,
     blocks_of,
-    follow_strobed,
+    follow_with_section,
     observe_window,
     samples_between,
     states_of,
@@ -83,13 +83,13 @@ class FixedCourse:
         """Observe the end of it."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
-        last = follow_strobed(run, duration.duration_s - duration.window_s)
+        last = follow_with_section(run, duration.duration_s - duration.window_s)
         before = pace.repeats([last])
         if before is None:
             run.follow_tangent()
         is_chaos = pace.is_chaos if before is None else None
         window = observe_window(run, duration.window_s, pace.cycle([last]), is_chaos)
-        seen = judged(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
+        seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
             # Its period was found only now: the window is gone through once more, for lines that do not leak.
@@ -104,7 +104,7 @@ class FixedCourse:
         return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
-def judged(
+def classify(
     run: FollowedRun, window: ObservedWindow, before: Sequence[Stretch], pace: Pace, ended: str
 ) -> SceneRun:
     """Return what a motion is, from its window and the stretches before it.
@@ -245,7 +245,7 @@ class SettlingCourse:
             if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
                 if pace.drifts(late):
                     return self._follow_on(path, len(late), DRIFT_SHARE * self._alone_s)
-                seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
+                seen = _observe_last(run, late, starts, in_window, pace, f"it is {kind}")
                 self._seen = replace(seen, settled_s=late[0].start_s, path=tuple(path))
                 return None
             made += self._slice_periods
@@ -255,9 +255,9 @@ class SettlingCourse:
             if not late:
                 run.follow_tangent()
             starts.append(run.apart())
-            late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
+            late.append(follow_with_section(run, end_s, Watch.PEAKS_AND_LINES))
         ended = f"it has not settled within {self._longest_s:g} s"
-        seen = _observed(run, late or early, starts, in_window, pace, ended)
+        seen = _observe_last(run, late or early, starts, in_window, pace, ended)
         self._seen = replace(seen, path=(*early, *late))
         return None
 
@@ -285,7 +285,7 @@ class SettlingCourse:
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [
-            follow_strobed(
+            follow_with_section(
                 run, (made + number * self._slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES
             )
             for number in range(1, self._in_window + 1)
@@ -296,14 +296,14 @@ class SettlingCourse:
             is_drifting = pace.drifts(last)
             found = "still drifts" if is_drifting else f"is {kind}"
             before = () if growth_of(path).is_certain else path[-watched:]
-            seen = judged(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
+            seen = classify(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
             return replace(
                 seen,
                 motion=MotionKind.UNDECIDED if is_drifting else seen.motion,
                 grew=growth_of(path).is_certain,
                 wandered_until_s=last[0].start_s,
             )
-        seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
+        seen = classify(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
         if run.outcome is not Outcome.REACHED_END:
             return seen
         settled_s = path[-watched].start_s
@@ -323,9 +323,9 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
     end_s = settled_s + repeats.period / pace.frequency_hz
-    one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
+    one = follow_with_section(run, end_s, Watch.PEAKS_AND_LINES)
     window = window_of(begins, [one])
-    seen = judged(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
+    seen = classify(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
     if run.outcome is not Outcome.REACHED_END:
         return seen
     return replace(
@@ -340,7 +340,7 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     )
 
 
-def _observed(
+def _observe_last(
     run: FollowedRun,
     stretches: Sequence[Stretch],
     starts: Sequence[FollowedRun],
@@ -352,4 +352,4 @@ def _observed(
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
     window = window_of(begins, last)
-    return judged(run, window, stretches[:-in_window], pace, ended)
+    return classify(run, window, stretches[:-in_window], pace, ended)

@@ -347,7 +347,7 @@ def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
     return Samples((first + 1) / rate_hz, rate_hz, max(0, last - first))
 
 
-def follow_strobed(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
+def follow_with_section(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
     """Follow a motion to an instant, and keep its states once a drive period."""
     end_s = max(until_s, run.time_s)
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
@@ -372,7 +372,7 @@ def observe_window(
     line_s = max(end_s - periods / frequency, start_s)
     count = min(BLOCKS, periods)
     edges = [end_s - (periods * (count - k) // count) / frequency for k in range(1, count)] + [end_s]
-    head = [follow_strobed(run, line_s, Watch.PEAKS)] if run.time_s < line_s else []
+    head = [follow_with_section(run, line_s, Watch.PEAKS)] if run.time_s < line_s else []
     parts: list[Stretch] = []
     for edge in edges:
         if is_chaos is not None and count == BLOCKS:
@@ -380,7 +380,7 @@ def observe_window(
                 run.drop_tangent()
             elif len(parts) == BLOCKS - LAST and math.isnan(parts[-1].growth):
                 run.follow_tangent()
-        parts.append(follow_strobed(run, edge, Watch.PEAKS_AND_LINES))
+        parts.append(follow_with_section(run, edge, Watch.PEAKS_AND_LINES))
     return window_of(begins, parts, head)
 
 

@@ -188,7 +188,7 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     """Plan a scene whose motion, as long as nothing is touched, is ``motion``."""
     method = _method(scene.specimen, motion, scene.duration)
     if method is Method.CLOSED_FORM:
-        why = _why_closed(scene.specimen, motion)
+        why = _reason_of_closed_form(scene.specimen, motion)
         return ScenePlan(method, (why,), CLOSED_FORM_S, CLOSED_FORM_S, method.value, motion.largest_p_m)
     if whole_periods(scene.duration.window_s, scene.drive.frequency_hz) > MOST_STATES:
         frequency_hz = scene.drive.frequency_hz
@@ -198,12 +198,12 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
         )
         raise ValueError(msg)
     sentences = (
-        _why_followed(scene.specimen, motion, method),
+        _reason_to_integrate(scene.specimen, motion, method),
         *(
             _refined(scene.duration)
             if scene.target is not None
             else (
-                *_carried(scene.observe),
+                *_carried_quantities(scene.observe),
                 _length(scene.duration),
                 *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
             )
@@ -239,7 +239,7 @@ def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | 
     return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
 
 
-def _why_closed(specimen: Specimen, motion: LinearMotion) -> str:
+def _reason_of_closed_form(specimen: Specimen, motion: LinearMotion) -> str:
     steady = "The steady motion is known in closed form; nothing is followed in time."
     if specimen.contact.kind == "linear":
         return f"There are no stops. {steady}"
@@ -249,7 +249,7 @@ def _why_closed(specimen: Specimen, motion: LinearMotion) -> str:
     )
 
 
-def _why_followed(specimen: Specimen, motion: LinearMotion, method: Method) -> str:
+def _reason_to_integrate(specimen: Specimen, motion: LinearMotion, method: Method) -> str:
     if method is Method.POLYNOMIAL:
         return "The force acts at every p: one adaptive method of order 8 follows the motion throughout."
     largest, gap = motion.largest_p_m * MICROMETRES, min(specimen.gaps_m) * MICROMETRES
@@ -265,7 +265,7 @@ def _why_followed(specimen: Specimen, motion: LinearMotion, method: Method) -> s
     )
 
 
-def _carried(observe: tuple[Observable, ...]) -> list[str]:
+def _carried_quantities(observe: tuple[Observable, ...]) -> list[str]:
     sentences = [
         "A tangent vector is carried for the exponent."
         if Observable.LYAPUNOV in observe

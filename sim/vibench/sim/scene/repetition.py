@@ -173,7 +173,7 @@ def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
     return late * max(1.0, ratio / (1.0 - ratio))
 
 
-def section_needed(forgetting_periods: float) -> int:
+def longest_section(forgetting_periods: float) -> int:
     """States that let every period up to the longest be found."""
     return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
 
@@ -241,7 +241,7 @@ class Pace:
     @property
     def section_s(self) -> float:
         """Length of the section that lets every period be found."""
-        return (section_needed(self.forgetting_periods) + 1) / self.frequency_hz
+        return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
     def settling_s(self) -> float:

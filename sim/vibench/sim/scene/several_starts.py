@@ -18,7 +18,7 @@ from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Floats, Y, Z
 from .course import SceneRun
-from .followed_run import FollowedRun, Stretch, follow_strobed, observe_window, window_of
+from .followed_run import FollowedRun, Stretch, follow_with_section, observe_window, window_of
 from .plan import LinearMotion, never_touches
 from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
 from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
@@ -88,14 +88,14 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     twin = begin.pushed(pushes(begin.specimen, begin.drive, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
-        pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
+        pressed = _at_stop(begin.specimen, beside.states) & _at_stop(begin.specimen, stretch.states)
         apart_m = np.abs(beside.states[~pressed, :3] - stretch.states[~pressed, :3]).max(initial=0.0)
         if not apart_m < PARTED * size_m:
             return True
     return False
 
 
-def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
+def _at_stop(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
     """Say of each state, shape (n, 6), whether m1 is at a stop: there lanes give the flight after it."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
@@ -261,7 +261,7 @@ class SeveralStarts:
         if other.repeats is not None:
             period, kind = other.repeats.period, MotionKind.PERIODIC
             begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
-            one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
+            one = follow_with_section(run, end_s, Watch.PEAKS_AND_LINES)
             window = window_of(begins, [one])
             until_s = other.wandered_until_s
             return ReachedMotion(run, kind, period, window.responses_m, None, until_s, NOT_CARRIED)

@@ -37,8 +37,8 @@ from .stated_error import (
     SAFETY,
     UNKNOWN_ERRORS,
     StatedErrors,
-    known,
-    off_settled,
+    error_of_settled,
+    finite_or_none,
     stated_errors,
     with_errors,
 )
@@ -97,7 +97,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
         from .refinement import refined  # noqa: PLC0415 - most scenes have no target
 
         return refined(scene)
-    method, motion = _planned(scene)
+    method, motion = _plan(scene)
     if method is Method.CLOSED_FORM:
         return in_closed_form(scene, motion, question)
     begun = _Begun(scene, method, motion, question)
@@ -156,43 +156,43 @@ def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) 
     for scene in scenes:
         states = REMEMBERED * scene.duration.longest_s / FEWEST_TIMES * scene.drive.frequency_hz
         if together and held + states > MOST_HELD:
-            found += _solved_together(together, question)
+            found += _solve_together(together, question)
             together, held = [], 0.0
         together.append(scene)
         held += states
-    return found + _solved_together(together, question)
+    return found + _solve_together(together, question)
 
 
-def _solved_together(scenes: Sequence[Scene], question: Question) -> list[Solved]:
+def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]:
     answers: dict[int, ScenePrediction] = {}
     begun: dict[int, _Begun] = {}
     taken_s = [0.0] * len(scenes)
     for place, scene in enumerate(scenes):
-        with _counted(taken_s, [place]):
-            method, motion = _planned(scene)
+        with _count_time(taken_s, [place]):
+            method, motion = _plan(scene)
             if method is Method.CLOSED_FORM:
                 answers[place] = in_closed_form(scene, motion, question)
             else:
                 begun[place] = _Begun(scene, method, motion, question)
     ways = {place: each.course.way for place, each in begun.items() if each.course.way is not None}
-    with _counted(taken_s, ways):
+    with _count_time(taken_s, ways):
         in_batches([*ways.values()])
     chaos = {}
     for place, each in begun.items():
-        with _counted(taken_s, [place]):
+        with _count_time(taken_s, [place]):
             followed_on = each.course.watch()
         if followed_on is not None:
             chaos[place] = followed_on
-    with _counted(taken_s, chaos):
+    with _count_time(taken_s, chaos):
         in_batches([*chaos.values()])
     for place, each in begun.items():
-        with _counted(taken_s, [place]):
+        with _count_time(taken_s, [place]):
             answers[place] = each.answer(in_batches)
     return [Solved(answers[place], taken_s[place]) for place in range(len(scenes))]
 
 
 @contextmanager
-def _counted(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
+def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
     """Add the processor time inside to that of these scenes, in equal parts."""
     began_s = time.thread_time()
     yield
@@ -233,7 +233,7 @@ def solve_ensemble(
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
         raise ValueError(msg)
-    method, motion = _planned(scene)
+    method, motion = _plan(scene)
     if method is Method.CLOSED_FORM:
         return None
     begun = _Begun(scene, method, motion, Question.ANSWER)
@@ -248,7 +248,7 @@ def solve_ensemble(
     return begun.ensemble(seen, errors, follow, Draw(starts, starts, starts, seed, budget_s))
 
 
-def _planned(scene: Scene) -> tuple[Method, LinearMotion]:
+def _plan(scene: Scene) -> tuple[Method, LinearMotion]:
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     return plan_of(scene, motion).method, motion
 
@@ -404,11 +404,13 @@ class _Begun:
             duration_s=run.time_s,
             window_s=window.length_s,
             settled_s=seen.settled_s,
-            ended=_ended(seen, ensemble),
-            integration_error=known(errors.integration),
+            ended=_end_in_words(seen, ensemble),
+            integration_error=finite_or_none(errors.integration),
             scatter=scatter,
-            lyapunov_per_s=known(exponent.exponent_per_s) if exponent is not None else None,
-            lyapunov_error_per_s=known(exponent.standard_error_per_s) if exponent is not None else None,
+            lyapunov_per_s=finite_or_none(exponent.exponent_per_s) if exponent is not None else None,
+            lyapunov_error_per_s=finite_or_none(exponent.standard_error_per_s)
+            if exponent is not None
+            else None,
             start=scene.start.name,
             final_state=_state(run.state),
             outcome=run.outcome,
@@ -438,11 +440,11 @@ def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pa
 
     def error_of(reached: ReachedMotion) -> float | None:
         if reached is asked:
-            return known(float(np.max(errors.stated)))
+            return finite_or_none(float(np.max(errors.stated)))
         if reached.period is None:
             return None if reached.scatter is None else reached.scatter.between_runs
-        off = off_settled(reached.run, reached.responses_m, accuracy, reached.period, pace.forgetting_s)
-        return known(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
+        off = error_of_settled(reached.run, reached.responses_m, accuracy, reached.period, pace.forgetting_s)
+        return finite_or_none(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
 
     return error_of
 
@@ -457,7 +459,7 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
             return lasting(seen.motion, escape)
 
 
-def _ended(seen: SceneRun, ensemble: Ensemble | None) -> str:
+def _end_in_words(seen: SceneRun, ensemble: Ensemble | None) -> str:
     if seen.motion is MotionKind.CHAOTIC and ensemble is not None and ensemble.escape is not None:
         return f"{seen.ended} (mean lifetime above {ensemble.escape.lifetime_above_s:.3g} s)"
     return seen.ended

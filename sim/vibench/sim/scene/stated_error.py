@@ -100,7 +100,7 @@ def stated_errors(
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
     if seen.repeats is not None and seen.was_settled:
-        off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
+        off = error_of_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
     strict = _strict_run(scene, begin, seen, run)
     if strict.responses_m is not None and strict.is_together:
@@ -108,7 +108,7 @@ def stated_errors(
         if float(np.max(off)) < PARTED:
             return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    drawn = _drawn(begin, seen, strict, pace, slowest_rate, follow)
+    drawn = _difference_of_draws(begin, seen, strict, pace, slowest_rate, follow)
     return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
 
 
@@ -146,7 +146,7 @@ class _StrictRun:
     """It never parted."""
 
 
-def _drawn(
+def _difference_of_draws(
     begin: FollowedRun,
     seen: SceneRun,
     strict: _StrictRun,
@@ -188,7 +188,7 @@ def _more_starts(
     return found
 
 
-def off_settled(
+def error_of_settled(
     run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
 ) -> Floats:
     """How far the responses of a motion that repeats are off, relatively; NaN if the comparison was lost.
@@ -274,17 +274,17 @@ def _responses(run: FollowedRun, length_s: float) -> Floats:
 
 def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
     """Add the errors of the responses, and the largest of them."""
-    response_i, response_ii, relative_i, relative_ii = (known(float(error)) for error in stated)
+    response_i, response_ii, relative_i, relative_ii = (finite_or_none(float(error)) for error in stated)
     return replace(
         found,
         response_i_error=response_i,
         response_ii_error=response_ii,
         relative_i_error=relative_i,
         relative_ii_error=relative_ii,
-        error_estimate=known(float(np.max(stated))),
+        error_estimate=finite_or_none(float(np.max(stated))),
     )
 
 
-def known(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """Return a number, or None where there is none."""
     return value if math.isfinite(value) else None

@@ -18,12 +18,12 @@ from ..model.state import Floats
 from .followed_run import (
     FollowedRun,
     Stretch,
-    follow_strobed,
     follow_together,
+    follow_with_section,
     samples_between,
     whole_periods,
 )
-from .repetition import Growth, Pace, Repetition, growth_of, section_needed, wandered_until
+from .repetition import Growth, Pace, Repetition, growth_of, longest_section, wandered_until
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
@@ -76,7 +76,9 @@ class StatesAlone:
         self._pace = pace
         self._every = every
         self._slice_periods = slice_periods or max(1, math.ceil(SLICE_S * pace.frequency_hz))
-        self._kept = section_needed(pace.forgetting_periods) + math.ceil(REMEMBERED * pace.forgetting_periods)
+        self._kept = longest_section(pace.forgetting_periods) + math.ceil(
+            REMEMBERED * pace.forgetting_periods
+        )
 
     @property
     def is_over(self) -> bool:
@@ -144,7 +146,7 @@ class StatesAlone:
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
-        stretches = [follow_strobed(self.run, end_s) for end_s in ends_s]
+        stretches = [follow_with_section(self.run, end_s) for end_s in ends_s]
         self.run.drop_tangent()
         return growth_of(stretches)
 

@@ -32,7 +32,7 @@ _BLOCK_S = 0.02
 """Impacts are counted in blocks of this length."""
 
 
-def unchanged(frequency_hz: FloatArray) -> ComplexArray:
+def identity(frequency_hz: FloatArray) -> ComplexArray:
     """Show a motion as it is."""
     return np.ones(frequency_hz.shape, dtype=np.complex128)
 
@@ -45,9 +45,9 @@ class DrivenTable:
     """Of no numbers where the voltage is that of the coil."""
     shaker: Shaker
     specimen: Specimen
-    base_sensor: Gain = unchanged
+    base_sensor: Gain = identity
     """Of the channel that shows the base's acceleration."""
-    m0_sensor: Gain = unchanged
+    m0_sensor: Gain = identity
     """Of the channel that shows m0's velocity; a delay is a phase that falls."""
     base_low_cut_hz: float = 0.0
     """-3 dB of the coupling of the base's channel, first order; 0 where direct voltage passes."""
@@ -116,7 +116,7 @@ def follow_voltage(
     begun = np.concatenate(impacts)
     blocks_s = np.minimum(np.arange(begun.size) * (block * step_s), volts.size / sample_rate_hz)
     return SampledMotion(
-        base_acceleration=_coupled(kept[0], table.base_low_cut_hz / sample_rate_hz),
+        base_acceleration=_high_pass(kept[0], table.base_low_cut_hz / sample_rate_hz),
         m0_velocity=kept[1],
         impact_times_s=blocks_s,
         impacts=begun,
@@ -185,7 +185,7 @@ class _Resampling:
         return np.asarray((1 + lag) * (1 - turns * (turned - 1) * (1 - left) / (turned - left)))
 
 
-def _coupled(values: FloatArray, cut: float) -> FloatArray:
+def _high_pass(values: FloatArray, cut: float) -> FloatArray:
     """Pass values through a first-order high-pass, its -3 dB in cycles per sample."""
     if cut == 0.0:
         return values

@@ -16,7 +16,7 @@ from distributed.comm import get_address_host_port
 from ..scene.scene import Scene
 from ..scene.solve import Solved, solve_scene
 from ._errors import ClusterLost
-from ._executor import Bundle, Reply, Solver, arrived_in, solve_timed
+from ._executor import Bundle, Reply, Solver, empty_queue, solve_timed
 from ._software import software
 
 CONNECT_PATIENCE_S = 30.0
@@ -50,7 +50,7 @@ class ClusterExecutor:
     ) -> None:
         self._address = address
         self._solver = solver
-        self._client = _connected(address, patience_s)
+        self._client = _connect(address, patience_s)
         try:
             _require_workers(self._client, address, patience_s)
         except BaseException:
@@ -90,7 +90,7 @@ class ClusterExecutor:
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
         """Return what has come back; a bundle that the scheduler has dropped comes back empty."""
-        arrived = arrived_in(self._arrived, timeout_s)
+        arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()
         answers = self._fetched([future for _, future in arrived if future.status == FINISHED])
@@ -149,7 +149,7 @@ class ClusterExecutor:
             return 0
 
 
-def _connected(address: str, patience_s: float) -> Client:
+def _connect(address: str, patience_s: float) -> Client:
     try:
         # Asked first: a client that was started with an address of another form cannot be closed again.
         get_address_host_port(address)

@@ -88,7 +88,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
         if isinstance(solver, InBatches):
             found = solve_scenes(group, solver.question)
         else:
-            found = [_timed(group[0], solver)]
+            found = [_solve_and_time(group[0], solver)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
             # To plan a closed form takes about as long as to evaluate it.
@@ -97,7 +97,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
             yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)
 
 
-def _timed(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> Solved:
+def _solve_and_time(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> Solved:
     start_s = time.thread_time()
     prediction = solver(scene)
     return Solved(prediction, time.thread_time() - start_s)
@@ -143,7 +143,7 @@ class ThreadExecutor:
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
         """Return what has come back."""
-        return arrived_in(self._arrived, timeout_s)
+        return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:
         """Begin no scene more, not even within a bundle; those under way come to their end."""
@@ -168,7 +168,7 @@ class ThreadExecutor:
         self._arrived.put(Reply(bundle, tuple(solved), error))
 
 
-def arrived_in(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Item]:
+def empty_queue(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Item]:
     """Empty a queue; waits for the first item, at most ``timeout_s``."""
     items: list[Item] = []
     try:

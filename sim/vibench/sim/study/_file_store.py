@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hdf5_files.writing import written_hdf5
+from ..hdf5_files.writing import open_hdf5_to_write
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _grid as layout
 from ._errors import StudyError
@@ -97,7 +97,7 @@ def make_file(path: Path, plan: GridPlan) -> None:
     try:
         _require_room(path, plan)
         making.unlink(missing_ok=True)
-        with written_hdf5(making, "x", layout.LIBVER) as file:
+        with open_hdf5_to_write(making, "x", layout.LIBVER) as file:
             _fill(file, plan)
         sync_file(making)
         rename(making, path)
@@ -155,7 +155,7 @@ def _fill(file: h5py.File, plan: GridPlan) -> None:
     for column in plan.columns:
         dataset = _column(file, column, plan.grid.shape)
         if column.components > 1 and column.along not in last:
-            last[column.along] = _scale(file, _COMPONENTS.get(column.along) or _numbered(column))
+            last[column.along] = _scale(file, _COMPONENTS.get(column.along) or _numbered_axis(column))
         along = [last[column.along]] if column.components > 1 else []
         for index, scale in enumerate([*scales, *along]):
             dataset.dims[index].attach_scale(scale)
@@ -176,7 +176,7 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
     return dataset
 
 
-def _numbered(column: Column) -> StudyAxis:
+def _numbered_axis(column: Column) -> StudyAxis:
     """Return the axis of a column whose components are numbered."""
     return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
 

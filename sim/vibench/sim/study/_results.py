@@ -46,7 +46,7 @@ class Session:
 
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
     """Read what was asked for; raises StudyError when the file is none of a plan of this ``kind``."""
-    with _opened(path, kind) as file:
+    with _open_store(path, kind) as file:
         return _plan(path, file, kind)
 
 
@@ -59,13 +59,13 @@ def read_arrays(path: Path, plan: GridPlan) -> Arrays:
         When the file cannot be read, or is of another kind than the plan.
 
     """
-    with _opened(path, type(plan)) as file:
+    with _open_store(path, type(plan)) as file:
         return _arrays(file, plan)
 
 
 def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
     """Read who computed, and when."""
-    with _opened(path, kind) as file:
+    with _open_store(path, kind) as file:
         group = file[layout.SESSIONS]
         rows = range(int(group[layout.N_SESSIONS][0]))
         columns = [group[column.name][:] for column in layout.SESSION_COLUMNS]
@@ -74,7 +74,7 @@ def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
 
 def places_of(path: Path, plan: GridPlan) -> Places:
     """Find the places of everything that is written later."""
-    with _opened(path, type(plan)) as file:
+    with _open_store(path, type(plan)) as file:
         group = file[layout.SESSIONS]
         return Places(
             columns={column.name: _offset(file[column.name]) for column in plan.columns},
@@ -103,7 +103,7 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 
 @contextmanager
-def _opened(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
+def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     # h5py, which answers in memory do without.
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 

@@ -130,7 +130,7 @@ class MemoryStore:
 def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
     """Turn a prediction into cells; what was not asked, or not found, stays missing."""
     return {
-        **_known(prediction, NUMBERS),
+        **_cells_of(prediction, NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),
         MOTION: list(MotionKind).index(prediction.motion),
         MEMORY: list(StartMemory).index(prediction.memory),
@@ -141,7 +141,7 @@ def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
     }
 
 
-def _known(value: object, columns: Mapping[str, Column]) -> dict[str, Cell]:
+def _cells_of(value: object, columns: Mapping[str, Column]) -> dict[str, Cell]:
     numbers = {column.name: getattr(value, field) for field, column in columns.items()}
     return {name: number for name, number in numbers.items() if number is not None}
 
@@ -151,18 +151,18 @@ def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, Cell]:
     if ensemble is None:
         return {}
     kept = ensemble.motions[:MOST_FOUND]
-    cells = _known(ensemble, ENSEMBLE_NUMBERS)
+    cells = _cells_of(ensemble, ENSEMBLE_NUMBERS)
     if ensemble.escape is not None:
-        cells |= _known(ensemble.escape, ESCAPE_NUMBERS)
-    cells[FOUND_KIND.name] = _placed(FOUND_KIND, [list(MotionKind).index(each.motion) for each in kept])
+        cells |= _cells_of(ensemble.escape, ESCAPE_NUMBERS)
+    cells[FOUND_KIND.name] = _fill_places(FOUND_KIND, [list(MotionKind).index(each.motion) for each in kept])
     for field, column in FOUND_NUMBERS.items():
-        cells[column.name] = _placed(column, [getattr(each, field) for each in kept])
+        cells[column.name] = _fill_places(column, [getattr(each, field) for each in kept])
     for field, column in FOUND_SHARE.items():
-        cells[column.name] = _placed(column, [getattr(each.share, field) for each in kept])
+        cells[column.name] = _fill_places(column, [getattr(each.share, field) for each in kept])
     return cells
 
 
-def _placed(column: Column, values: list[float | None]) -> Cell:
+def _fill_places(column: Column, values: list[float | None]) -> Cell:
     """Fill the places of a column, those of absent values and of absent motions with what is missing."""
     filled = [column.missing if value is None else value for value in values]
     return tuple(filled + [column.missing] * (MOST_FOUND - len(filled)))  # type: ignore[arg-type]

@@ -58,7 +58,7 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
     return tuple(start + step * k for k in range(math.floor(steps * (1.0 + WHOLE) + WHOLE) + 1))
 
 
-def listed(given: object) -> object:
+def expand_ranges(given: object) -> object:
     """Replace tables with start, stop and step by their values; anything else is left to its validator."""
     match given:
         case {
@@ -73,7 +73,7 @@ def listed(given: object) -> object:
                 f"a range from {start!r} to {stop!r} in steps of {step!r} is not allowed: give three numbers"
             )
         case list() | tuple():
-            return _flattened(given)
+            return _flatten(given)
         case _:
             return given
 
@@ -88,10 +88,10 @@ def _number(given: float) -> float:
         ) from error
 
 
-def _flattened(given: list[object] | tuple[object, ...]) -> object:
+def _flatten(given: list[object] | tuple[object, ...]) -> object:
     values: list[object] = []
     for each in given:
-        match listed(each):
+        match expand_ranges(each):
             case tuple() as some:
                 values.extend(some)
             case one:
@@ -143,7 +143,7 @@ def _ascending(values: Numbers) -> Numbers:
 
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
-Frequencies = Annotated[Positive, BeforeValidator(listed)]
+Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
 _PER = {"%": 0.01, "min": 60.0, "h": 3600.0, "ms": 1e-3, "s": 1.0}
 """Units of an error and of a time, longest word first where one ends another."""
@@ -178,20 +178,20 @@ StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.S
 
 
 def _own_law(said: dict[str, Any]) -> tuple[str, ...]:
-    return (_described(said).contact,)
+    return (_described_specimen(said).contact,)
 
 
 def _own_damping(said: dict[str, Any]) -> tuple[float, ...] | None:
-    own_s = _described(said).damping_time_s
+    own_s = _described_specimen(said).damping_time_s
     return None if own_s is None else (own_s,)
 
 
 def _own_gap(said: dict[str, Any]) -> tuple[float, ...] | None:
-    own_m = _described(said).gap_m
+    own_m = _described_specimen(said).gap_m
     return (own_m,) if isinstance(own_m, float) else None
 
 
-def _described(said: dict[str, Any]) -> SpecimenTable:
+def _described_specimen(said: dict[str, Any]) -> SpecimenTable:
     """Return the specimen of a study that is being read; the usual one where its own is not allowed."""
     found: SpecimenTable = said.get("specimen") or usual_specimen()
     return found
