@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from ..signals.arrays import Reals
 from ..tables import Labelled, plus_minus, unit_of
-from ._estimation import Estimate, estimate, looked_for, search_start
+from ._estimation import Estimate, estimate, search_start, searched_parameters
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
 from ._parameters import NEAR, PRIOR_SD, SEARCHES, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
@@ -135,7 +135,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
-        refined = _refine(described, motion, described, looked_for(described, NEAR))
+        refined = _refine(described, motion, described, searched_parameters(described, NEAR))
         if isinstance(refined, FoundSpecimen):
             return refined
     stretches = _stretches(motion)
@@ -299,7 +299,7 @@ def _parameter(what: Hidden, value: float, half: float, described: float, *, is_
 
 
 def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
-    nan, wanted = float("nan"), looked_for(described, PRIOR_SD)
+    nan, wanted = float("nan"), searched_parameters(described, PRIOR_SD)
     parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(described, each), why) for each in wanted)
     return FoundSpecimen(described, parameters, 0, searched)
 

@@ -23,8 +23,8 @@ from ..kinds.analysis_kind import AnyResult, Result
 from ..recordings.channels import RecordedChannels, Stretch
 from ..recordings.facts import RecordingFacts, plan_of, recording_facts
 from ..uncertainty.budget import COVERAGE, RESULT_PATTERNS, Budget, Cause
+from .campaign_results import budgets_of
 from .measurement_analysis import CONTRADICTIONS
-from .summary import budgets_of
 
 PATIENCE_S = 20.0
 """How long the file may take to hold the samples of a look [s]."""

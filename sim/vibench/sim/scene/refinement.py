@@ -22,7 +22,7 @@ from .followed_run import (
     FollowedRun,
     ObservedWindow,
     Stretch,
-    follow_strobed,
+    follow_with_section,
     states_of,
     whole_periods,
     window_of,
@@ -216,7 +216,7 @@ class _Refinement:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
                 return None
             spent_s, began_s = run.cost_s, time.thread_time()
-            parts.append(follow_strobed(run, min(until_s, run.time_s + self._part_s), watch))
+            parts.append(follow_with_section(run, min(until_s, run.time_s + self._part_s), watch))
             if run.outcome is not Outcome.REACHED_END:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
