@@ -61,11 +61,8 @@ def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
     given = dict(zip(split[::2], split[1::2], strict=False))
     if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
         return None
-    level, reason, pid = (
-        given.get("--level", "ramp"),
-        given.get("--reason", "vibench stop"),
-        given.get("--pid"),
-    )
+    level, reason = given.get("--level", "ramp"), given.get("--reason", "vibench stop")
+    pid = given.get("--pid")
     is_plain = level in LEVELS and reason and (pid is None or pid.isdecimal())
     return (level, reason, pid or "") if is_plain else None
 

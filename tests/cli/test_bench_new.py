@@ -1,9 +1,9 @@
 """`vibench bench new`: the configuration that it writes, the page that it keeps, and what it refuses."""
 
-import errno
 import re
 import shlex
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -171,23 +171,18 @@ def test_a_number_that_nothing_can_be_computed_with_is_asked_again(tmp_path):
     assert "amplifier.gain_db" in wrong[0]
 
 
-def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path, monkeypatch):
+@pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
+def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path):
     """A full disk; begin again would find the name taken."""
+    import resource
 
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    real = Path.open
-
-    def opened(self, *given, **named):
-        file = real(self, *given, **named)
-        if "x" in given:
-            monkeypatch.setattr(file, "write", full)
-        return file
-
-    monkeypatch.setattr(Path, "open", opened)
-    with pytest.raises(ConfigurationError, match="No space left"):
-        configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
+    try:
+        with pytest.raises(ConfigurationError, match="File too large"):
+            configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
 
 

@@ -36,6 +36,7 @@ from vibench.sim import toml_table
 from vibench.sim.operating_system.this import replace_file
 
 from .output import console, paragraph
+from .paths import unused
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
@@ -168,7 +169,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     console.print(f"written: {target}")
     console.print()
     page = _day(rig, target, operator, given)
-    kept = _free(target.with_suffix(".first_day.md"))
+    kept = unused(target.with_suffix(".first_day.md"))
     with replace_file(kept) as coming:
         coming.write_text(page.text, encoding="utf-8")
     console.print(paragraph(page.text))
@@ -181,9 +182,3 @@ def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPag
     wired, switch = partial(_wired_at_terminal, target) if given is None else given.wired, StopSwitch()
     with open_bench(rig, confirm) as bench, stop_on_signal(switch, "bench new"):
         return first_day(bench, target, operator, wired, switch)
-
-
-def _free(path: Path) -> Path:
-    """Return the path, or the next of its name that nothing has."""
-    names = (path.with_name(f"{path.stem}_{number}{path.suffix}") for number in range(2, 1000))
-    return path if not path.exists() else next(name for name in names if not name.exists())

@@ -17,7 +17,7 @@ from vibench.acquisition import MissingLibrary, built_site, documentation_page, 
 from .exit_code import ExitCode
 from .options import option
 from .output import console, print_json
-from .paths import AsJson, copy_file, room_for_folder
+from .paths import AsJson, room_for_folder
 
 NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
@@ -73,5 +73,4 @@ def build(target: Path, extent: str) -> None:
         )
         if ended.returncode != 0:
             raise typer.Exit(ExitCode.FAILED)
-        no_cache = shutil.ignore_patterns(".doctrees")
-        shutil.copytree(root / "site", target, ignore=no_cache, copy_function=copy_file, dirs_exist_ok=True)
+        shutil.copytree(root / "site", target, ignore=shutil.ignore_patterns(".doctrees"), dirs_exist_ok=True)

@@ -1,14 +1,16 @@
 """`vibench examples`: what comes with vibench, by name, and copies of it to change."""
 
+import shutil
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 from vibench.acquisition import ConfigurationError, shipped_folder
+from vibench.sim.operating_system.this import replace_file
 
 from .options import option
 from .output import console, print_json
-from .paths import AsJson, copy_file, room_for_folder
+from .paths import AsJson, room_for_folder
 
 FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
@@ -64,4 +66,5 @@ def copy_all(found: dict[str, list[Path]], target: Path) -> None:
         raise ConfigurationError(f"{standing} exists already; nothing was copied, give another folder")
     for path, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
-        copy_file(path, copy)
+        with replace_file(copy) as coming:
+            shutil.copyfile(path, coming)

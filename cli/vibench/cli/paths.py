@@ -1,13 +1,11 @@
 """Options that several commands share."""
 
-import shutil
 import tempfile
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vibench.acquisition import ConfigurationError, named
-from vibench.sim.operating_system.this import replace_file
 
 from .options import option
 
@@ -103,9 +101,3 @@ def unused(path: Path) -> Path:
         number += 1
         candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
     return candidate
-
-
-def copy_file(source: str | Path, target: str | Path) -> None:
-    """Copy a file; ``target`` is whole, or as it was."""
-    with replace_file(Path(target)) as coming:
-        shutil.copyfile(source, coming)

@@ -1,7 +1,5 @@
 """What can be done with a plot: by a key while it has the focus, and by its context menu; how it is saved."""
 
-import errno
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,13 +58,21 @@ def write_plot(plot: "Plot", path: Path) -> None:
     Raises OSError when something of that name is there, or the file cannot be written.
     """
     if path.exists():
-        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+        raise FileExistsError(0, "it exists already")
     memory = QBuffer()  # Qt does not report every error of a disk
     match path.suffix.lower():
         case ".csv":
             memory.setData(numbers_of(plot, ",").encode())
         case ".svg":
-            _draw_svg(plot, memory)
+            generator = QSvgGenerator()
+            generator.setOutputDevice(memory)
+            generator.setSize(plot.size())
+            generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
+            # With the usual resolution axes and curves would be shifted against each other.
+            generator.setResolution(plot.logicalDpiX())
+            painter = QPainter(generator)
+            plot.render(painter)
+            painter.end()
         case ending:
             if not plot.grab().save(memory, ending.removeprefix(".")):
                 raise OSError(0, "give an ending: .png, .svg or .csv")
@@ -86,15 +92,3 @@ def numbers_of(plot: "Plot", separator: str) -> str:
                 for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
             ]
     return "\n".join(rows) + "\n"
-
-
-def _draw_svg(plot: "Plot", memory: QBuffer) -> None:
-    generator = QSvgGenerator()
-    generator.setOutputDevice(memory)
-    generator.setSize(plot.size())
-    generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
-    # With the usual resolution axes and curves would be shifted against each other.
-    generator.setResolution(plot.logicalDpiX())
-    painter = QPainter(generator)
-    plot.render(painter)
-    painter.end()

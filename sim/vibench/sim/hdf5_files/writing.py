@@ -7,12 +7,13 @@ first error, which is raised when HDF5 has closed the file. A Ctrl-C in the midd
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
+from traceback import walk_stack
 from types import FrameType
-from typing import Literal
+from typing import Any, Literal
 
 import h5py
 
@@ -44,10 +45,7 @@ def open_hdf5_to_write(
     """Create (``x``) or change (``r+``) a file; raises OSError where the disk refuses any of it."""
     with _Disk(path, "x+" if mode == "x" else mode) as disk:
         try:
-            with (
-                _late_interrupts(disk),
-                h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file,
-            ):
+            with _interrupts(disk), h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
                 yield file
         finally:
             if disk.refusal is not None:
@@ -55,24 +53,18 @@ def open_hdf5_to_write(
 
 
 @contextmanager
-def _late_interrupts(disk: _Disk) -> Iterator[None]:
+def _interrupts(disk: _Disk) -> Iterator[None]:
     """Keep a KeyboardInterrupt of a signal as the refusal, and raise it at once only outside this module."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    found = {number: signal.getsignal(number) for number in signal.valid_signals()}
-    handlers: dict[int, Callable[[int, FrameType | None], object]] = {
-        number: handler for number, handler in found.items() if callable(handler)
-    }
+    is_reached = threading.current_thread() is threading.main_thread()
+    found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
+    handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         try:
             handlers[number](number, frame)
         except KeyboardInterrupt as interrupt:
             disk.refusal = disk.refusal or interrupt
-            while frame is not None and frame.f_code.co_filename != __file__:
-                frame = frame.f_back
-            if frame is None:
+            if all(each.f_code.co_filename != __file__ for each, _ in walk_stack(frame)):
                 raise
 
     for number in handlers:

@@ -92,7 +92,14 @@ def make_file(path: Path, plan: GridPlan) -> None:
 
     Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
     """
-    _claim_name(path)
+    try:
+        path.open("xb").close()  # two runs cannot both have the name
+    except FileExistsError:
+        raise StudyError(
+            f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
+        ) from None
+    except OSError as error:
+        raise StudyError(f"{path} cannot be created: {error.strerror}; choose another folder.") from error
     making = path.with_name(path.name + MAKING_SUFFIX)
     try:
         _require_room(path, plan)
@@ -103,27 +110,11 @@ def make_file(path: Path, plan: GridPlan) -> None:
         rename(making, path)
         sync_folder(path.parent)
     except BaseException as error:
-        _discard(making, path)
+        for each in (making, path):
+            each.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise StudyError(f"{path} cannot be created: {error}. Nothing was computed.") from error
         raise
-
-
-def _discard(*paths: Path) -> None:
-    for path in paths:
-        path.unlink(missing_ok=True)
-
-
-def _claim_name(path: Path) -> None:
-    """Take the name with an empty file, so that two runs cannot both have it."""
-    try:
-        path.open("xb").close()
-    except FileExistsError:
-        raise StudyError(
-            f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
-        ) from None
-    except OSError as error:
-        raise StudyError(f"{path} cannot be created: {error.strerror}; choose another folder.") from error
 
 
 def _require_room(path: Path, plan: GridPlan) -> None:
@@ -155,11 +146,17 @@ def _fill(file: h5py.File, plan: GridPlan) -> None:
     for column in plan.columns:
         dataset = _column(file, column, plan.grid.shape)
         if column.components > 1 and column.along not in last:
-            last[column.along] = _scale(file, _COMPONENTS.get(column.along) or _numbered_axis(column))
+            numbers = tuple(float(each) for each in range(column.components))
+            numbered = StudyAxis(column.along, numbers, "1", column.along)
+            last[column.along] = _scale(file, _COMPONENTS.get(column.along, numbered))
         along = [last[column.along]] if column.components > 1 else []
         for index, scale in enumerate([*scales, *along]):
             dataset.dims[index].attach_scale(scale)
-    _sessions(file)
+    sessions = file.create_group(layout.SESSIONS)
+    for text_column in layout.SESSION_COLUMNS:
+        kind = h5py.string_dtype("utf-8", text_column.width)
+        sessions.create_dataset(text_column.name, data=np.zeros(layout.MOST_SESSIONS, dtype=kind), dtype=kind)
+    sessions.create_dataset(layout.N_SESSIONS, data=np.zeros(1, dtype=layout.COUNTER_DTYPE))
 
 
 def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
@@ -174,11 +171,6 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
     _attach(dataset, {"long_name": axis.long_name})
     dataset.make_scale(axis.name)
     return dataset
-
-
-def _numbered_axis(column: Column) -> StudyAxis:
-    """Return the axis of a column whose components are numbered."""
-    return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
 
 
 def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -197,14 +189,6 @@ def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dat
         dataset.attrs["flag_values"] = np.arange(len(column.meanings), dtype=kind)
         _attach(dataset, {"flag_meanings": " ".join(column.meanings)})
     return dataset
-
-
-def _sessions(file: h5py.File) -> None:
-    group = file.create_group(layout.SESSIONS)
-    for column in layout.SESSION_COLUMNS:
-        kind = h5py.string_dtype("utf-8", column.width)
-        group.create_dataset(column.name, data=np.zeros(layout.MOST_SESSIONS, dtype=kind), dtype=kind)
-    group.create_dataset(layout.N_SESSIONS, data=np.zeros(1, dtype=layout.COUNTER_DTYPE))
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
