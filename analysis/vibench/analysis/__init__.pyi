@@ -71,4 +71,6 @@ from .uncertainty.expected import (
     Expected as Expected,
     expected_recorded_s as expected_recorded_s,
     expected_uncertainty as expected_uncertainty,
+    recorded_s as recorded_s,
 )
+from .uncertainty.time_budget import TimeShare as TimeShare, within as within

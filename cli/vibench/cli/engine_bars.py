@@ -74,9 +74,8 @@ class EngineBars:
         self._bars.update(self._whole, completed=run.campaign_elapsed_s, total=run.campaign_total_s)
         if self._one is not None:
             state = status.state if status.state != "running" else run.run_state
-            self._bars.update(
-                self._one, completed=run.elapsed_s, total=run.total_s, state=state.value.replace("_", " ")
-            )
+            text = state.value.replace("_", " ") + ("" if run.until is None else f"; {run.until.sentence}")
+            self._bars.update(self._one, completed=run.elapsed_s, total=run.total_s, state=text)
 
     def _row(self, row: RowStatus) -> None:
         if row.state in {"queued", "running"} or row.name in self._told:

@@ -1,5 +1,6 @@
 """`vibench measure`: carry out a campaign, one recording a measurement."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -50,7 +51,7 @@ from .output import console, errors, leave_output_to_json, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
-    from vibench.analysis import Expected
+    from vibench.analysis import Expected, TimeShare
 
 
 class Form(StrEnum):
@@ -61,16 +62,29 @@ class Form(StrEnum):
 
 
 def tell_estimate(
-    expected: CampaignEstimate, form: Form, known: Mapping[str, Sequence["Expected"]] = MappingProxyType({})
+    expected: CampaignEstimate,
+    form: Form,
+    known: Mapping[str, Sequence["Expected"]] = MappingProxyType({}),
+    shares: Sequence["TimeShare"] = (),
+    ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
     """Say how many recordings, how long and how large, whether the disk has room, and what they will tell."""
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
             told = {name: [each.to_dict() for each in found] for name, found in known.items()}
-            print_json(document | {"uncertainty": told})
+            ends = {name: {"expected_s": end, "longest_s": most} for name, (end, most) in ends_s.items()}
+            within = [asdict(each) for each in shares]
+            print_json(document | {"uncertainty": told, "until": ends, "within": within})
         case Form.TEXT:
+            for share in shares:
+                console.print(share.sentence)
             console.print(paragraph(estimate_text(expected)))
+            for name, (end_s, longest_s) in ends_s.items():
+                length = "an unknown time" if end_s is None else f"about {end_s:.3g} s"
+                console.print(
+                    f"{name}: records {length} until its results are known, at most {longest_s:.4g} s"
+                )
             for name, found in known.items():
                 for each in found:
                     console.print(f"{name}: {each.sentence}")
@@ -98,6 +112,24 @@ def estimate_text(expected: CampaignEstimate) -> str:
     if not expected.fits:
         lines.append("The disk may be full before the end: make room, or record elsewhere")
     return "\n".join(lines)
+
+
+def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | None, float]]:
+    """Predict for how long measurements with `until` record; give their longest times too [s]."""
+    waiting = [each for each in campaign.measurements if each.until is not None]
+    found = vibench.analysis.expected_recorded_s
+    return {each.name: (found(each, rig), vibench.analysis.recorded_s(each)) for each in waiting}
+
+
+def duration_s(text: str) -> float:
+    """Read a time like ``30min``, ``1.5 h`` or ``90 s`` [s]."""
+    found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*(s|min|h)\s*", text, re.ASCII)
+    seconds = float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2]] if found else 0.0
+    if not 0.0 < seconds < float("inf"):
+        raise typer.BadParameter(
+            f"{text!r} is no time above zero; give a number with s, min or h, like 30min"
+        )
+    return seconds
 
 
 NotifyCommand = Annotated[
@@ -147,6 +179,10 @@ def measure(
             name="--estimate",
         ),
     ] = False,
+    time_limit: Annotated[
+        str | None,
+        option("Distribute this time over measurements by what their until needs.", "TIME", name="--within"),
+    ] = None,
     as_json: AsJson = False,
     twin: Annotated[
         bool, option("Follow the hidden motion beside it; note when the specimen changes.")
@@ -159,11 +195,16 @@ def measure(
         leave_output_to_json()
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
     existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
+    shares: tuple[TimeShare, ...] = ()
+    if time_limit is not None:
+        plan, shares = vibench.analysis.within(plan, rig, duration_s(time_limit))
     known = expected_of(plan, rig) if only_estimate else {}
     tell_estimate(
         estimate_campaign(plan, rig, out, existing),
         Form.JSON if as_json and only_estimate else Form.TEXT,
         known,
+        shares,
+        expected_ends_s(plan, rig) if only_estimate else {},
     )
     if only_estimate:
         return

@@ -12,10 +12,9 @@ from vibench.acquisition.plan import (
     SteppedSine,
     StreamedNoise,
     Until,
-    UntilProgress,
     WhiteNoise,
 )
-from vibench.acquisition.recording import feedback_note
+from vibench.acquisition.recording import UntilNote, feedback_note
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.run.until import UntilWatch
 from vibench.acquisition.stopping.stop import Cause, StopRequest, StopSwitch
@@ -166,12 +165,12 @@ def test_the_recording_goes_on_when_the_analysis_has_died(rig, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("bounds", "said"),
     [
-        ({}, "not known yet of 1 %"),
-        ({"response_i": None}, "not known yet of 1 %"),
+        ({}, "not known of 1 %"),
+        ({"response_i": None}, "not known of 1 %"),
         ({"response_i": 0.02}, "about 12 s left"),
         ({"response_i": 0.5}, "not within 20 s"),
     ],
 )
 def test_the_time_left_follows_the_root_of_time(bounds, said):
-    progress = UntilProgress(wishes={"response_i": 0.01}, bounds=bounds, looked_s=4.0, longest_s=20.0)
+    progress = UntilNote(stretch=1, wishes={"response_i": 0.01}, bounds=bounds, looked_s=4.0, longest_s=20.0)
     assert said in progress.sentence

@@ -156,7 +156,8 @@ class StatusLine(ClosedOnLeaving):
         self._where = f"{stand.number}/{stand.count} {stand.name}"
         if monotonic() - self._written >= LINE_EVERY_S:
             state = run.state.value.replace("_", " ")
-            self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s")
+            known = "" if run.until is None else f"; {run.until.sentence}"
+            self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s{known}")
 
     def close(self) -> None:
         """Let the last lines be written. Legal at any time."""

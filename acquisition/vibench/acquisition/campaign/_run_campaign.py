@@ -415,7 +415,7 @@ class CampaignEstimate:
     free_bytes: int
     """On the disk of the folder, now."""
     searching: int = 0
-    """How many of the recordings end sooner where their feedback needs less than its longest searches."""
+    """How many of the recordings may end sooner: by their feedback, or when their results are known."""
 
     @property
     def needed_bytes(self) -> int:
@@ -461,7 +461,9 @@ def estimate_campaign(
         largest_bytes=round(max(durations_s, default=0.0) * bytes_per_s),
         total_bytes=round(sum(durations_s) * bytes_per_s * WRITTEN_SHARE),
         free_bytes=shutil.disk_usage(_existing_part(folder)).free,
-        searching=sum(isinstance(each.excitation, AbstractFeedback) for each in missing),
+        searching=sum(
+            isinstance(each.excitation, AbstractFeedback) or each.until is not None for each in missing
+        ),
     )
 
 

@@ -303,6 +303,7 @@ class PublishedState:
             amplitude_vpp=run.amplitude_vpp,
             frequency_hz=run.frequency_hz,
             plan=self._plans.get(progress.name, ""),
+            until=run.until,
         )
 
     def _look_at_disk(self) -> None:

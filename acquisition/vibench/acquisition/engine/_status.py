@@ -9,6 +9,7 @@ from enum import StrEnum
 from ..bench.result import BenchReport
 from ..host.toml_file import FrozenModel
 from ..plan import RunState
+from ..recording import UntilNote
 
 
 class EngineState(StrEnum):
@@ -133,6 +134,8 @@ class RunStatus(FrozenModel):
     frequency_hz: float | None
     plan: str = ""
     """What is played, in words: kind and highest level."""
+    until: UntilNote | None = None
+    """How well results are known, of a measurement that lasts until they are."""
 
 
 class ChannelLevel(FrozenModel):

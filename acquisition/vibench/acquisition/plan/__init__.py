@@ -89,7 +89,7 @@ from ._sweep import (
     RangeSpacing,
     SweepAxis,
 )
-from ._until import FEWEST_REALISATIONS, LOOK_FACTOR, Until, UntilProgress
+from ._until import FEWEST_REALISATIONS, LOOK_FACTOR, Until
 
 __all__ = [
     "BYTES_PER_SAMPLE",
@@ -146,7 +146,6 @@ __all__ = [
     "StreamedNoise",
     "SweepAxis",
     "Until",
-    "UntilProgress",
     "WhiteNoise",
     "base_motion",
     "check_amplitude_vpp",

@@ -1,9 +1,9 @@
-"""Recording until a result is known well enough: what is wanted, and how far a recording has come."""
+"""Recording until a result is known well enough: what a plan wants to know, and when to look."""
 
 import re
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import BeforeValidator, Field, PositiveFloat, model_validator
 
 from ..host.toml_file import FrozenModel
 
@@ -60,51 +60,3 @@ class Until(FrozenModel):
 
 WISHES = ("resonance_hz", "transmissibility", "response_i", "response_ii")
 """Results that a plan may name."""
-
-
-class UntilProgress(FrozenModel):
-    """How well results are known so far."""
-
-    wishes: dict[str, PositiveFloat]
-    """Wanted bounds of 95 %, relative, by result."""
-    bounds: dict[str, NonNegativeFloat | None] = Field(default_factory=dict)
-    """Bounds at the last look; None where none can be stated yet. Empty before the first look."""
-    looked_s: NonNegativeFloat = 0.0
-    """Recorded at the last look [s]."""
-    longest_s: PositiveFloat
-    """Recorded time at which the recording ends anyway [s]."""
-    looks: int = 0
-    is_reached: bool = False
-    hindrance: str = ""
-    """Why nothing can be stated; empty otherwise."""
-    stretch: PositiveInt = 1
-    """Number of the step; 1 where there is one stretch."""
-
-    @property
-    def needed_s(self) -> float | None:
-        """Recorded time that the wishes need, as scatter falls with the root of time [s]; None if unknown."""
-        found = [(self.bounds.get(name), wish) for name, wish in self.wishes.items()]
-        shares = [bound / wish for bound, wish in found if bound is not None]
-        if self.is_reached or len(shares) < len(found):
-            return self.looked_s if self.is_reached else None
-        return self.looked_s * max(1.0, *shares) ** 2
-
-    @property
-    def sentence(self) -> str:
-        """Bounds, targets and the time left in words."""
-        parts = []
-        for name, wish in self.wishes.items():
-            bound = self.bounds.get(name)
-            known = "not known yet" if bound is None else f"± {100 * bound:.2g} %"
-            parts.append(f"{name} {known} of {100 * wish:.2g} %")
-        said = ", ".join(parts)
-        if self.hindrance:
-            return f"{said} ({self.hindrance})"
-        if self.is_reached:
-            return f"{said}: reached"
-        needed_s = self.needed_s
-        if needed_s is None:
-            return said
-        if needed_s > self.longest_s:
-            return f"{said}, not within {self.longest_s:.3g} s"
-        return f"{said}, about {needed_s - self.looked_s:.3g} s left"

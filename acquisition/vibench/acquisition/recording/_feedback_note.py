@@ -6,6 +6,7 @@ is short, so that notes of the first version name no version.
 
 import json
 from enum import StrEnum
+from math import inf, isfinite
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -313,31 +314,56 @@ class BranchEndNote(AbstractNote):
 
 
 class UntilNote(AbstractNote):
-    """How a stretch ended that was recorded until its results were known well enough."""
+    """How well results are known of a stretch that is recorded until they are, now or when it ended."""
 
     kind: Literal["until"] = "until"
     stretch: int
     """Number of the step; 1 where there is one stretch."""
-    is_reached: bool
-    """False where it ended at its longest time."""
-    recorded_s: SixFigures
-    looked_s: SixFigures
-    """Recorded at the last look; 0 if there was none."""
-    looks: int
-    bounds: dict[str, SixFigures | None]
-    """Of 95 % at the last look, relative, by result; None where none could be stated."""
+    wishes: dict[str, SixFigures]
+    """Wanted bounds of 95 %, relative, by result."""
+    longest_s: SixFigures
+    """Recorded time at which it ends anyway [s]."""
+    bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
+    """Bounds of 95 % at the last look; None where none could be stated, empty before the first look."""
+    looked_s: SixFigures = 0.0
+    """Recorded at the last look [s]."""
+    looks: int = 0
     hindrance: str = ""
+    """Why nothing could be stated; empty otherwise."""
+    recorded_s: SixFigures | None = None
+    """Recorded in all; None while it is recorded [s]."""
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Bound over wish of each result; infinite where no bound is known."""
+        found = {name: inf if bound is None else bound for name, bound in self.bounds.items()}
+        return tuple(found.get(name, inf) / wish for name, wish in self.wishes.items())
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether every wish is met."""
+        return max(self.shares) <= 1.0
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
-        known = ", ".join(
-            f"{name} " + ("not determined" if bound is None else f"± {100 * bound:.2g} %")
-            for name, bound in self.bounds.items()
+        """Bounds, wishes, and the time left or what was recorded, in words."""
+        said = ", ".join(
+            f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} of {100 * wish:.2g} %"
+            for name, wish in self.wishes.items()
+            for bound in (self.bounds.get(name),)
         )
-        end = "known well enough" if self.is_reached else "longest time"
-        why = f" ({self.hindrance})" if self.hindrance else ""
-        return f"{end} after {self.recorded_s:.4g} s: {known or 'no look'}{why}"
+        # Scatter falls with the root of time.
+        needed_s = self.looked_s * max(self.shares) ** 2 if self.bounds else inf
+        if self.recorded_s is not None:
+            end = "known well enough" if self.is_reached else "longest time"
+            said = f"{end} after {self.recorded_s:.4g} s: {said}"
+        elif self.is_reached:
+            said = f"{said}: reached"
+        elif needed_s <= self.longest_s:
+            said = f"{said}, about {needed_s - self.looked_s:.3g} s left"
+        elif isfinite(needed_s):
+            said = f"{said}, not within {self.longest_s:.3g} s"
+        return f"{said} ({self.hindrance})" if self.hindrance else said
 
 
 FeedbackNote: TypeAlias = (

@@ -7,8 +7,8 @@ from pathlib import Path
 from ..errors import AcquisitionError, DataLost, DriveLate, InstrumentError, LimitExceeded, RecordingError
 from ..excitation.steps import Segment
 from ..instruments import Block, Digitizer
-from ..plan import RunState, UntilProgress
-from ..recording import RecordingState, RecordingWriter
+from ..plan import RunState
+from ..recording import RecordingState, RecordingWriter, UntilNote
 from ..stopping.stop import Cause
 from .silence_watch import DriveGuard
 
@@ -29,7 +29,7 @@ class Progress:
     """Setting of the generator, peak to peak [V]; 0 while its output is off."""
     frequency_hz: float | None = None
     """Of the sine that is played; None for anything else."""
-    until: UntilProgress | None = None
+    until: UntilNote | None = None
     """How well results are known, of a recording that lasts until they are."""
 
 

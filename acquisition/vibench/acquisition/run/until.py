@@ -18,7 +18,6 @@ from ..plan import (
     Phase,
     RunState,
     Until,
-    UntilProgress,
     phases,
 )
 from ..recording import UntilNote
@@ -26,6 +25,8 @@ from ..stopping.stop import StopSwitch
 
 PIECE_S = 0.5
 """Time between two questions whether to go on [s]; a realisation of noise is always recorded whole."""
+LONGEST_HINDRANCE = 120
+"""Characters: an event's text is short."""
 _ENDING_S = 2.0
 _READY_S = 60.0
 """How long the analysis may take to start [s]; the recording is made anyway, and looks come when they can."""
@@ -64,15 +65,15 @@ class UntilWatch(ClosedOnLeaving):
         self._longest_s = sum(steps) if excitation.stretches > 1 else max(steps)
         self._stretch = 0
         self._recorded_s = self._due_s = 0.0
-        self._begun: UntilProgress | None = None
+        self._begun: UntilNote | None = None
         """Of the stretch that is recorded, before its first look."""
-        self._found: UntilProgress | None = None
+        self._found: UntilNote | None = None
         """Of the last look, which may belong to the stretch before; written by the thread, as a whole."""
         self.ended: list[UntilNote] = []
         """How each stretch ended; emptied by the run, which notes them in the recording."""
 
     @property
-    def progress(self) -> UntilProgress | None:
+    def progress(self) -> UntilNote | None:
         """Give the newest of the stretch that is recorded; None between stretches."""
         begun, found = self._begun, self._found
         is_newer = begun is not None and found is not None and found.stretch == begun.stretch
@@ -124,23 +125,12 @@ class UntilWatch(ClosedOnLeaving):
     def _begin(self, first_s: float) -> None:
         self._stretch += 1
         self._recorded_s, self._due_s = 0.0, first_s
-        self._begun = UntilProgress(
-            wishes=self._until.wishes, longest_s=self._longest_s, stretch=self._stretch
-        )
+        wishes = self._until.wishes
+        self._begun = UntilNote(wishes=wishes, longest_s=self._longest_s, stretch=self._stretch)
 
     def _end(self) -> None:
         if (progress := self.progress) is not None:
-            self.ended.append(
-                UntilNote(
-                    stretch=progress.stretch,
-                    is_reached=progress.is_reached,
-                    recorded_s=self._recorded_s,
-                    looked_s=progress.looked_s,
-                    looks=progress.looks,
-                    bounds=dict(progress.bounds),
-                    hindrance=progress.hindrance[:120],
-                )
-            )
+            self.ended.append(progress.model_copy(update={"recorded_s": self._recorded_s}))
             self._begun = None
 
     def _recorded(self, duration_s: float) -> None:
@@ -153,7 +143,7 @@ class UntilWatch(ClosedOnLeaving):
             self._due_s *= LOOK_FACTOR
         self._beside.do(lambda: self._look(asked, recorded_s))
 
-    def _look(self, asked: UntilProgress, recorded_s: float) -> None:
+    def _look(self, asked: UntilNote, recorded_s: float) -> None:
         """Have the file analysed up to a time of the stretch; in the thread beside the run."""
         bounds: dict[str, float | None] = {}
         try:
@@ -166,14 +156,12 @@ class UntilWatch(ClosedOnLeaving):
             hindrance = str(answer["hindrance"])
         except (OSError, ValueError, KeyError, AttributeError):
             hindrance = "the analysis beside the run has ended"
-        known = [(bounds.get(name), wish) for name, wish in asked.wishes.items()]
         self._found = asked.model_copy(
             update={
                 "bounds": bounds,
                 "looked_s": recorded_s,
                 "looks": asked.looks + 1,
-                "is_reached": all(bound is not None and bound <= wish for bound, wish in known),
-                "hindrance": hindrance,
+                "hindrance": hindrance[:LONGEST_HINDRANCE],
             }
         )
 

@@ -1,7 +1,7 @@
 """What a plan will be able to tell: uncertainty over recording time, before anything moves."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -222,36 +222,71 @@ MOST_STEPS = 6
 """Of which the end is predicted; the others are taken to last as long on average."""
 
 
+def recorded_s(measurement: Measurement) -> float:
+    """Return the planned time of all that is recorded [s]."""
+    return float(sum(each.record_s for each in measurement.excitation.steps()))
+
+
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
     """Predict for how long a measurement with `until` will record, all stretches together [s].
 
-    The scatter of `expected_uncertainty` falls with the root of time, and a recording ends at a look. None
-    where that scatter is not known, or without `until`.
+    It ends at a look, and at its planned time at the latest. None where the scatter is not known beforehand,
+    or without `until`.
     """
+    found = [
+        None if need is None else end_s(need, first_s, longest_s)
+        for need, first_s, longest_s in _stretches(measurement, rig)
+    ]
+    return _in_all(measurement, found)
+
+
+def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
+    """Predict after which recorded time all wishes are met, all stretches together [s].
+
+    None where it is not known, or no time is long enough.
+    """
+    found = [None if need is None else max(need, first) for need, first, _ in _stretches(measurement, rig)]
+    needed_s = _in_all(measurement, found)
+    return needed_s if needed_s is not None and np.isfinite(needed_s) else None
+
+
+def _in_all(measurement: Measurement, found: Sequence[float | None]) -> float | None:
+    known = [each for each in found if each is not None]
+    if not known or len(known) < len(found):
+        return None
+    count = sum(1 for _ in measurement.excitation.steps()) if _has_steps(measurement) else 1
+    return count * float(np.mean(known))
+
+
+def _has_steps(measurement: Measurement) -> bool:
+    return isinstance(measurement.excitation, SteppedSine)
+
+
+def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
+    """Give the time that wishes need, the first look and the planned time [s], of some stretches."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
-        return None
+        return
     steps = list(excitation.steps())
-    if not isinstance(excitation, SteppedSine):
-        first_s = until.shortest_s
-        if excitation.period_points is not None:
-            first_s = FEWEST_REALISATIONS * steps[0].record_s
-        return end_s(expected_uncertainty(measurement, rig), until, first_s, sum(s.record_s for s in steps))
-    tones = [float(step.segment.numbers["frequency_hz"]) for step in steps]
-    ends_s = []
-    for at_hz in tones[:: -(-len(tones) // MOST_STEPS)]:
+    if not _has_steps(measurement):
+        is_repeated = excitation.period_points is not None
+        first_s = FEWEST_REALISATIONS * steps[0].record_s if is_repeated else until.shortest_s
+        need = needed_s(expected_uncertainty(measurement, rig), until)
+        yield need, first_s, recorded_s(measurement)
+        return
+    for step in steps[:: -(-len(steps) // MOST_STEPS)]:
         dwell = Dwell(
-            amplitude_vpp=excitation.amplitude_vpp, frequency_hz=at_hz, duration_s=excitation.record_s
+            amplitude_vpp=excitation.amplitude_vpp,
+            frequency_hz=float(step.segment.numbers["frequency_hz"]),
+            duration_s=step.record_s,
         )
         alone = measurement.model_copy(update={"excitation": dwell})
-        ends_s.append(end_s(expected_uncertainty(alone, rig), until, until.shortest_s, excitation.record_s))
-    known_s = [each for each in ends_s if each is not None]
-    return len(tones) * float(np.mean(known_s)) if len(known_s) == len(ends_s) else None
+        yield needed_s(expected_uncertainty(alone, rig), until), until.shortest_s, step.record_s
 
 
-def end_s(expected: tuple[Expected, ...], until: Until, first_s: float, longest_s: float) -> float | None:
-    """Predict at which look a stretch of at most ``longest_s`` ends [s]; None where scatter is not known."""
-    needed_s = first_s
+def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
+    """Return the recorded time after which expected bounds meet the wishes [s]; None if not known."""
+    needs = []
     for name, wish in until.wishes.items():
         found = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
         if not found:
@@ -260,11 +295,16 @@ def end_s(expected: tuple[Expected, ...], until: Until, first_s: float, longest_
             if each.scatter is None:
                 return None
             # A scatter of 0 does not fall with time: it is that of a maximum, which `lasting` holds.
-            bound = COVERAGE * WIDENING * (each.scatter or each.lasting)
-            falls = bound / wish if each.scatter else float(np.inf if bound > wish else 0.0)
-            needed_s = max(needed_s, each.time_s * falls**2)
-    looks = max(0, int(np.ceil(np.log(min(needed_s, longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)))
-    return float(min(first_s * LOOK_FACTOR**looks, longest_s))
+            share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
+            fixed = float(np.inf) if share > 1.0 else 0.0
+            needs.append(each.time_s * share**2 if each.scatter else fixed)
+    return max(needs)
+
+
+def end_s(need_s: float, first_s: float, longest_s: float) -> float:
+    """Return the time of the look at which a need is met, and the longest at most [s]."""
+    looks = np.ceil(np.log(min(max(need_s, first_s), longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)
+    return float(min(first_s * LOOK_FACTOR ** max(0.0, looks), longest_s))
 
 
 def until_checks(facts: RecordingFacts) -> Iterator[Check]:

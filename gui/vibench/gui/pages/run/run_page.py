@@ -225,8 +225,8 @@ class WatchCard(QGroupBox):
 
 
 def _progress_text(run: RunStatus) -> str:
-    left = clock(run.total_s - run.elapsed_s)
-    return f"{run.run_state.value.replace('_', ' ')}, {left} left"
+    left = f"{run.run_state.value.replace('_', ' ')}, {clock(run.total_s - run.elapsed_s)} left"
+    return left if run.until is None else f"{left} at most; {run.until.sentence}"
 
 
 _HINTS = {

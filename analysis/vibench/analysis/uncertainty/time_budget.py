@@ -1,0 +1,103 @@
+"""Time for a whole campaign, distributed over measurements by how long each needs to meet its wishes."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+from pydantic import ValidationError
+
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.plan import Campaign, Excitation, Measurement, measured_s
+from vibench.acquisition.rig import Rig
+from vibench.sim import fault_in_words
+
+from .expected import recorded_s, time_to_wishes_s
+
+
+@dataclass(frozen=True)
+class TimeShare:
+    """Recording time of one measurement."""
+
+    name: str
+    planned_s: float
+    """As the campaign states it [s]."""
+    needed_s: float | None
+    """Until its wishes are met, as predicted [s]; None without wishes, or where they cannot be predicted."""
+    allotted_s: float
+    """As it is going to be recorded at most [s]."""
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        needed = "as planned" if self.needed_s is None else f"needs about {self.needed_s:.3g} s"
+        return f"{self.name}: at most {self.allotted_s:.4g} s of recording ({needed})"
+
+
+def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
+    """Return the campaign with recording times that fill a time, and the share of each measurement.
+
+    What a measurement needs is the time after which `expected_uncertainty` meets its `until`; time beyond the
+    sum of all needs is distributed in their proportion. Sweeps, and measurements without a prediction, keep
+    their times.
+
+    Raises
+    ------
+    ConfigurationError
+        When no measurement has wishes that can be predicted, or the time is too short for all wishes.
+
+    """
+    needs = {each.name: time_to_wishes_s(each, rig) for each in campaign.measurements}
+    mine = [each for each in campaign.measurements if needs[each.name] is not None]
+    if not mine:
+        raise ConfigurationError(
+            f"{campaign.name} has no measurement with until whose time can be predicted, so no time can be "
+            "distributed. Nothing was played; add until to a measurement, or leave --within out"
+        )
+    variable_s = sum(each.repeats * _cost(each) * recorded_s(each) for each in mine)
+    needed_s = sum(each.repeats * _cost(each) * (needs[each.name] or 0.0) for each in mine)
+    fixed_s = campaign.duration_s - variable_s
+    if available_s < fixed_s + needed_s:
+        left_s = available_s - fixed_s
+        most = (
+            f"in this time bounds would be {sqrt(needed_s / left_s):.2g} times as wide as wished"
+            if left_s > 0
+            else "ramps, settling and what has no wish take longer"
+        )
+        raise ConfigurationError(
+            f"{available_s:g} s are too short for {campaign.name}, whose wishes need about "
+            f"{fixed_s + needed_s:.0f} s: {most}. Nothing was played; give more time or wider bounds"
+        )
+    factor = (available_s - fixed_s) / needed_s
+    changed = []
+    for each in campaign.measurements:
+        need = needs[each.name]
+        changed.append(each if need is None else _lasting(each, factor * need))
+    shares = tuple(
+        TimeShare(old.name, recorded_s(old), needs[old.name], recorded_s(new))
+        for old, new in zip(campaign.measurements, changed, strict=True)
+    )
+    return campaign.model_copy(update={"measurements": tuple(changed)}), shares
+
+
+def _cost(measurement: Measurement) -> float:
+    """Time on the rig per recorded time: each realisation of noise has ramps and a wait of its own."""
+    has_many = measurement.excitation.stretches > 1
+    return measured_s(measurement) / recorded_s(measurement) if has_many else 1.0
+
+
+def _lasting(measurement: Measurement, time_s: float) -> Measurement:
+    """Return the measurement with another recording time, in whole realisations."""
+    excitation: Excitation = measurement.excitation
+    share = time_s / recorded_s(measurement)
+    longer = {
+        name: max(1, int(share * value + 1e-9)) if isinstance(value, int) else share * value
+        for name in ("duration_s", "record_s", "realisations")
+        if (value := getattr(excitation, name, None)) is not None
+    }
+    document = measurement.model_dump() | {"excitation": excitation.model_dump() | longer}
+    try:
+        return Measurement.model_validate(document)
+    except ValidationError as error:
+        raise ConfigurationError(
+            f"{measurement.name} would be recorded for {time_s:.4g} s, which its kind does not allow "
+            f"({fault_in_words(error.errors()[0])}). Nothing was played; give less time or wider bounds"
+        ) from error

@@ -1,0 +1,69 @@
+"""What a plan may wait for, and what is refused in a sentence."""
+
+import pytest
+from pydantic import ValidationError
+
+from vibench.acquisition.plan import Measurement
+
+BAND = {"amplitude_vpp": 0.1, "band_start_hz": 20, "band_stop_hz": 800}
+KINDS = {
+    "white_noise": BAND,
+    "odd_multisine": BAND,
+    "streamed_noise": BAND | {"duration_s": 60},
+    "dwell": {"amplitude_vpp": 0.1, "frequency_hz": 200, "duration_s": 60},
+    "stepped_sine": {"amplitude_vpp": 0.1, "frequencies_hz": [150, 160]},
+    "sine_sweep": {"amplitude_vpp": 0.1, "start_hz": 200, "stop_hz": 210, "duration_s": 60},
+    "stepped_level": {"amplitude_vpp": 0.2, "frequency_hz": 200, "lowest_vpp": 0.1, "step_vpp": 0.05},
+    "settled_sine": {"amplitude_vpp": 0.1, "frequencies_hz": [150, 160]},
+    "held_noise": BAND | {"spectrum": [{"frequency_hz": 20, "density": 0.01}]},
+}
+NOISE, SINE = {"resonance_hz", "transmissibility"}, {"response_i", "response_ii"}
+ALLOWED = {
+    "white_noise": NOISE,
+    "odd_multisine": NOISE,
+    "streamed_noise": NOISE,
+    "dwell": SINE,
+    "stepped_sine": SINE,
+}
+
+
+def plan(kind, until):
+    return Measurement.model_validate(
+        {"name": "a", "excitation": {"kind": kind, **KINDS[kind]}, "until": until}
+    )
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("name", sorted(NOISE | SINE))
+def test_each_kind_waits_for_its_own_results_alone(kind, name):
+    if name in ALLOWED.get(kind, set()):
+        assert plan(kind, {name: "1 %"}).until.wishes == {name: 0.01}
+        return
+    with pytest.raises(ValidationError, match=f"until names {name}, which {kind} does not wait for"):
+        plan(kind, {name: "1 %"})
+
+
+@pytest.mark.parametrize(("said", "meant"), [("0.1 %", 0.001), ("2%", 0.02), ("1e-3 %", 1e-5), (0.05, 0.05)])
+def test_a_bound_is_a_percentage_or_a_share(said, meant):
+    until = plan("dwell", {"response_i": said}).until
+    assert until.response_i == pytest.approx(meant)
+    assert type(until).model_validate_json(until.model_dump_json()) == until
+
+
+@pytest.mark.parametrize("said", ["1", "1.2.3 %", "-1 %", "0 %", "100 %", "nan %", True, 0, 1.5, "", "٣ %"])
+def test_what_is_no_bound_is_refused(said):
+    with pytest.raises(ValidationError):
+        plan("dwell", {"response_i": said})
+
+
+def test_until_without_a_wish_is_refused():
+    with pytest.raises(ValidationError, match="it names no result"):
+        plan("dwell", {"shortest_s": 3.0})
+
+
+def test_a_plan_of_before_has_no_until():
+    assert plan("dwell", None).until is None
+    assert (
+        Measurement.model_validate({"name": "a", "excitation": {"kind": "dwell", **KINDS["dwell"]}}).until
+        is None
+    )
