@@ -2,6 +2,7 @@
 
     python benchmarks/until_coverage.py --rule                           # the rule alone, on Gaussian records
     python benchmarks/until_coverage.py --count 60 --seed 1 --shard 1/2 --save part1.json
+    python benchmarks/until_coverage.py --synthetic --count 1000 --seed 1 --save synthetic.json
     python benchmarks/until_coverage.py --add part1.json part2.json        # the table of what shards kept
 
 The virtual rig makes one recording of each scene at its longest time, in simulated time and with noisier
@@ -18,11 +19,14 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from report_coverage import modes, peak
+from resonance_coverage import peak as largest, transmission
+from scipy.signal import lfilter
 from twin_agreement import random_rig
 
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
@@ -30,9 +34,12 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import FEWEST_REALISATIONS, LOOK_FACTOR, Dwell, Measurement, Until, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig, specimen_of
 from vibench.analysis import AnalysisError, Expected, budgets_of, expected_uncertainty
+from vibench.analysis.frequency_response.resonance import resonances
+from vibench.analysis.frequency_response.transmissibility import transmissibility
 from vibench.analysis.kinds.analysis_kind import AnyResult
 from vibench.analysis.recordings.facts import recording_facts
 from vibench.analysis.results.growing_bounds import bound_of, bounds_of, result_so_far
+from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.uncertainty.budget import COVERAGE, RESULT_PATTERNS, WIDENING
 from vibench.analysis.uncertainty.expected import end_s, needed_s
 from vibench.sim import base_transmissibility
@@ -242,6 +249,101 @@ def saving(found: list[Ended], row: tuple[str, str]) -> float:
     return 1 - used / fixed if fixed else float("nan")
 
 
+SYNTHETIC_HZ = 2048.0
+AT_HZ, RESPONSE, DAMPING = 160.0, 2.5, 0.01
+SYNTHETIC = {
+    "sine in noise": ("response_ii",),
+    "sine that wanders": ("response_ii",),
+    "streamed noise": ("resonance_hz", "transmissibility"),
+}
+
+
+def synthetic_record(kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Make drive, base and response, shape (3, samples), whose Response or resonance is known."""
+    samples = round((LONGEST_S + 2.0) * SYNTHETIC_HZ)
+    omega, time_s = 2 * np.pi * AT_HZ, np.arange(samples) / SYNTHETIC_HZ
+    if kind == "streamed noise":
+        drive = rng.standard_normal(samples)
+        lines_hz = np.fft.rfftfreq(samples, 1 / SYNTHETIC_HZ)
+        response = np.fft.irfft(np.fft.rfft(drive) * transmission(lines_hz, [(AT_HZ, DAMPING, 1.0)]), samples)
+        return np.stack([drive, drive, response + 0.3 * np.std(response) * rng.standard_normal(samples)])
+    wander = np.zeros(samples)
+    if kind == "sine that wanders":
+        # Amplitude and phase that a motion without period has: correlated for some twentieth of a second.
+        white = rng.standard_normal((2, samples))
+        smooth = lfilter([1.0], [1.0, -np.exp(-20.0 / SYNTHETIC_HZ)], white, axis=1)
+        smooth *= 0.15 / np.std(smooth)
+        wander = smooth[0] * np.sin(omega * time_s) + smooth[1] * np.cos(omega * time_s)
+    base = np.sin(omega * time_s)
+    velocity = (-np.cos(omega * time_s) * RESPONSE + RESPONSE * wander) / omega
+    size = RESPONSE / omega
+    noise = size * (0.5 if kind == "sine in noise" else 0.01) * rng.standard_normal(samples)
+    return np.stack([np.sin(omega * time_s), base, velocity + noise])
+
+
+def synthetic_results(kind: str, record: np.ndarray, time_s: float) -> dict[str, tuple[float, float]]:
+    """Analyse the beginning of a record: value and relative standard uncertainty of each result."""
+    if kind != "streamed noise":
+        data = record[:, : round((time_s + 2.0) * SYNTHETIC_HZ)]
+        found = dwell_response(*data, SYNTHETIC_HZ, near_hz=AT_HZ, window_s=time_s)
+        return {"response_ii": (found.response_ii, found.sd_response_ii / found.response_ii)}
+    drive, _, response = record[:, : round(time_s * SYNTHETIC_HZ)]
+    lines = transmissibility(
+        drive, response, SYNTHETIC_HZ, segment_samples=4096, window="hann", overlap=0.5,
+        estimator="drive", reference=drive,
+    )  # fmt: skip
+    for each in resonances(lines, low_hz=0.6 * AT_HZ, high_hz=1.4 * AT_HZ)[:1]:
+        return {
+            "resonance_hz": (each.frequency_hz, each.sd_frequency_hz / each.frequency_hz),
+            "transmissibility": (each.peak_magnitude, each.sd_peak_magnitude / each.peak_magnitude),
+        }
+    return {}
+
+
+def synthetic(number: int, seed: int) -> Iterator[Ended]:
+    """End one synthetic record by wishes that other records of its kind meet after several times."""
+    kind = tuple(SYNTHETIC)[number % len(SYNTHETIC)]
+    first_s = 8.0 if kind == "streamed noise" else 2.0
+    scatter = promised(kind)
+    rng = np.random.default_rng((seed, number))
+    record = synthetic_record(kind, rng)
+    looks = looks_s(first_s, LONGEST_S, PIECE_S)
+    told: dict[float, dict[str, tuple[float, float]]] = {}
+    true = {"response_ii": RESPONSE, "resonance_hz": AT_HZ, "transmissibility": shown_peak()}
+    for name in SYNTHETIC[kind]:
+        promise_s = first_s * (LONGEST_S / first_s) ** float(rng.uniform(0.05, 0.75))
+        factor = COVERAGE * WIDENING
+        wish = factor * scatter[name] * float(np.sqrt(LONGEST_S / promise_s))
+        for time_s in looks:
+            if time_s not in told:
+                told[time_s] = synthetic_results(kind, record, time_s)
+            value, sd = told[time_s].get(name, (np.nan, np.inf))
+            if factor * sd <= wish:
+                break
+        yield Ended(
+            scene=number, kind=kind, quantity=name, wish=wish, is_reached=bool(factor * sd <= wish),
+            stopped_s=time_s, longest_s=LONGEST_S, expected_s=end_s(promise_s, first_s, LONGEST_S),
+            value=float(value), bound=float(factor * sd), whole=float(value), true=true[name],
+        )  # fmt: skip
+
+
+@cache
+def shown_peak() -> float:
+    """Return the peak of the synthetic mode."""
+    return largest([(AT_HZ, DAMPING, 1.0)], AT_HZ, DAMPING)
+
+
+@cache
+def promised(kind: str) -> dict[str, float]:
+    """Return the scatter of whole records, from eight others: rms of their standard uncertainties."""
+    found = defaultdict(list)
+    for number in range(8):
+        record = synthetic_record(kind, np.random.default_rng((99, number)))
+        for name, (_, sd) in synthetic_results(kind, record, LONGEST_S).items():
+            found[name].append(sd)
+    return {name: float(np.sqrt(np.mean(np.square(sds)))) for name, sds in found.items()}
+
+
 def rule(runs: int, seed: int) -> Iterator[str]:
     """Give the coverage at the end of Gaussian records of ten parts, in the worst of all wishes."""
     rng = np.random.default_rng(seed)
@@ -274,6 +376,9 @@ def main() -> None:
     parser.add_argument("--save", type=Path, metavar="FILE.json", help="keep every end, and go on from it")
     parser.add_argument("--add", type=Path, nargs="+", metavar="FILE.json", help="count what shards kept")
     parser.add_argument("--rule", action="store_true", help="only the rule, on Gaussian records")
+    parser.add_argument(
+        "--synthetic", action="store_true", help="synthetic records in place of the virtual rig's: fast"
+    )
     asked = parser.parse_args()
     if asked.rule:
         print("\n".join(rule(20_000, asked.seed)))
@@ -287,7 +392,7 @@ def main() -> None:
         for number in range(part - 1, asked.count, of):
             if number in done:
                 continue
-            ends = list(scene(number, asked.seed))
+            ends = list((synthetic if asked.synthetic else scene)(number, asked.seed))
             found += ends
             if asked.save is not None:
                 with asked.save.open("a", encoding="utf-8") as file:
