@@ -312,7 +312,7 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
     notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
     if not notes:
         return
-    recorded_s = sum(each.recorded_s for each in notes)
+    time_s = sum(each.recorded_s or 0.0 for each in notes)
     try:
         expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
     except ValidationError:  # imported, or written by another version
@@ -320,7 +320,7 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
     said = "its time was not predictable" if expected_s is None else f"predicted were {expected_s:.3g} s"
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
     reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} stretches known well enough, {recorded_s:.4g} s in all; {said}"
+    text = f"{last}{reached} of {len(notes)} stretches known well enough, {time_s:.4g} s in all; {said}"
     yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
