@@ -31,7 +31,15 @@ from twin_agreement import random_rig
 
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import FEWEST_REALISATIONS, LOOK_FACTOR, Dwell, Measurement, Until, WhiteNoise
+from vibench.acquisition.plan import (
+    FEWEST_REALISATIONS,
+    LOOK_FACTOR,
+    Dwell,
+    Measurement,
+    RunState,
+    Until,
+    WhiteNoise,
+)
 from vibench.acquisition.rig import Rig, load_rig, specimen_of
 from vibench.analysis import AnalysisError, Expected, budgets_of, expected_uncertainty
 from vibench.analysis.frequency_response.resonance import resonances
@@ -141,7 +149,9 @@ def scene(number: int, seed: int) -> Iterator[Ended]:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
         with open_bench(rig) as bench:
-            run_measurement(bench, plan.model_copy(update={"until": None}), path)
+            outcome = run_measurement(bench, plan.model_copy(update={"until": None}), path)
+        if outcome.state is not RunState.FINISHED:  # a signal ends the recording softly; keep nothing of it
+            raise SystemExit(outcome.reason)
         with open_recording(path) as recording:
             facts = replace(recording_facts(recording), measurement=plan)
             for time_s in looks_s(first_s, LONGEST_S, piece_s):
