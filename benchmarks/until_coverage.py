@@ -137,6 +137,14 @@ def true_value(rig: Rig, plan: Measurement, quantity: str) -> float | None:
     return nearest_hz if "frequency" in quantity else peak(specimen, nearest_hz)
 
 
+def record(rig: Rig, plan: Measurement, path: Path) -> None:
+    """Record a plan at its longest time."""
+    with open_bench(rig) as bench:
+        outcome = run_measurement(bench, plan.model_copy(update={"until": None}), path)
+    if outcome.state is not RunState.FINISHED:  # a signal ends the recording softly; keep nothing of it
+        raise SystemExit(outcome.reason)
+
+
 def scene(number: int, seed: int) -> Iterator[Ended]:
     """Record once, and end that record by wishes of several sizes."""
     kind, rig, plan = drawn(number, seed)
@@ -148,10 +156,7 @@ def scene(number: int, seed: int) -> Iterator[Ended]:
     last: AnyResult | None = None
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
-        with open_bench(rig) as bench:
-            outcome = run_measurement(bench, plan.model_copy(update={"until": None}), path)
-        if outcome.state is not RunState.FINISHED:  # a signal ends the recording softly; keep nothing of it
-            raise SystemExit(outcome.reason)
+        record(rig, plan, path)
         with open_recording(path) as recording:
             facts = replace(recording_facts(recording), measurement=plan)
             for time_s in looks_s(first_s, LONGEST_S, piece_s):
