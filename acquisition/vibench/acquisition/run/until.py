@@ -63,6 +63,7 @@ class UntilWatch(ClosedOnLeaving):
         self._labels = excitation.result_labels
         steps = [each.record_s for each in excitation.steps()]
         self._longest_s = sum(steps) if excitation.stretches > 1 else max(steps)
+        self._greeting: list[str] = []
         self._stretch = 0
         self._recorded_s = self._due_s = 0.0
         self._begun: UntilNote | None = None
@@ -82,7 +83,7 @@ class UntilWatch(ClosedOnLeaving):
     def wait_until_ready(self, switch: StopSwitch) -> None:
         """Wait before anything plays until the process has loaded what it needs; a stop ends the wait."""
         give_up_s = monotonic() + _READY_S
-        self._beside.do(self._take_greeting)
+        self._beside.do(lambda: self._greeting.append(self._read_answer()))
         while self._beside.is_busy and switch.request is None and monotonic() < give_up_s:
             self._beside.wait(_ASK_S)
 
@@ -164,9 +165,6 @@ class UntilWatch(ClosedOnLeaving):
                 "hindrance": hindrance[:LONGEST_HINDRANCE],
             }
         )
-
-    def _take_greeting(self) -> None:
-        self._read_answer()
 
     def _read_answer(self) -> str:
         assert self._process.stdout is not None

@@ -71,19 +71,9 @@ def bound_of(budget: Budget) -> float | None:
 
 
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
-    """Analyse a recording up to a time of one of its stretches.
+    """Analyse a recording up to a time [s] of a stretch, which is the number of the step and else 1.
 
-    Raises AnalysisError when nothing in it is usable yet.
-
-    Parameters
-    ----------
-    recording, facts
-        Open, and what it states of plan and bench.
-    stretch
-        Number of the step, from 1; 1 where the excitation has one result.
-    recorded_s
-        Time of the stretch that is analysed [s]; realisations of noise are analysed as far as they are whole.
-
+    Realisations of noise are analysed as far as they are whole. Raises AnalysisError when nothing is usable.
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)

@@ -1,7 +1,7 @@
 """What a plan will be able to tell: uncertainty over recording time, before anything moves."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -233,11 +233,7 @@ def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
     It ends at a look, and at its planned time at the latest. None where the scatter is not known beforehand,
     or without `until`.
     """
-    found = [
-        None if need is None else end_s(need, first_s, longest_s)
-        for need, first_s, longest_s in _stretches(measurement, rig)
-    ]
-    return _in_all(measurement, found)
+    return _in_all(measurement, rig, end_s)
 
 
 def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
@@ -245,21 +241,21 @@ def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
 
     None where it is not known, or no time is long enough.
     """
-    found = [None if need is None else max(need, first) for need, first, _ in _stretches(measurement, rig)]
-    needed_s = _in_all(measurement, found)
+    needed_s = _in_all(measurement, rig, lambda need_s, first_s, _: max(need_s, first_s))
     return needed_s if needed_s is not None and np.isfinite(needed_s) else None
 
 
-def _in_all(measurement: Measurement, found: Sequence[float | None]) -> float | None:
-    known = [each for each in found if each is not None]
-    if not known or len(known) < len(found):
-        return None
-    count = sum(1 for _ in measurement.excitation.steps()) if _has_steps(measurement) else 1
-    return count * float(np.mean(known))
-
-
-def _has_steps(measurement: Measurement) -> bool:
-    return isinstance(measurement.excitation, SteppedSine)
+def _in_all(
+    measurement: Measurement, rig: Rig, time_s: Callable[[float, float, float], float]
+) -> float | None:
+    known: list[float] = []
+    for need_s, first_s, longest_s in _stretches(measurement, rig):
+        if need_s is None:
+            return None
+        known.append(time_s(need_s, first_s, longest_s))
+    steps = sum(1 for _ in measurement.excitation.steps())
+    count = steps if isinstance(measurement.excitation, SteppedSine) else 1
+    return count * float(np.mean(known)) if known else None
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
@@ -268,7 +264,7 @@ def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | Non
     if until is None:
         return
     steps = list(excitation.steps())
-    if not _has_steps(measurement):
+    if not isinstance(excitation, SteppedSine):
         is_repeated = excitation.period_points is not None
         first_s = FEWEST_REALISATIONS * steps[0].record_s if is_repeated else until.shortest_s
         need = needed_s(expected_uncertainty(measurement, rig), until)

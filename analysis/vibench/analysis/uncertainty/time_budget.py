@@ -67,10 +67,10 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
             f"{fixed_s + needed_s:.0f} s: {most}. Nothing was played; give more time or wider bounds"
         )
     factor = (available_s - fixed_s) / needed_s
-    changed = []
-    for each in campaign.measurements:
-        need = needs[each.name]
-        changed.append(each if need is None else _lasting(each, factor * need))
+    changed = [
+        each if (need := needs[each.name]) is None else _lasting(each, factor * need)
+        for each in campaign.measurements
+    ]
     shares = tuple(
         TimeShare(old.name, recorded_s(old), needs[old.name], recorded_s(new))
         for old, new in zip(campaign.measurements, changed, strict=True)
