@@ -120,18 +120,15 @@ class EnsembleCurve(Labelled):
     def limit(self) -> float:
         """Largest |z| that is still chance among the points compared.
 
-        That of normal values, or where the draws themselves lie further out among one another, that of
-        Gumbel's distribution of the largest |z| of each: chaos has longer tails than square roots cure.
+        That of normal values, or where the draws themselves lie further out among one another, that of one
+        more such draw: chaos has longer tails than square roots cure.
         """
         normal = z_limit(self.compared)
         own = np.abs(self._z_of_draws[:, self._is_compared])
         own = own[np.isfinite(own).any(axis=1)]
         if self.compared < _FEWEST_POINTS or len(own) < FEWEST_DRAWS:
             return normal
-        largest = np.nanmax(own, axis=1)
-        scale = float(np.std(largest, ddof=1)) * np.sqrt(6) / np.pi
-        mode = float(np.mean(largest)) - np.euler_gamma * scale
-        return max(normal, float(mode - scale * np.log(-np.log(AGREEMENT))))
+        return max(normal, largest_of_chance(np.nanmax(own, axis=1)))
 
     @property
     def outside(self) -> int:
@@ -224,6 +221,18 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
         deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
         tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
     return np.asarray(np.sign(deviate) * scipy.stats.norm.isf(np.exp(np.maximum(tail, -690.0))))
+
+
+def largest_of_chance(largest: Reals) -> float:
+    """Largest |z| of one more draw in 99 % of all cases, from the largest of each of five draws or more.
+
+    The quantile of Gumbel's distribution with their mean and deviation, widened because few draws determine
+    these poorly: without that, one draw more lies beyond in 2 % of all cases for 16 draws, 5 % for five. The
+    factor is that of simulated draws, to 1 %, and the same for every location and scale.
+    """
+    quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
+    widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
+    return float(np.mean(largest) + widened * np.std(largest, ddof=1))
 
 
 def z_limit(values: int) -> float:
