@@ -3,16 +3,19 @@
     python benchmarks/twin_agreement.py --ranks 20           # one chaotic dwell, 20 seeds of the rig's noise
     python benchmarks/twin_agreement.py --rigs 10 --seed 3   # other rigs, levels, frequencies: dwells, noise
     python benchmarks/twin_agreement.py --rigs 10 --json
+    python benchmarks/twin_agreement.py --sweeps 6           # sweeps of 20 s: false alarms
+    python benchmarks/twin_agreement.py --wrong 1            # the same under six wrong specimens
 
 Every measurement is made on the virtual rig with another seed of its noise, and analysed with 19 draws. Of an
 agreeing twin every rank is as likely as any other, and one set of values in a hundred lies outside its limit.
+With --sweeps, draws take the place of the measurement too, each against 16 of the others, in 400 choices.
 """
 
 import argparse
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,13 +23,16 @@ import numpy as np
 from scipy.stats import binom, chisquare
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
+from vibench.analysis.model.ensemble import EnsembleCurve, z_limit
 from vibench.analysis.results.campaign_results import overlay
+from vibench.sim import Specimen, gong2025
 
 RIG = load_rig(Path(__file__).parents[1] / "hardware_configs" / "virtual_rig.toml")
 DRAWS = 19
+DRAWS_OF_SWEEPS = 24
 BINS = 5
 """Of the ranks: 20 seeds fill four to a bin."""
 
@@ -46,15 +52,24 @@ class Compared:
     draws: int
 
 
-def compared(rig: Rig, excitation: Dwell | WhiteNoise, scene: str) -> Iterator[Compared]:
-    """Measure, simulate and compare."""
+def compared(
+    rig: Rig,
+    excitation: Dwell | WhiteNoise | SineSweep,
+    scene: str,
+    specimen: Specimen | None = None,
+    draws: int = DRAWS,
+    curves: dict[str, list[np.ndarray]] | None = None,
+) -> Iterator[Compared]:
+    """Measure, simulate and compare; all draws of a quantity are added to ``curves``."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
         with open_bench(rig) as bench:
             run_measurement(bench, Measurement(name="measured", excitation=excitation, ramp_s=0.3), path)
         with open_recording(path) as recording:
-            laid = overlay(recording, analyse(recording), draws=DRAWS)
+            laid = overlay(recording, analyse(recording), draws=draws, specimen=specimen)
     for each in laid.ensemble:
+        if curves is not None and len(each.draws) == draws:
+            curves.setdefault(each.name, []).append(each.draws)
         rank = int(each.rank[0]) if each.compared == 1 else None
         yield Compared(
             f"{scene}, {laid.run.impact_rate_hz:.0f} impacts/s",
@@ -125,6 +140,67 @@ def random_scenes(count: int, seed: int) -> Iterator[Compared]:
         yield from compared(rig, noise, f"{scene}, noise")
 
 
+def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSweep]:
+    """Give a sweep of 200 intervals, at half the usual rate of samples."""
+    daq = rig.daq.model_copy(update={"sample_rate_hz": 25_600.0})
+    return rig.model_copy(update={"daq": daq}), SineSweep(
+        amplitude_vpp=level_vpp, start_hz=start_hz, stop_hz=start_hz + 20, duration_s=20, hold="displacement"
+    )
+
+
+def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> Iterator[Compared]:
+    """Measure sweeps of the shipped rig and of random ones in turn."""
+    for number in range(seed, seed + count):
+        rng = np.random.default_rng(number)
+        rig, words = (seeded(RIG, number), "shipped rig") if number % 2 else random_rig(rng)
+        start_hz = float(np.round(rng.uniform(180, 320)))
+        rig, plan = sweep_of(rig, 1.5 if number % 2 else float(10 ** rng.uniform(-0.2, 0.6)), start_hz)
+        yield from compared(
+            rig, plan, f"rig {number}: {words}, sweep from {start_hz:g} Hz", None, DRAWS_OF_SWEEPS, curves
+        )
+
+
+def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
+    """Compare sweeps with specimens that are a few bounds of a fit off."""
+    true = gong2025()
+    (m0, m1, m2), (k0, k1, k2) = true.masses, true.stiffnesses
+    wrong = {
+        "gap 47 um": gong2025(gap_m=47e-6),
+        "gap 46 um": gong2025(gap_m=46e-6),
+        "damping 25 us": gong2025(damping_time_s=2.5e-5),
+        "m1 + 2 %": replace(true, masses=(m0, 1.02 * m1, m2)),
+        "k0 + 2 %": replace(true, stiffnesses=(1.02 * k0, k1, k2)),
+        "m0 + 3 %": replace(true, masses=(1.03 * m0, m1, m2)),
+    }
+    for number in range(seed, seed + count):
+        rig, plan = sweep_of(seeded(RIG, number), 1.5, 255.0)
+        for words, specimen in wrong.items():
+            yield from compared(rig, plan, f"seed {number}, {words}", specimen, 16)
+
+
+def false_alarms(
+    curves: dict[str, list[np.ndarray]], draws: int = 16, choices: int = 400
+) -> dict[str, object]:
+    """Take draws as measurements: sweeps laid end to end, their draws in random order each time."""
+    rng, found = np.random.default_rng(0), {}
+    for name, sets in curves.items():
+        rows = []
+        for _ in range(choices):
+            values = np.hstack([each[rng.permutation(len(each))[: draws + 1]] for each in sets])
+            curve = EnsembleCurve(name, np.arange(values.shape[1]), values[0], values[1:])
+            worst = abs(curve.largest_z)
+            rows.append((worst > z_limit(curve.compared), worst > curve.limit, worst, curve.limit))
+        beyond_normal, beyond, worst, limit = np.transpose(rows)
+        found[name] = {
+            "values": int(np.hstack(sets).shape[1]),
+            "beyond_limit_of_normal_values": float(beyond_normal.mean()),
+            "beyond_limit": float(beyond.mean()),
+            "largest_z_50_90_99_percent": np.quantile(worst, [0.5, 0.9, 0.99]).round(2).tolist(),
+            "median_limit": float(np.median(limit)),
+        }
+    return found
+
+
 def summary(found: list[Compared]) -> dict[str, object]:
     """Count what lies outside, and test the ranks."""
     with_values = [each for each in found if each.compared]
@@ -148,9 +224,16 @@ def main() -> None:
     parser.add_argument("--rigs", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--sweeps", type=int, default=0)
+    parser.add_argument("--wrong", type=int, default=0, metavar="SEEDS")
     asked = parser.parse_args()
-    found = []
-    for scenes in (same_dwell(asked.first_seed, asked.ranks), random_scenes(asked.rigs, asked.seed)):
+    found, curves = [], {}
+    for scenes in (
+        same_dwell(asked.first_seed, asked.ranks),
+        random_scenes(asked.rigs, asked.seed),
+        true_sweeps(asked.sweeps, asked.seed, curves),
+        wrong_sweeps(asked.wrong, asked.seed),
+    ):
         for each in scenes:
             found.append(each)
             place = "" if each.rank is None else f", rank {each.rank} of {each.draws}"
@@ -164,6 +247,8 @@ def main() -> None:
         print(json.dumps({"summary": summary(found), "compared": [asdict(each) for each in found]}))
     else:
         print(json.dumps(summary(found)))
+    if asked.sweeps:
+        print(json.dumps(false_alarms(curves)), file=sys.stderr if asked.json else sys.stdout)
 
 
 if __name__ == "__main__":
