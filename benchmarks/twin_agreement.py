@@ -4,7 +4,7 @@
     python benchmarks/twin_agreement.py --rigs 10 --seed 3   # other rigs, levels, frequencies: dwells, noise
     python benchmarks/twin_agreement.py --rigs 10 --json
     python benchmarks/twin_agreement.py --sweeps 6           # sweeps of 20 s: false alarms
-    python benchmarks/twin_agreement.py --wrong 1            # the same under six wrong specimens
+    python benchmarks/twin_agreement.py --wrong 1            # the same under four wrong specimens
 
 Every measurement is made on the virtual rig with another seed of its noise, and analysed with 19 draws. Of an
 agreeing twin every rank is as likely as any other, and one set of values in a hundred lies outside its limit.
@@ -163,14 +163,12 @@ def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> I
 def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
     """Compare sweeps with specimens that are a few bounds of a fit off."""
     true = gong2025()
-    (m0, m1, m2), (k0, k1, k2) = true.masses, true.stiffnesses
+    m0, m1, m2 = true.masses
     wrong = {
         "gap 47 um": gong2025(gap_m=47e-6),
         "gap 46 um": gong2025(gap_m=46e-6),
         "damping 25 us": gong2025(damping_time_s=2.5e-5),
         "m1 + 2 %": replace(true, masses=(m0, 1.02 * m1, m2)),
-        "k0 + 2 %": replace(true, stiffnesses=(1.02 * k0, k1, k2)),
-        "m0 + 3 %": replace(true, masses=(1.03 * m0, m1, m2)),
     }
     for number in range(seed, seed + count):
         rig, plan = sweep_of(seeded(RIG, number), 1.5, 255.0)
