@@ -4,7 +4,7 @@ The voltage is brought to the steps of a `LoadedShaker` and its motion back to t
 signals (Shannon), piece by piece, so that a recording of any length fits in memory. SI units.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -96,7 +96,8 @@ def follow_voltage(
     step_s = 1 / (sample_rate_hz * ratio)
     shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
     gains = (table.base_sensor, table.m0_sensor)
-    kept = [np.empty(volts.size), np.empty(volts.size)]
+    kept = np.empty((len(gains), volts.size))
+    coupling = _Coupling(table.base_low_cut_hz / sample_rate_hz)
     impacts = [np.zeros(1)]
     block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
     tail = np.zeros((2, 0))
@@ -109,14 +110,14 @@ def follow_voltage(
         # The last samples wait for the motion behind them, but at the end.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
-        for row, gain, result in zip(tail, gains, kept, strict=True):
-            result[done:upto] = resampling.samples(row, gain)[done - held : upto - held]
+        seen = resampling.samples(tail, gains)[:, done - held : upto - held]
+        kept[:, done:upto] = coupling.passed(seen[0]), seen[1]
         done = upto
         tail = tail[:, max(0, (done - _MARGIN - held)) * ratio :]
     begun = np.concatenate(impacts)
     blocks_s = np.minimum(np.arange(begun.size) * (block * step_s), volts.size / sample_rate_hz)
     return SampledMotion(
-        base_acceleration=_high_pass(kept[0], table.base_low_cut_hz / sample_rate_hz),
+        base_acceleration=kept[0],
         m0_velocity=kept[1],
         impact_times_s=blocks_s,
         impacts=begun,
@@ -151,14 +152,16 @@ class _Resampling:
             fine = fft.irfft(spectrum, padded.size * ratio, overwrite_x=True)
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
-    def samples(self, means: FloatArray, gain: Gain) -> FloatArray:
-        """Return the samples behind a sensor of this gain."""
-        count = means.size // self._ratio
+    def samples(self, means: FloatArray, gains: Sequence[Gain]) -> FloatArray:
+        """Return the samples behind a sensor of each gain, shape of ``means`` (sensors, steps)."""
+        count = means.shape[1] // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
-        padded = np.zeros(size * self._ratio)
-        padded[_MARGIN * self._ratio : (_MARGIN + count) * self._ratio] = means
-        spectrum = fft.rfft(padded)[: size // 2 + 1] * self._weights_of(size, gain)
-        return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[_MARGIN : _MARGIN + count])
+        padded = np.zeros((len(gains), size * self._ratio))
+        padded[:, _MARGIN * self._ratio : (_MARGIN + count) * self._ratio] = means
+        spectrum = fft.rfft(padded, overwrite_x=True)[:, : size // 2 + 1]
+        for place, gain in enumerate(gains):
+            spectrum[place] *= self._weights_of(size, gain)
+        return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
         """Return the factors of the lines of ``samples`` samples, to steps or from them behind a sensor."""
@@ -185,10 +188,19 @@ class _Resampling:
         return np.asarray((1 + lag) * (1 - turns * (turned - 1) * (1 - left) / (turned - left)))
 
 
-def _high_pass(values: FloatArray, cut: float) -> FloatArray:
-    """Pass values through a first-order high-pass, its -3 dB in cycles per sample."""
-    if cut == 0.0:
-        return values
-    half_turn = np.tan(np.pi * cut)
-    weights = np.array([1.0, -1.0]) / (1 + half_turn)
-    return np.asarray(scipy.signal.lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
+class _Coupling:
+    """Passes values, stretch by stretch, through a first-order high-pass; -3 dB in cycles per sample."""
+
+    def __init__(self, cut: float) -> None:
+        half_turn = np.tan(np.pi * cut)
+        self._weights = np.array([1.0, -1.0]) / (1 + half_turn)
+        self._poles = np.array([1.0, -(1 - half_turn) / (1 + half_turn)])
+        self._memory = np.zeros(1)
+        self._passes_all = cut == 0.0
+
+    def passed(self, values: FloatArray) -> FloatArray:
+        """Give the next values behind the coupling."""
+        if self._passes_all:
+            return values
+        result, self._memory = scipy.signal.lfilter(self._weights, self._poles, values, zi=self._memory)
+        return np.asarray(result)
