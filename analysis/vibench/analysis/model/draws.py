@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import islice
 from typing import ClassVar, Generic, TypeVar
 
@@ -56,7 +56,7 @@ class PlayedVoltage:
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
-        self._volts, self._own_v = volts, converter_rms_v
+        self._samples, self._own_v = volts.size, converter_rms_v
         self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
         self._frames = 1 - (-volts.size // self._hop)
         """They overlap by half; the first begins and the last ends half a frame outside."""
@@ -64,10 +64,10 @@ class PlayedVoltage:
         halves = self._window.reshape(2, self._hop)
         self._back = (halves / np.sum(halves**2, axis=0)).ravel()
         """Window of synthesis, with which frames that overlap by half add up to what was taken apart."""
+        self._likely, self._roots = (volts, []) if converter_rms_v == 0.0 else self._parts(volts)
 
-    @cached_property
-    def _likely(self) -> tuple[Reals, list[Singles]]:
-        """The likely voltage, and roots of the shares of what was recorded, by line in batches of frames."""
+    def _parts(self, volts: Reals) -> tuple[Reals, list[Singles]]:
+        """Give the likely voltage, and roots of the recorded shares, by line in batches of frames."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         roots: list[Singles] = []
 
@@ -87,21 +87,20 @@ class PlayedVoltage:
             return share * lines
 
         recorded = np.zeros((self._frames + 1, self._hop))
-        recorded.ravel()[self._hop : self._hop + self._volts.size] = self._volts
+        recorded.ravel()[self._hop : self._hop + volts.size] = volts
         rows = iter(recorded)
         return self._through(filtered, lambda count: np.array(list(islice(rows, count)))), roots
 
     def drawn(self, rng: np.random.Generator) -> Reals:
         """Return a voltage that may have been played, shape (samples,) [V]."""
         if self._own_v == 0.0:
-            return self._volts
-        likely, roots = self._likely
-        share = iter(roots)
+            return self._likely
+        share = iter(self._roots)
         drawn = self._through(
             lambda lines: next(share) * lines,
             lambda count: self._own_v * rng.standard_normal((count, self._hop)),
         )
-        drawn += likely
+        drawn += self._likely
         return drawn
 
     def _through(self, change: Callable[[Complexes], Complexes], following: Callable[[int], Reals]) -> Reals:
@@ -120,7 +119,7 @@ class PlayedVoltage:
             whole = fft.irfft(lines, self._window.size, overwrite_x=True) * self._back
             result[first:last] += whole[:, :hop]
             result[first + 1 : last + 1] += whole[:, hop:]
-        return result.ravel()[hop : hop + self._volts.size]
+        return result.ravel()[hop : hop + self._samples]
 
 
 def above_noise(volts: Reals, rms: float) -> Reals:
@@ -271,6 +270,7 @@ class DrawSource:
     accuracy: Accuracy
     base_band_hz: tuple[float, float] | None
     most: int
+    samples: int
     why: str
     channels: Callable[[int], SimulatedChannels]
 
@@ -306,6 +306,7 @@ def voltage_source(
         accuracy=Accuracy.STANDARD,
         base_band_hz=None,
         most=draws,
+        samples=recording.samples,
         why="" if fitted is None else fitted.sentence,
         channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, voltage, drive_v, noise),
     )
@@ -318,7 +319,7 @@ def base_source(
     channels = under_base_motion(recording, measurement, specimen, accuracy)
     rate = recording.sample_rate_hz
     band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
-    return DrawSource(specimen, Driven.BASE, accuracy, band, 1, why, lambda _: channels)
+    return DrawSource(specimen, Driven.BASE, accuracy, band, 1, channels.samples, why, lambda _: channels)
 
 
 def drawn(
@@ -329,15 +330,15 @@ def drawn(
     Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
     many are made. Raises UnusableData when a simulation did not reach its end.
     """
-    channels = source.channels(0)
-    first = estimate(channels)
-    samples = channels.samples
-    del channels
-    workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * samples))))
-    others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
-    found = [_without_response(first)]
+    workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * source.samples))))
     with ThreadPoolExecutor(workers) as pool:
         # No more than are computed at a time wait with their whole estimates.
+        first, *beside = pool.map(
+            lambda number: estimate(source.channels(number)), range(min(workers, source.most))
+        )
+        found = [_without_response(each) for each in (first, *beside)]
+        del beside
+        others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
         numbers = _numbers(others, others if source.most == 1 else _MORE * others, found, measured)
         while batch := list(islice(numbers, workers)):
             found += pool.map(lambda number: _without_response(estimate(source.channels(number))), batch)
@@ -358,7 +359,7 @@ def drawn(
 
 def _numbers(usual: int, most: int, found: list[Draw[None]], measured: Sequence[Quantity]) -> Iterator[int]:
     """Yield the numbers of the draws that are still to be made."""
-    for number in range(1, most):
+    for number in range(len(found), most):
         if number >= usual:
             curves = ensemble_curves(measured, [each.quantities for each in found])
             count = np.concatenate([each.count for each in curves])
