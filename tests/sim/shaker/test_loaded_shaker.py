@@ -166,7 +166,7 @@ def test_the_amplifier_clips_at_its_largest_voltage():
     drive = tones(5.0, [100.0])
     motion = table.move(drive, np.zeros(SECOND))
     assert np.max(np.abs(motion.amplifier_voltage)) == pytest.approx(5.0)
-    assert table.limited_steps > SECOND / 2
+    assert table.structure["limited_steps"] > SECOND / 2
 
 
 def test_the_amplifier_gives_no_more_current_than_its_limiter_is_set_to():
@@ -174,7 +174,7 @@ def test_the_amplifier_gives_no_more_current_than_its_limiter_is_set_to():
     motion = table.move(tones(3.0, [200.0]), np.zeros(SECOND), SECOND)
     current = motion.ends[:, COLUMN["current"]]
     assert np.max(np.abs(current)) == pytest.approx(1.0)
-    assert table.limited_steps > 0
+    assert table.structure["limited_steps"] > 0
 
 
 def test_noise_is_added_at_the_amplifiers_output():
@@ -191,14 +191,14 @@ def test_the_rubber_stops_end_the_stroke_and_are_counted():
     motion = table.move(tones(6.0, [8.0]), np.zeros(SECOND), SECOND)
     reached = np.max(np.abs(motion.ends[:, COLUMN["base_displacement"]]))
     assert stroke < reached < 1.15 * stroke
-    assert table.bumps > 0
+    assert table.structure["bumps"] > 0
 
 
 def test_a_small_drive_never_touches_the_rubber_stops():
     table = shaken()
     table.move(tones(0.5, [50.0]), np.zeros(SECOND))
-    assert table.bumps == 0
-    assert table.limited_steps == 0
+    assert table.structure["bumps"] == 0
+    assert table.structure["limited_steps"] == 0
 
 
 def test_a_motion_that_is_not_finite_is_an_error_that_says_where():
@@ -232,7 +232,20 @@ def test_the_voltage_recorded_at_the_coil_moves_the_table_as_the_amplifier_did()
     again = driven.move(recorded.amplifier_voltage)
     assert driven.impacts == measured.impacts > 0
     assert again.base_acceleration == pytest.approx(recorded.base_acceleration, rel=1e-9, abs=1e-9)
-    assert driven.limited_steps == 0
+    assert driven.structure["limited_steps"] == 0
+
+
+def test_a_stretch_in_one_call_moves_and_counts_as_its_blocks_do():
+    drive, block = tones(0.7, [266.0])[:9500], 1000
+    whole, stepwise = shaken(), shaken()
+    motion = whole.move(drive, block=block)
+    parts, begun = [], []
+    for first in range(0, len(drive), block):
+        parts.append(stepwise.move(drive[first : first + block]).m0_velocity)
+        begun.append(stepwise.impacts)
+    assert motion.begun.tolist() == begun
+    assert begun[-1] == whole.impacts > 0
+    assert np.array_equal(motion.m0_velocity, np.concatenate(parts))
 
 
 def test_a_specimen_that_starts_away_from_rest_pushes_the_table_that_nothing_drives():

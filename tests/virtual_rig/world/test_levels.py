@@ -83,7 +83,7 @@ def test_weak_noise_never_makes_an_impact_and_strong_noise_makes_hundreds():
     assert weak.impacts == 0
     assert np.max(np.abs(p)) < 0.3 * RIG.specimen.gap_m
     assert strong.impacts > 300
-    assert strong.limited_steps == strong.bumps == 0
+    assert strong.structure["limited_steps"] == strong.structure["bumps"] == 0
 
 
 def test_weak_noise_shows_the_three_linear_resonances():

@@ -122,13 +122,6 @@ class PlayedVoltage:
         return result.ravel()[hop : hop + self._samples]
 
 
-def above_noise(volts: Reals, rms: float) -> Reals:
-    """Return what certainly is voltage and no noise of its channel, which would shake a simulated table."""
-    spectrum = np.fft.rfft(volts)
-    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
-    return np.asarray(np.fft.irfft(spectrum, volts.size))
-
-
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Looked at, evenly over the recording; the whole first and last second besides."""
@@ -330,18 +323,20 @@ def drawn(
     Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
     many are made. Raises UnusableData when a simulation did not reach its end.
     """
+
+    def estimated(number: int) -> Draw[R]:
+        return estimate(source.channels(number))
+
     workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * source.samples))))
     with ThreadPoolExecutor(workers) as pool:
         # No more than are computed at a time wait with their whole estimates.
-        first, *beside = pool.map(
-            lambda number: estimate(source.channels(number)), range(min(workers, source.most))
-        )
-        found = [_without_response(each) for each in (first, *beside)]
-        del beside
+        begun = pool.map(estimated, range(min(workers, source.most)))
+        first = next(begun)
+        found = [_without_response(each) for each in (first, *begun)]
         others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
         numbers = _numbers(others, others if source.most == 1 else _MORE * others, found, measured)
         while batch := list(islice(numbers, workers)):
-            found += pool.map(lambda number: _without_response(estimate(source.channels(number))), batch)
+            found += map(_without_response, pool.map(estimated, batch))
     run = SimulatedRun(
         specimen=source.specimen,
         driven=source.driven,
@@ -477,5 +472,8 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
-    played = above_noise(volts, noise.rms[rig.role])
+    # Noise of the voltage's channel would shake the simulated table: only what surely is voltage is played.
+    spectrum = np.fft.rfft(volts)
+    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
+    played = np.asarray(np.fft.irfft(spectrum, volts.size))
     return StretchDraws(recording, rig, fitted, noise, played, first, slice(start - first, stop - first))

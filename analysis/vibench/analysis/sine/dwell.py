@@ -356,7 +356,7 @@ def dwell_response(
     level = replace(level, sd_amplitude_m=of_base_m)
     noise_density, sensor = _sensor_noise(response, displacement)
     silent = background_in_silence(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
-    repeated = np.asarray(np.real(repeating.value[:, 0] @ order_turns(phase, orders)))
+    repeated = np.asarray(np.real(repeating.value[:, 0] @ np.stack(order_turns(phase, orders))))
     rest = background_between_lines(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
     most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)

@@ -111,13 +111,8 @@ def tracked_together(
     return tuple(TrackedOrders(orders, *each) for each in zip(value, sd, residual, strict=True))
 
 
-def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
-    """Return exp(i order phase) for each order, shape (orders, ...)."""
-    return np.stack(_turns(phase_rad, orders))
-
-
-def _turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
-    """Return exp(i order phase) order by order.
+def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
+    """Return exp(i order phase) for each order.
 
     Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
     a sine and a cosine.
@@ -141,7 +136,7 @@ def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
 def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
     """Fit signals of shape (intervals, samples, signals); results have shape (signals, ..., intervals)."""
     samples, count = signals.shape[1], len(orders)
-    *turned, first = _turns(phase, (*orders, 1.0))
+    *turned, first = order_turns(phase, (*orders, 1.0))
     changing = np.linspace(-1.0, 1.0, samples) * first
     basis = np.empty((len(phase), 2 * count + 3, samples))
     for place, turn in enumerate(turned):

@@ -142,10 +142,13 @@ class ShakenMotion:
     """Contacts begun up to the end of each block of steps, shape (blocks,); none unless asked for."""
 
     @classmethod
-    def of(cls, count: int, end_rows: int, blocks: int = 0) -> Self:
+    def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
         """Make room for this many steps, for the ends of the first of them, and for blocks of contacts."""
-        ends = np.empty((end_rows, len(MOTION_COLUMNS)))
-        return cls(np.empty(count), np.empty(count), np.empty(count), ends, np.empty(blocks))
+        ends, begun = (
+            np.empty((end_rows, len(MOTION_COLUMNS))),
+            np.empty(math.ceil(count / block) if block else 0),
+        )
+        return cls(np.empty(count), np.empty(count), np.empty(count), ends, begun)
 
 
 class MotionFailed(ArithmeticError):
@@ -216,16 +219,6 @@ class LoadedShaker:
         return int(self.structure["impacts"])
 
     @property
-    def bumps(self) -> int:
-        """Steps that the table has spent in its rubber stops."""
-        return int(self.structure["bumps"])
-
-    @property
-    def limited_steps(self) -> int:
-        """Steps in which the amplifier clipped or limited its current."""
-        return int(self.structure["limited_steps"])
-
-    @property
     def gain(self) -> float:
         """Output volts of the amplifier per input volt; may be changed between stretches."""
         return float(self.structure["gain"])
@@ -269,9 +262,10 @@ class LoadedShaker:
             When the motion is no longer finite; this shaker cannot go on.
 
         """
-        blocks = math.ceil(len(drive_v) / block) if block else 0
-        drive = np.ascontiguousarray(drive_v, np.float64)
-        motion = ShakenMotion.of(len(drive), end_rows, blocks)
+        drive, motion = (
+            np.ascontiguousarray(drive_v, np.float64),
+            ShakenMotion.of(len(drive_v), end_rows, block),
+        )
         self.structure["block"] = block
         noise = np.zeros(len(drive)) if noise_v is None else np.ascontiguousarray(noise_v, np.float64)
         self.move_into(motion, drive, noise)

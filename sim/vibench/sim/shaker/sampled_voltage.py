@@ -97,7 +97,9 @@ def follow_voltage(
     shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
     gains = (table.base_sensor, table.m0_sensor)
     kept = np.empty((len(gains), volts.size))
-    coupling = _Coupling(table.base_low_cut_hz / sample_rate_hz)
+    half_turn = np.tan(np.pi * table.base_low_cut_hz / sample_rate_hz)
+    high_pass = [1.0, -1.0] / (1 + half_turn), [1.0, -(1 - half_turn) / (1 + half_turn)]
+    memory = np.zeros(1)
     impacts = [np.zeros(1)]
     block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
     tail = np.zeros((2, 0))
@@ -111,17 +113,14 @@ def follow_voltage(
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]
-        kept[:, done:upto] = coupling.passed(seen[0]), seen[1]
+        if half_turn > 0.0:
+            seen[0], memory = scipy.signal.lfilter(*high_pass, seen[0], zi=memory)
+        kept[:, done:upto] = seen
         done = upto
         tail = tail[:, max(0, (done - _MARGIN - held)) * ratio :]
     begun = np.concatenate(impacts)
     blocks_s = np.minimum(np.arange(begun.size) * (block * step_s), volts.size / sample_rate_hz)
-    return SampledMotion(
-        base_acceleration=kept[0],
-        m0_velocity=kept[1],
-        impact_times_s=blocks_s,
-        impacts=begun,
-    )
+    return SampledMotion(kept[0], kept[1], blocks_s, begun)
 
 
 class _Resampling:
@@ -186,21 +185,3 @@ class _Resampling:
         turns = self._sample_rate_hz * self._ratio * time_constant_s
         left, turned = np.exp(-1 / turns), np.exp(lag / turns)
         return np.asarray((1 + lag) * (1 - turns * (turned - 1) * (1 - left) / (turned - left)))
-
-
-class _Coupling:
-    """Passes values, stretch by stretch, through a first-order high-pass; -3 dB in cycles per sample."""
-
-    def __init__(self, cut: float) -> None:
-        half_turn = np.tan(np.pi * cut)
-        self._weights = np.array([1.0, -1.0]) / (1 + half_turn)
-        self._poles = np.array([1.0, -(1 - half_turn) / (1 + half_turn)])
-        self._memory = np.zeros(1)
-        self._passes_all = cut == 0.0
-
-    def passed(self, values: FloatArray) -> FloatArray:
-        """Give the next values behind the coupling."""
-        if self._passes_all:
-            return values
-        result, self._memory = scipy.signal.lfilter(self._weights, self._poles, values, zi=self._memory)
-        return np.asarray(result)
