@@ -53,7 +53,8 @@ ITERATIONS = 8
 MOST_PUSH = 1000.0
 """Drive amplitudes that stand for the gap, at most, where other starts are drawn."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""The motion from the start is looked at after this long, so many drive periods, or this share of the way."""
+"""The motion from the start is looked at every so many drive periods, whenever its time has doubled up to
+looks of this length, and then after this share of its way."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
 SAME = 1e-3
 """Relative difference from the middle of all starts up to which they came to one motion that repeats."""
@@ -144,6 +145,8 @@ class _Refinement:
         self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
+        self._pair = self._main.apart(), self._twin.apart()
+        """Where both motions were last seen."""
         self._orbit: _Orbit | None = None
         self._closest = CLOSE
         self._size_m = self._spent_s = 0.0
@@ -168,7 +171,7 @@ class _Refinement:
         kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
         while self._main.time_s < settle_s:
             made = round(self._main.time_s * self._frequency_hz)
-            look = max(LOOK_S * self._frequency_hz, LOOK_PERIODS, LOOK_SHARE * made)
+            look = max(LOOK_PERIODS, LOOK_SHARE * made, min(LOOK_S * self._frequency_hz, made))
             look_s = (made + math.ceil(look)) / self._frequency_hz
             ours, other = self._followed(self._main, look_s), self._followed(self._twin, look_s)
             if self._is_lost:
@@ -177,6 +180,7 @@ class _Refinement:
             if ours is None or other is None:
                 yield from self._interim()
                 return
+            self._pair = self._main.apart(), self._twin.apart()
             if self._have_parted(ours, other):
                 yield from self._many_starts()
                 return
@@ -264,42 +268,54 @@ class _Refinement:
         return bool(now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE))
 
     def _newton(self, period: int) -> _Orbit | None:
-        """Find the stable motion of so many drive periods near where the motion is now."""
+        """Find the stable motion of so many drive periods, or of fewer, near where the motion is now."""
         cost_s = NEWTON_COST * self._main.cost_s / self._main.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
-        run, scales = self._main.apart(TIGHT), self._scales
-        size = float(np.abs(run.state / scales).max(initial=1e-300))
-        gone = math.inf
         try:
-            for _ in range(ITERATIONS):
-                image, slope = run.image(period)
-                off = (image - run.state) / scales
-                if not np.all(np.isfinite(slope)) or not np.abs(off).max() < gone:
-                    return None
-                gone = float(np.abs(off).max())
-                scaled = slope * scales / scales[:, None]
-                away = np.linalg.inv(np.eye(6) - scaled)
-                if gone < RETURNED * size:
-                    break
-                run = run.pushed(away @ off * scales)
-            if gone > RETURNED * size or np.abs(np.linalg.eigvals(scaled)).max() >= 1.0:
+            found = self._fixed_point(period)
+            if found is None:
                 return None
+            run, away = found
             strict = run.apart(TIGHTEST)
-            off = (strict.image(period)[0] - strict.state) / scales
-            strict = strict.pushed(away @ off * scales)
-            windows = [self._observed(each.apart(), period) for each in (run, strict)]
+            off = (strict.image(period)[0] - strict.state) / self._scales
+            strict = strict.pushed(away @ off * self._scales)
         except (ValueError, np.linalg.LinAlgError):
             return None
+        windows = [self._observed(each.apart(), period) for each in (run, strict)]
         if windows[0] is None or windows[1] is None:
             return None
+        states = states_of(windows[1].stretches) / self._scales
+        same = SAME * float(np.abs(states).max(initial=1e-300))
+        for shorter in range(1, period):
+            if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
+                return self._newton(shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        rounding = ROUNDING * np.repeat(second[::2], 2) / second
         # What roundings of the state at the end of a period may come to, through the inverse of the map.
-        rounding = rounding * max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
-        return _Orbit(
-            period, strict, second, SAFETY * np.abs(first - second) / second + rounding, windows[1].impacts
-        )
+        grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
+        rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
+        errors = SAFETY * np.abs(first - second) / second + rounding
+        return _Orbit(period, strict, second, errors, windows[1].impacts)
+
+    def _fixed_point(self, period: int) -> tuple[FollowedRun, Floats] | None:
+        """Solve for a motion that comes back; gives it, and the inverse of what the map leaves of a change.
+
+        None where there is none near, or it is unstable. Raises ValueError where a state is not allowed.
+        """
+        run, scales, gone = self._main.apart(TIGHT), self._scales, math.inf
+        size = float(np.abs(run.state / scales).max(initial=1e-300))
+        for _ in range(ITERATIONS):
+            image, slope = run.image(period)
+            off = (image - run.state) / scales
+            if not np.all(np.isfinite(slope)) or not np.abs(off).max() < gone:
+                return None
+            gone = float(np.abs(off).max())
+            scaled = slope * scales / scales[:, None]
+            away = np.linalg.inv(np.eye(6) - scaled)
+            if gone < RETURNED * size:
+                return (run, away) if np.abs(np.linalg.eigvals(scaled)).max() < 1.0 else None
+            run = run.pushed(away @ off * scales)
+        return None
 
     def _on_orbit(self) -> ScenePrediction:
         orbit = self._orbit
@@ -317,13 +333,10 @@ class _Refinement:
         return _reported(found, self._target, self._clock, 1, None)
 
     def _interim(self) -> Iterator[ScenePrediction]:
-        """Answer for a window that begins now, from both motions."""
-        run, twin = self._main.apart(), self._twin.apart()
-        late = max(run.time_s, twin.time_s)
-        late_s = math.ceil(late * self._frequency_hz * (1.0 - 1e-12)) / self._frequency_hz
-        if self._followed(run, late_s) is None or self._followed(twin, late_s) is None:
-            return
-        periods = min(self._window_periods, max(1, round(late_s * self._frequency_hz) // 8))
+        """Answer for a window that begins where both motions were last seen."""
+        self._spent_s = 0.0
+        run, twin = (each.apart() for each in self._pair)
+        periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))
         windows = [self._observed(each, periods) for each in (run, twin)]
         if windows[0] is None or windows[1] is None:
             return

@@ -1,0 +1,31 @@
+"""A sample of the campaign on requested errors: `benchmarks/error_targets.py` has the whole."""
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[3] / "benchmarks"
+SEED = 2026
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", [str(FOLDER), *sys.path])
+        return runpy.run_path(str(FOLDER / "error_targets.py"))
+
+
+@pytest.mark.parametrize("index", [2, 4, 8, 9, 10])
+def test_stated_errors_hold_and_targets_are_met_where_the_start_is_kept(campaign, index):
+    _, scene = campaign["drawn_scene"](SEED, index)
+    for target in campaign["judged"](scene, 60.0)["targets"]:
+        assert target["kind"] in {"periodic", "named window"}
+        assert target["is_met"]
+        assert all(target["covered"]), target
+        assert target["stated"] <= target["error"]
+
+
+def test_scenes_are_the_same_in_every_shard(campaign):
+    assert campaign["drawn_scene"](SEED, 7) == campaign["drawn_scene"](SEED, 7)
