@@ -53,6 +53,14 @@ LONG_S = 60.0
 """After which a damped motion of these scenes has settled."""
 SHORT, SMALL = 0.1, 1e-3
 """Share of the time for errors up to this where the start is forgotten: no mean reaches them soon."""
+KINDS = ("periodic", "named window", "forgotten")
+HEADING, LAST = "## Requested errors", "## Other solvers"
+INTRODUCTION = """`vibench predict --error 1% --time 2s` answers to a requested error, within a time. A motion
+that approaches a stable periodic one is completed by Newton's iteration. One that keeps its start but does
+not repeat is observed in a window that the answer names. Where the start is forgotten, the answer is the
+mean over starts in a named window, and its error is that of the mean. `vibench tradeoff --amplitude 5e-6
+--frequency 260` draws error over time for your own scene. This section is made by `python
+benchmarks/error_targets.py --save FILE`, then `--sum FILE --markdown docs/accuracy.md`."""
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
@@ -159,54 +167,96 @@ def judged(scene, time_s):
     return row
 
 
-def told(rows):
-    """Print what a campaign found."""
-    every = [(row, each) for row in rows for each in row["targets"]]
-    answered = [(row, each) for row, each in every if "kind" in each]
-    print(f"{len(rows)} scenes, {len(every) - len(answered)} targets refused in a sentence")
-    print(
-        f"{'kind':13} {'error':>7} {'scenes':>6} {'covered':>8} {'all four':>8} {'met':>6} {'median CPU':>11}"
-    )
-    for kind in ("periodic", "named window", "forgotten"):
+def answered_of(rows):
+    """Return each scene beside each of its answers."""
+    return [(row, each) for row in rows for each in row["targets"] if "kind" in each]
+
+
+def groups_of(rows):
+    """Return what was found for each kind of motion and error: labels, then numbers."""
+    answered = answered_of(rows)
+    for kind in KINDS:
         for error in (*ERRORS, None):
             group = [each for _, each in answered if each["kind"] == kind and error in (each["error"], None)]
-            if not group:
-                continue
-            covered = np.mean([np.mean(each["covered"]) for each in group])
-            whole = np.mean([all(each["covered"]) for each in group])
-            met = np.mean([each["is_met"] for each in group])
-            cost_s = np.median([each["taken_s"] for each in group])
-            print(
-                f"{kind:13} {error or 'all':>7} {len(group):6} {covered:8.1%} {whole:8.1%} {met:6.1%}"
-                f" {cost_s:9.4f} s"
-            )
-    pairs = [(row, each) for row, each in answered if each["error"] == ERRORS[1]]
-    ratios = [row["default_s"] / each["taken_s"] for row, each in pairs]
-    median_s = np.median([each["taken_s"] for _, each in pairs])
-    default_s = np.median([row["default_s"] for row, _ in pairs])
-    print(
-        f"to 1 %: median {median_s:.4f} s; 30 s default {default_s:.4f} s: {default_s / median_s:.1f} times;"
-        f" median ratio {np.median(ratios):.1f};"
-        f" in all {sum(row['default_s'] for row, _ in pairs):.1f} s over"
-        f" {sum(each['taken_s'] for _, each in pairs):.1f} s"
+            if group:
+                yield (
+                    kind,
+                    "all" if error is None else f"{100.0 * error:g} %",
+                    len(group),
+                    np.mean([np.mean(each["covered"]) for each in group]),
+                    np.mean([each["is_met"] for each in group]),
+                    np.median([each["stated"] for each in group]),
+                    np.median([each["taken_s"] for each in group]),
+                )
+
+
+def costs_of(rows):
+    """Compare costs: to 1 % with the 30 s default, and 1e-6 with 1e-2 on periodic motion."""
+    pairs = [(row, each) for row, each in answered_of(rows) if each["error"] == ERRORS[1]]
+    taken_s, default_s = [each["taken_s"] for _, each in pairs], [row["default_s"] for row, _ in pairs]
+    middle_s, usual_s = np.median(taken_s), np.median(default_s)
+    yield (
+        f"To 1 %: median {middle_s:.4f} s of processor time, the 30 s default {usual_s:.4f} s, "
+        f"{usual_s / middle_s:.1f} times as much; median of the ratios "
+        f"{np.median(np.divide(default_s, taken_s)):.1f}."
     )
+    for kind in KINDS:
+        own = [row["default_s"] / each["taken_s"] for row, each in pairs if each["kind"] == kind]
+        if own:
+            yield f"The default over it, {kind}: median {np.median(own):.1f}."
     costs = [
-        {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == "periodic"}
+        {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == KINDS[0]}
         for row in rows
     ]
-    costs = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
-    print(
-        f"periodic: 1e-6 over 1e-2: median {np.median(costs):.2f}, 95 % below {np.quantile(costs, 0.95):.2f}"
-    )
-    late = [each["time_s"] for _, each in answered]
-    print(f"longest answer {max(late):.2f} s")
-    for row, each in answered:
+    ratios = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
+    yield f"On periodic motion 1e-6 costs {np.median(ratios):.2f} times 1e-2 (median of {len(ratios)})."
+
+
+def told(rows):
+    """Print what a campaign found."""
+    refused = sum("refusal" in each for row in rows for each in row["targets"])
+    print(f"{len(rows)} scenes, {refused} targets refused in a sentence")
+    for kind, error, count, covered, met, stated_error, cost_s in groups_of(rows):
+        numbers = f"{count:5} covered {covered:6.1%} met {met:6.1%} stated {stated_error:.1e} {cost_s:8.4f} s"
+        print(f"{kind:13} {error:>7} {numbers}")
+    print(*costs_of(rows), sep="\n")
+    print(f"longest answer {max(each['time_s'] for _, each in answered_of(rows)):.2f} s")
+    for row, each in answered_of(rows):
         if each["times"] > 3.0:
             print(
                 f"off by {each['times']:.3g}: scene {row['scene']} {row['law']} {each['kind']}"
                 f" {each['error']} stated {each['stated']:.2g} true motion {each['true_motion']}"
                 f" {each['ended']}"
             )
+
+
+def write_section(page, rows, time_s):
+    """Put the figures into the page on accuracy, before the comparison with other solvers."""
+    text = page.read_text(encoding="utf-8")
+    before, last = text.split(f"\n{LAST}\n")
+    lines = [
+        HEADING,
+        "",
+        INTRODUCTION,
+        "",
+        f"Measured on {len(rows)} random scenes of all contact laws, with {time_s:g} s for an answer (a",
+        "tenth for small errors where the start is forgotten) on a busy machine, which gave a small part of it.",
+        "*Covered*: the part of the four responses whose truth, by *reference*, is within the stated error.",
+        "",
+        "| motion | requested | answers | covered | met | stated, median | processor time, median |",
+        "|---|---|---|---|---|---|---|",
+        *(
+            f"| {kind} | {error} | {count} | {covered:.0%} | {met:.0%} | {wide:.1e} | {cost_s:.2g} s |"
+            for kind, error, count, covered, met, wide, cost_s in groups_of(rows)
+        ),
+        "",
+        *costs_of(rows),
+        "",
+    ]
+    page.write_text(
+        before.split(f"\n{HEADING}\n")[0] + "\n" + "\n".join(lines) + f"\n{LAST}\n" + last,
+        encoding="utf-8",
+    )
 
 
 def main():
@@ -218,11 +268,15 @@ def main():
     parser.add_argument("--time", type=float, default=10.0, help="requested with every error [s]")
     parser.add_argument("--minutes", type=float, default=math.inf, help="end after this long")
     parser.add_argument("--only", type=int, help="one scene")
-    parser.add_argument("--save", type=Path, help="file of JSON lines; it is gone on with")
+    parser.add_argument("--save", type=Path, help="file of JSON lines; it is continued")
     parser.add_argument("--sum", type=Path, nargs="+", help="add up such files, and compute nothing")
+    parser.add_argument("--markdown", type=Path, help="with --sum: put the figures into this page")
     given = parser.parse_args()
     if given.sum:
-        told([json.loads(line) for path in given.sum for line in path.read_text().splitlines()])
+        rows = [json.loads(line) for path in given.sum for line in path.read_text().splitlines()]
+        told(rows)
+        if given.markdown is not None:
+            write_section(given.markdown, rows, given.time)
         return
     shard, shards = (int(part) for part in given.shard.split("/"))
     indices = range(shard - 1, given.count, shards) if given.only is None else [given.only]

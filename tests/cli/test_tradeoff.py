@@ -27,7 +27,6 @@ def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibenc
         (("--error", "1%"), "a scene needs both --amplitude and --frequency"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0"),
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
-        (("--amplitude", 5e-6, "--frequency", 100, "--markdown", "x.md"), "leave out one of the two"),
     ],
 )
 def test_a_scene_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):

@@ -1,6 +1,5 @@
 """`vibench tradeoff`: speed against accuracy, measured on this machine."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -22,12 +21,11 @@ from vibench.sim.accuracy_benchmark.figures import (
     MotionBenchmark,
 )
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
-from vibench.sim.operating_system.this import replace_file
 from vibench.sim.study import Study
 
 from .options import Fields, RequestOptions, option, validated
 from .output import console, errors, print_json, print_table, words
-from .paths import AsJson, room_for_folder, room_for_page
+from .paths import AsJson, room_for_folder
 from .progress_bars import shown
 from .specimen_option import AXES, SPECIMEN, described
 
@@ -42,7 +40,6 @@ def tradeoff(
     error: Annotated[str | None, option("Error requested for it; 1% if neither is given.", "E")] = None,
     time_limit: Annotated[str | None, option("Time requested for it, as 2s.", "T", name="--time")] = None,
     out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
-    markdown: Annotated[Path | None, option("Write the page of docs/accuracy.md.", "FILE.md")] = None,
     span: Annotated[float, option("Length of the motion compared; the paper's test is 2.", "S")] = 2.0,
     as_json: AsJson = False,
     *,
@@ -52,22 +49,17 @@ def tradeoff(
     said = {"amplitude": amplitude, "frequency": frequency, "error": error, "time": time_limit}
     said = {name: value for name, value in said.items() if value is not None} | dict(choice.typed)
     if said:
-        if markdown is not None:
-            raise InvalidRequest("--markdown was given with a scene; leave out one of the two")
         _tell_scene(_study(said), out, as_json)
     else:
-        _measure_known(out, markdown, span, as_json)
+        _measure_known(out, span, as_json)
 
 
-def _measure_known(out: Path | None, markdown: Path | None, span: float, as_json: bool) -> None:
+def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
     """Measure every level in motions that are known."""
     if not _SHORTEST_S <= span <= _LONGEST_S:
         raise InvalidRequest(f"a span of {span} s was asked for; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
-    folder = _folder(out, markdown)
-    if folder is not None:
-        room_for_folder(folder)
-    if markdown is not None:
-        room_for_page(markdown)
+    if out is not None:
+        room_for_folder(out)
     columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with shown(Progress(*columns, TimeElapsedColumn(), console=errors)) as bars:
         bar = bars.add_task("", total=_STEPS)
@@ -83,8 +75,10 @@ def _measure_known(out: Path | None, markdown: Path | None, span: float, as_json
         for each in benchmark.motions:
             _tell(each)
         _tell_lotteries(benchmark.lotteries)
-    if folder is not None:
-        _save(benchmark, folder, markdown)
+    if out is not None:
+        from vibench.analysis.report import tradeoff_figure
+
+        tradeoff_figure(benchmark).save(out)
 
 
 def _study(said: Mapping[str, Any]) -> Study:
@@ -134,21 +128,6 @@ def _tell_scene(study: Study, out: Path | None, as_json: bool) -> None:
             console.print("The figure:", path.resolve())
 
 
-def _folder(out: Path | None, markdown: Path | None) -> Path | None:
-    """Where the figure goes: beside the page, unless something else is asked for."""
-    return out if out is not None or markdown is None else markdown.parent / "images"
-
-
-def _save(benchmark: AccuracyBenchmark, folder: Path, markdown: Path | None) -> None:
-    from vibench.analysis.report import accuracy_document, tradeoff_figure
-
-    paths = tradeoff_figure(benchmark).save(folder)
-    if markdown is not None:
-        picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
-        with replace_file(markdown) as coming:
-            coming.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
-
-
 def _tell(found: MotionBenchmark) -> None:
     rows = Table(title=f"{found.motion.regime.value}: {found.motion.name}", title_justify="left")
     for heading in ("", "simulated s per s", "error of the state", "of Response I"):
@@ -189,8 +168,6 @@ def _number(value: float | None) -> str:
 
 
 def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
-    from vibench.analysis.report import worst_error
-
     return {
         "machine": benchmark.machine,
         "software": benchmark.software,
@@ -212,7 +189,7 @@ def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
             for each in benchmark.transients
         ],
         "promises": [
-            {"level": level.value, "promised": level.promise, "worst": worst_error(benchmark, level)}
+            {"level": level.value, "promised": level.promise, "worst": benchmark.worst_error(level)}
             for level in Accuracy
         ],
     }

@@ -1,7 +1,3 @@
-from ._accuracy_document import (
-    accuracy_document as accuracy_document,
-    worst_error as worst_error,
-)
 from ._choices import (
     SHOWN as SHOWN,
     ImageKind as ImageKind,

@@ -286,3 +286,8 @@ class AccuracyBenchmark:
     software: str
     lotteries: tuple[LotteryFigures, ...] = ()
     transients: tuple[TransientFigures, ...] = ()
+
+    def worst_error(self, accuracy: Accuracy) -> float:
+        """Return the largest error of the state that a level made on any motion that is not chaotic."""
+        levels = [level for each in self.motions for level in each.levels if level.accuracy is accuracy]
+        return max((each.state_error for each in levels if each.state_error is not None), default=0.0)

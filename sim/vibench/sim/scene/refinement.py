@@ -349,7 +349,8 @@ class _Refinement:
                 found.relative_ii_error,
             )
             stated = np.array(errors, dtype=np.float64) + self._unsettled
-            found = _reported(with_errors(found, stated), self._target, self._clock, 1, None)
+            found = replace(with_errors(found, stated), memory=StartMemory.UNKNOWN)
+            found = _reported(found, self._target, self._clock, 1, None)
         yield found
 
     @property

@@ -1,9 +1,16 @@
-"""The trade of speed for accuracy as a Markdown page, made from one measurement of it."""
+"""The page docs/accuracy.md: what each level of accuracy costs and errs, from one measurement.
 
+``python benchmarks/accuracy_page.py``; then `work_precision.py` and `error_targets.py` add their sections.
+"""
+
+import argparse
 import json
+import os
 from collections.abc import Iterator
 from itertools import groupby
+from pathlib import Path
 
+from vibench.analysis.report import tradeoff_figure
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark.figures import (
     LEAST_GAIN,
@@ -15,6 +22,7 @@ from vibench.sim.accuracy_benchmark.figures import (
     StatedShare,
     TransientFigures,
 )
+from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 
 _HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
@@ -50,8 +58,9 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
         "",
         "## How it was measured",
         "",
-        "Made by `vibench tradeoff --markdown docs/accuracy.md`; then `python benchmarks/work_precision.py",
-        "--markdown docs/accuracy.md` adds the comparison with other solvers. Not edited by hand.",
+        "Made by `python benchmarks/accuracy_page.py`; then `python benchmarks/work_precision.py --markdown",
+        "docs/accuracy.md` adds the comparison with other solvers, and `python benchmarks/error_targets.py",
+        "--sum FILE --markdown docs/accuracy.md` the requested errors. Not edited by hand.",
         f"Machine: {benchmark.machine}; vibench {json.loads(benchmark.software)['vibench']}.",
         "",
         "Errors of the state are the largest of six components, in units of 100 µm and 0.1 m/s, against an",
@@ -172,7 +181,7 @@ def _number(value: float | None) -> str:
 def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from ("", "## Promises", "", "| level | promised | worst found | kept |", "|---|---|---|---|")
     for accuracy in Accuracy:
-        worst = worst_error(benchmark, accuracy)
+        worst = benchmark.worst_error(accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
     # Name the motions on which a level buys nothing.
@@ -186,28 +195,17 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         yield from ("", f"Errors that a level does not reduce by a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
-def worst_error(benchmark: AccuracyBenchmark, accuracy: Accuracy) -> float:
-    """Return the largest error of the state that a level made on any motion that is not chaotic.
+def main() -> None:
+    """Measure, and write the page with its picture."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
+    parser.add_argument("--span", type=float, default=2.0, help="length of the motion compared [s]")
+    given = parser.parse_args()
+    benchmark = measure_accuracy(Thoroughness(span_s=given.span), print)
+    pictures = tradeoff_figure(benchmark).save(given.markdown.parent / "images")
+    picture = Path(os.path.relpath(pictures[0], given.markdown.parent)).as_posix()
+    given.markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
 
-    Parameters
-    ----------
-    benchmark
-        As it was measured.
-    accuracy
-        The level.
 
-    Returns
-    -------
-    float
-        Relative to the largest displacement.
-
-    """
-    return max(
-        (
-            level.state_error
-            for each in benchmark.motions
-            for level in each.levels
-            if level.accuracy is accuracy and level.state_error is not None
-        ),
-        default=0.0,
-    )
+if __name__ == "__main__":
+    main()
