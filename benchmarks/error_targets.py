@@ -240,7 +240,7 @@ def write_section(page, rows, time_s):
         INTRODUCTION,
         "",
         f"Measured on {len(rows)} random scenes of all contact laws, with {time_s:g} s for an answer (a",
-        "tenth for small errors where the start is forgotten) on a busy machine, which gave a small part of it.",
+        "tenth for small errors of forgotten starts) on a busy machine, which gave a small part of it.",
         "*Covered*: the part of the four responses whose truth, by *reference*, is within the stated error.",
         "",
         "| motion | requested | answers | covered | met | stated, median | processor time, median |",
