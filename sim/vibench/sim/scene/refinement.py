@@ -56,8 +56,9 @@ LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """The motion from the start is looked at every so many drive periods, whenever its time has doubled up to
 looks of this length, and then after this share of its way."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
-SAME = 1e-3
-"""Relative difference from the middle of all starts up to which they came to one motion that repeats."""
+SAME, ALIKE = 1e-3, 1e-2
+"""Relative differences of states up to which a motion repeats, and of responses up to which starts count as
+one motion: some are still settling."""
 OTHER_DIFFERS = 1.0
 """Relative difference of a motion that no start has come to yet: chaos beside a motion without impacts."""
 FEWEST_STARTS, MOST_STARTS = 16, 1_000_000
@@ -558,7 +559,7 @@ def _others(seen: Sequence[Floats]) -> int | None:
     """Count the starts that did not come to the motion of most; None where most came to none that repeats."""
     responses = np.array(seen)
     middle = np.median(responses, axis=0)
-    others = int(np.sum(np.any(np.abs(responses - middle) > SAME * middle, axis=1)))
+    others = int(np.sum(np.any(np.abs(responses - middle) > ALIKE * middle, axis=1)))
     return others if 2 * others <= len(seen) else None
 
 
