@@ -241,7 +241,7 @@ def write_section(page, rows, time_s):
         "",
         f"Measured on {len(rows)} random scenes of all contact laws, with {time_s:g} s for an answer (a",
         "tenth for small errors of forgotten starts) on a busy machine, which gave a small part of it.",
-        "*Covered*: the part of the four responses whose truth is within the stated error and the truth's own.",
+        "*Covered*: the part of the responses whose truth is within the stated error and the truth's own.",
         "The truth is an answer of *reference*; of forgotten starts, the mean over other starts at *quick*.",
         "",
         "| motion | requested | answers | covered | met | stated, median | processor time, median |",
