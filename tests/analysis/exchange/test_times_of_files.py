@@ -164,6 +164,92 @@ def test_what_a_file_says_of_time_reaches_the_recording(tmp_path, kind, seed):
         np.testing.assert_allclose(drive, np.where(np.isnan(drive), np.nan, expected), atol=2e-5)
 
 
+HEADINGS = ("Elapsed time [s]", "X_Value", "t/s", "Zeit in s", "Seconds", "Tiempo [s]", "", "x", "#")
+UNITS_OF_TIME = {
+    "Time [min]": 1 / 60,
+    "time (msec)": 1e3,
+    "time [ns]": 1e9,
+    "Time [h]": 1 / 3600,
+    "Time [d]": 1,
+}
+COUNTS = ("Index", "Scan", "Sample")
+
+
+@pytest.mark.parametrize("seed", [43])
+@pytest.mark.parametrize("fault", ["sound", "gap", "drop", "repeat", "swap", "restart", "drift", "rate"])
+def test_a_column_that_rises_evenly_places_samples_whatever_it_is_called(tmp_path, fault, seed):
+    rng = np.random.default_rng(seed)
+    scales = {**dict.fromkeys(HEADINGS, 1.0), **UNITS_OF_TIME, **dict.fromkeys(COUNTS, RATE_HZ), None: 1.0}
+    for number, (heading, scale) in enumerate(scales.items()):
+        if heading in COUNTS and fault in {"drift", "rate"}:
+            continue  # a count shows neither
+        times = faulty_times(fault, rng)
+        path = tmp_path / f"{number}.csv"
+        rows = np.stack((scale * times, motion(times), 2 * motion(times))).T
+        first = {} if heading is None else {"header": f"{heading},a,b", "comments": ""}
+        np.savetxt(path, rows, "%.12g", ",", **first)
+        content = mapped("csv", RATE_HZ * 1.05 if fault == "rate" else RATE_HZ).model_dump()
+        if heading is None:
+            content["channels"][0]["source"], content["channels"][1]["source"] = "2", "3"
+        meaning = validated(content, ImportMapping, "test")
+        if fault in {"restart", "drift", "rate"}:
+            with pytest.raises(InvalidRequest):
+                import_recording(path, meaning, path.with_suffix(".h5"))
+            continue
+        with open_recording(import_recording(path, meaning, path.with_suffix(".h5"))) as recording:
+            drive = recording.read("drive_voltage")
+        assert np.isnan(drive).any() == (fault != "sound"), heading
+        expected = motion(np.arange(drive.size) / RATE_HZ)
+        np.testing.assert_allclose(drive, np.where(np.isnan(drive), np.nan, expected), atol=2e-5)
+
+
+def late_hdf5(path, first, second, fact):
+    with h5py.File(path, "w") as file:
+        for name, values, start_s in (("a", first, 0.0), ("b", second, 0.0025)):
+            dataset = file.create_dataset(f"run/{name}", data=values)
+            dataset.attrs["wf_increment"] = 1 / RATE_HZ
+            moment = f"2026-03-01T12:00:00.{round(start_s * 1e6):06d}Z"
+            dataset.attrs[fact] = moment if fact == "wf_start_time" else start_s
+
+
+def late_mat(path, first, second, fact):
+    struct, name = fact.split(".")
+    channels = {}
+    for channel, values, start_s in (("a", first, 0.0), ("b", second, 0.0025)):
+        about = {name: start_s, "increment": 1 / RATE_HZ}
+        channels[channel] = {"y": values, struct: about} if struct else {"y": values, **about}
+    savemat(path, {"run": channels})
+
+
+@pytest.mark.parametrize(
+    ("suffix", "fact"),
+    [
+        *((".h5", fact) for fact in ("t0", "start_time", "wf_start_offset", "x0", "wf_start_time")),
+        *((".mat", fact) for fact in ("x_values.start_value", ".Tstart", ".start")),
+    ],
+)
+def test_starts_and_rates_beside_channels_are_read(tmp_path, suffix, fact):
+    times = np.arange(SAMPLES) / RATE_HZ
+    path = tmp_path / f"a{suffix}"
+    write_late = late_hdf5 if suffix == ".h5" else late_mat
+    late_s = 13 / RATE_HZ  # 2.5 ms are 12.8 samples
+    write_late(path, motion(times), 2 * motion(times + 0.0025), fact)
+    content = mapped("h5", RATE_HZ).model_dump()
+    names = ("/run/a", "/run/b") if suffix == ".h5" else ("run.a.y", "run.b.y")
+    content["channels"][0]["source"], content["channels"][1]["source"] = names
+    made = import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "made.h5")
+    with open_recording(made) as recording:
+        drive, response = (recording.read(role) for role in recording.roles)
+        (delay_s,) = (each.delay_s for each in recording.channels if each.role == "m0_velocity")
+    sampled = np.flatnonzero(~np.isnan(response))
+    assert sampled[0] == round(late_s * RATE_HZ)
+    np.testing.assert_allclose(drive[sampled], motion(sampled / RATE_HZ), atol=2e-5)
+    np.testing.assert_allclose(response[sampled], 2 * motion(sampled / RATE_HZ - delay_s), atol=1e-4)
+    content["sample_rate_hz"] = RATE_HZ * 1.05
+    with pytest.raises(InvalidRequest, match="samples/s"):
+        import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "wrong.h5")
+
+
 def test_a_mapping_overrides_the_times_of_a_file_and_says_so(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
     content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}

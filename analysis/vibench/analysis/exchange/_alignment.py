@@ -2,9 +2,11 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import inf
+from datetime import UTC, datetime
+from itertools import chain, pairwise
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +15,33 @@ import numpy as np
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._mapping import ImportMapping
-from ._source_channel import SECONDS, SourceChannel, rate_bounds
+from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
 
-_UNIT = r"(?:[ _]*[\[(]?(?P<unit>[kM]?Hz|[kM]?S/s|s|sec|ms|us|[\u00b5\u03bc]s)[\])]?)?"
-_RATE = re.compile(rf"(?:sampl\w*?[ _]?(?:rate|freq\w*)|f_?s|abtast(?:rate|frequenz)){_UNIT}", re.IGNORECASE)
+_HERTZ = {"hz": 1.0, "s/s": 1.0, "khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6}
+UNITS = {*_HERTZ, *SECONDS, "\u00b5s"} - {""}
+_WORDS = "|".join(re.escape(each) for each in sorted(UNITS, key=len, reverse=True))
+_UNIT = rf"(?:[ _/,]*(?:in )?[\[(]?(?P<unit>{_WORDS})[\])]?)?"
+_RATE = re.compile(
+    rf"(?:(?:(?:sampl\w*?|scan|acquisition|daq)[ _]?)?rate|sampl\w*?[ _]?freq\w*|samples[ _]?per[ _]?sec\w*"
+    rf"|f_?s(?:amp\w*)?|sr|sps|sfreq|abtast(?:rate|frequenz)){_UNIT}",
+    re.IGNORECASE,
+)
 _INTERVAL = re.compile(
-    rf"(?:sampl\w*?[ _]?(?:interval|period|time)|dt|delta[ _]?t|time[ _]?(?:step|increment)){_UNIT}",
+    r"(?:(?:sampl\w*?|scan)[ _]?(?:interval|period|time)|interval|(?:d|delta)[ _]?[tx]|[tx][ _]?(?:d|delta)"
+    rf"|time[ _]?(?:step|delta)|(?:(?:time|wf|x)[ _]?)?(?:increment|spacing)){_UNIT}",
+    re.IGNORECASE,
+)
+_START = re.compile(
+    r"(?:(?:(?:wf|time|t|x)[ _]?)?start(?:ing)?(?:[ _]?(?:time|offset|value))?|[tx]_?0"
+    rf"|(?:time|t)[ _]?offset){_UNIT}",
     re.IGNORECASE,
 )
 _TIME = re.compile(
-    rf"(?:(?:x|rel|relative)[ _]?)?(?:time|zeit|temps|t)(?:[ _]?(?:stamps?|axis|vector|channel))?{_UNIT}",
+    rf"(?:(?:x|rel|relative|elapsed)[ _]?)?(?:times?|zeit|temps|t|sec|seconds|sekunden)"
+    rf"(?:[ _]?(?:stamps?|axis|vector|channel))?{_UNIT}",
     re.IGNORECASE,
 )
-_HERTZ = {"khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6}
+_QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03bc]*)\s*", re.IGNORECASE)
 SAME_RATE = 1e-4
 """How far two statements of one sample rate may differ: clocks differ less."""
 EVEN = 1e-3
@@ -40,6 +56,9 @@ _RISING = 0.9
 """Share of its intervals that are not negative in a channel of times."""
 _BIN = 512
 """Samples of which the extremes are kept."""
+_LEAST_RISING = 64
+"""Numbers that must rise evenly before they count as times under another name than that of times."""
+_NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
 """Samples by which times may go back; more is another record."""
@@ -62,22 +81,70 @@ def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]
 
 def _rates_hz(facts: Iterable[tuple[str, Any]]) -> Iterator[float]:
     for name, value in facts:
-        number = np.ravel(value)
-        if number.size != 1 or number.dtype.kind not in "iuf" or not 0 < number[0] < inf:
+        number, unit = _number(value)
+        if not 0 < number < inf:
             continue
         if found := _RATE.fullmatch(name.strip()):
-            yield float(number[0]) * _HERTZ.get((found["unit"] or "").casefold(), 1.0)
+            yield number * _HERTZ.get((found["unit"] or unit).casefold(), 1.0)
         elif found := _INTERVAL.fullmatch(name.strip()):
-            bounds = rate_bounds(float(number[0]), 0.0, found["unit"] or "")
+            bounds = rate_bounds(number, 0.0, found["unit"] or unit)
             yield from () if bounds is None else bounds[:1]
 
 
-def time_unit(channel: SourceChannel) -> str | None:
-    """Return the unit of a channel of times, empty where the file states none; None for any other channel."""
-    found = _TIME.fullmatch(channel.label.strip())
-    if found is None or (channel.unit and channel.unit.casefold() not in SECONDS):
+def _number(value: Any) -> tuple[float, str]:
+    """Return a single number, also one that is written as text, and the unit behind it; NaN for all else."""
+    found = _QUANTITY.fullmatch(_text(value))
+    return (nan, "") if found is None else (float(found[1]), found[2])
+
+
+def _text(value: Any) -> str:
+    single = np.ravel(value)
+    if single.size != 1:
+        return ""
+    return text_of(single[0]) if isinstance(single[0], bytes) else str(single[0])
+
+
+def told_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
+    """Return when a channel's first sample was taken, as named facts state it, the nearest first.
+
+    A date and an offset from it are added, as in NI's waveforms.
+    """
+    moments_s, offsets_s = [], []
+    for name, value in facts:
+        if (found := _START.fullmatch(name.strip())) is None:
+            continue
+        number, unit = _number(value)
+        if isfinite(number):
+            offsets_s.append(number * SECONDS.get((found["unit"] or unit).casefold(), 1.0))
+        else:
+            with suppress(ValueError):
+                moment = datetime.fromisoformat(_text(value).strip())
+                moments_s.append((moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp())
+    return sum((*moments_s[:1], *offsets_s[:1])) if moments_s or offsets_s else None
+
+
+def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
+    """Place samples by a channel of times, read once in blocks.
+
+    None for a channel of other numbers. Whatever its name, a channel that rises evenly and has no unit of
+    another quantity contains times, or counts samples.
+    """
+    found, said = _TIME.fullmatch(channel.label.strip()), channel.unit.casefold()
+    first = next(iterator := iter(blocks), np.empty(0))
+    scan = _begin(first) if found is not None or said in _NO_UNITS else None
+    is_named = found is not None and said in SECONDS
+    if scan is None or not (is_named or (first.size >= _LEAST_RISING and not scan.is_coarse)):
         return None
-    return channel.unit or found["unit"] or ""
+    for block in chain((first,), iterator):
+        scan.add(block)
+    axis = scan.axis()
+    if found is not None and is_named:
+        return replace(axis, unit=channel.unit or found["unit"] or "", is_named=True)
+    if axis.interval == 1:
+        return replace(axis, unit=None)
+    # Numbers under another name may have any unit: no exact rate, so that the mapping must confirm it.
+    uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
+    return replace(axis, unit=channel.unit if said in SECONDS else "", uncertainty=uncertainty)
 
 
 @dataclass(frozen=True)
@@ -94,17 +161,26 @@ class TimeAxis:
     """First sample, and its place in sample intervals, of each stretch without irregularity."""
     trouble: str = ""
     """Why samples cannot be placed."""
+    unit: str | None = ""
+    """Empty where the file states none; None where these are numbers of samples."""
+    is_named: bool = False
+    """Whether the channel is called time."""
 
-    def of(self, channel: SourceChannel, unit: str) -> SourceChannel:
-        """Return a channel with these times; what it said of its rate itself must agree."""
+    def of(self, channel: SourceChannel) -> SourceChannel:
+        """Return a channel with these times; what it said of its rate itself must agree.
+
+        A count of samples (no unit) shows which are missing, and nothing else.
+        """
+        trouble = channel.time_trouble or self.trouble
+        if (unit := self.unit) is None:
+            return replace(channel, runs=self.runs, time_trouble=trouble)
         bounds = rate_bounds(self.interval, self.uncertainty, unit)
         told = channel.sample_rate_hz
         if told is not None and not unit:
             # A rate tells in which unit the times are.
-            units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in ("s", "ms", "us")}
+            units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in _UNITS}
             unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(told, b)), (unit, bounds))
         second = SECONDS[unit.casefold()]
-        trouble = channel.time_trouble or self.trouble
         if told is not None and bounds is not None and not agrees(told, bounds):
             trouble = f"says {told:.9g} samples/s, and its times say {sum(bounds) / 2:.9g}"
         is_exact = bounds is not None and self.uncertainty == 0
@@ -112,7 +188,9 @@ class TimeAxis:
             channel,
             sample_rate_hz=told if told is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            start_s=self.start * second,
+            # Times that begin at zero count from the start that the file states beside them.
+            start_s=self.start * second
+            + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,
             runs=self.runs,
             time_unit=unit,
@@ -124,22 +202,6 @@ def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
     """Return whether a rate lies within bounds, widened by the difference of two clocks."""
     low, high = bounds_hz
     return low * (1 - SAME_RATE) <= rate_hz <= high * (1 + SAME_RATE)
-
-
-def time_axis(blocks: Iterable[Reals]) -> TimeAxis | None:
-    """Place samples by their times, read once in blocks; None where the numbers are no times.
-
-    Times that have too few digits to place single samples are taken as even if they deviate from a straight
-    line by no more than their rounding.
-    """
-    scan: _Scan | None = None
-    for block in blocks:
-        if scan is None:
-            scan = _begin(block)
-            if scan is None:
-                return None
-        scan.add(block)
-    return None if scan is None else scan.axis()
 
 
 def _begin(block: Reals) -> "_Scan | None":
@@ -161,7 +223,7 @@ class _Scan:
 
     def __init__(self, interval: float, rounding: float) -> None:
         self._interval, self._rounding = interval, rounding
-        self._is_coarse = rounding > _OFF * interval
+        self.is_coarse = rounding > _OFF * interval
         self._last: tuple[float, int] | None = None
         self._start = 0.0
         self._samples = 0
@@ -179,7 +241,7 @@ class _Scan:
             self._last = (self._start - self._interval, -1)
         before, place = self._last
         steps = np.ones(block.size, dtype=np.int64)
-        if not self._is_coarse:
+        if not self.is_coarse:
             count = np.rint(np.diff(block, prepend=before) / self._interval)
             steps = np.clip(count, -FARTHEST, FARTHEST).astype(np.int64)
         places = place + np.cumsum(steps)
@@ -203,7 +265,7 @@ class _Scan:
         off = distance - slope * places / span - offset
         spread, interval = float(np.ptp(off)), self._interval + float(slope) / span
         allowed = (
-            _COARSE_SPREAD * self._rounding if self._is_coarse else 2 * _PLACED * interval + self._rounding
+            _COARSE_SPREAD * self._rounding if self.is_coarse else 2 * _PLACED * interval + self._rounding
         )
         trouble = self._trouble or _impossible(self._runs, self._samples, span)
         if not trouble and spread > allowed:
@@ -273,7 +335,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 _APART = 0.1
 """Largest offset, in sample intervals, that channels analysed together may have."""
 _IGNORE = 'give time = "even" and sample_rate_hz in the mapping to ignore it'
-_UNITS = ("s", "ms", "us")
+_UNITS = ("s", "ms", "us", "ns", "min", "h")
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,6 +387,9 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
         if len(own) > 1 or own[-1].end - own[0].place != each.samples:
             missing = own[-1].end - own[0].place - sum(one.samples for one in own)
             remarks[f"the times of {each.name} jump; {missing} samples are lost there"] = None
+        low, high = each.rates_hz
+        if each.time_unit is not None and (high / low - 1) * each.samples > 1:
+            remarks[f"the times of {each.name} have too few digits to show every lost sample"] = None
     late_s = tuple((offset - round(offset)) / rate_hz for offset in offsets)
     return Alignment(rate_hz, places, tuple(cut), late_s, tuple(remarks))
 

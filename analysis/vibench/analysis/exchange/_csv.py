@@ -15,7 +15,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ._alignment import stated_rate_hz
+from ._alignment import UNITS, stated_rate_hz
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
 
@@ -46,13 +46,13 @@ DELIMITERS = (";", "\t", ",", None)
 """In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
-    r"[\[(].*[\])]|-|%|(?:[mu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
+    r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
     r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2))?"
 )
 """One cell of a row of units."""
 NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
 STATEMENT = re.compile(
-    r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)\s*([\w/]*)"
+    r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
 )
 """A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
 
@@ -220,4 +220,6 @@ def _row(line: str, layout: _Layout) -> list[str]:
 def _statements(head: Sequence[str]) -> Iterator[tuple[str, float]]:
     for line in head:
         if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
-            yield f"{found[1].strip()} {found[3]}".strip(), float(found[2].replace(",", "."))
+            # A cell behind the number may be its unit, or another name.
+            unit = found[3] if found[3].casefold() in UNITS else ""
+            yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))

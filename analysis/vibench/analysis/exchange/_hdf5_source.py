@@ -15,7 +15,7 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz
+from ._alignment import stated_rate_hz, told_start_s
 from ._source_channel import SourceChannel, text_of
 
 FEWEST_SAMPLES = 2
@@ -94,8 +94,9 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
 def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
     known: dict[str, Facts] = {}
     for dataset in (item for _, item in walk(file) if _holds_samples(item)):
-        rate_hz, trouble = stated_rate_hz((*dataset.attrs.items(), *_facts(dataset.parent, known)))
-        said = {"sample_rate_hz": rate_hz, "time_trouble": trouble}
+        facts = (*dataset.attrs.items(), *_facts(dataset.parent, known))
+        rate_hz, trouble = stated_rate_hz(facts)
+        said = {"sample_rate_hz": rate_hz, "time_trouble": trouble, "start_s": told_start_s(facts)}
         if dataset.ndim == 1:
             yield _channel(dataset, dataset.name, dataset.shape[0], said), _Place(dataset.name, None)
             continue

@@ -21,7 +21,7 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz
+from ._alignment import stated_rate_hz, told_start_s
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
@@ -210,7 +210,10 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
 def _numbers(
     struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
 ) -> Iterator[tuple[SourceChannel, Any]]:
-    facts = (*((name, value) for name, value in struct.items() if np.size(value) == 1), *around)
+    # Some measuring programs keep start and increment in a struct beside the values.
+    own = {**struct, **(axis if isinstance(axis := struct.get("x_values"), dict) else {})}
+    facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
+    start_s = told_start_s(facts)
     rate_hz, trouble = stated_rate_hz(facts)
     unit = struct.get("units", struct.get("unit", ""))
     for name, value in struct.items():
@@ -221,7 +224,8 @@ def _numbers(
                 for channel, row in _channels(
                     f"{prefix}{name}", value, unit if isinstance(unit, str) else ""
                 ):
-                    yield replace(channel, sample_rate_hz=rate_hz, time_trouble=trouble), row
+                    told = replace(channel, sample_rate_hz=rate_hz, start_s=start_s, time_trouble=trouble)
+                    yield told, row
 
 
 def _holds_samples(values: np.ndarray[Any, Any]) -> bool:

@@ -15,7 +15,7 @@ from vibench.sim.hdf5_files.door import system_error
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import TimeAxis, time_axis, time_unit
+from ._alignment import time_axis
 from ._csv import open_csv
 from ._excerpt import BLOCK_SAMPLES
 from ._hdf5_source import open_hdf5_source
@@ -111,21 +111,18 @@ def opened_source(path: Path) -> Iterator[Source]:
 
 def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
     """Yield the channels with the times that stand beside them in the file."""
-    axes: dict[SourceChannel, tuple[TimeAxis, str]] = {}
-    for each in source.channels:
-        unit = time_unit(each)
-        axis = None if unit is None else time_axis(channel_blocks(source, each))
-        if unit is not None and axis is not None:
-            axes[each] = axis, unit
+    read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
+    axes = {each: axis for each, axis in read.items() if axis is not None}
     for number, each in enumerate(source.channels):
         above = [
             time for time in axes if time.samples == each.samples and _group(each).startswith(_group(time))
         ]
+        above = [time for time in above if axes[time].is_named] or above
         nearest = max((len(_group(time)) for time in above), default=0)
         near = [time for time in above if len(_group(time)) == nearest]
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
-        yield axes[chosen[0]][0].of(each, axes[chosen[0]][1]) if chosen else each
+        yield axes[chosen[0]].of(each) if chosen else each
 
 
 def _group(channel: SourceChannel) -> str:

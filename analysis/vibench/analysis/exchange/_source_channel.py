@@ -14,9 +14,12 @@ from ..signals.arrays import Reals
 LEAST_INTERVAL_S = 1e-100
 """Shorter is no time between samples, and its inverse may be no number."""
 SECONDS = {
-    **dict.fromkeys(("", "none", "s", "sec", "second", "seconds"), 1.0),
-    "ms": 1e-3,
-    **dict.fromkeys(("us", "\u03bcs"), 1e-6),
+    **dict.fromkeys(("", "none", "s", "sec", "secs", "sek", "second", "seconds", "sekunden"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "\u03bcs", "usec", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nanosecond", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("min", "minute", "minutes", "minuten"), 60.0),
+    **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
 }
 """Of a unit of time, by its text without regard to case."""
 

@@ -11,14 +11,12 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz
+from ._alignment import stated_rate_hz, told_start_s
 from ._source_channel import SourceChannel
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
-INTERVAL, UNIT = "wf_increment", "unit_string"
-START, OFFSET = "wf_start_time", "wf_start_offset"
-"""Properties that NI's software writes; the offset is that of the first sample from the start time [s]."""
+UNIT = "unit_string"
 START_ERROR_S = 1e-6
 """Start times are kept in microseconds."""
 
@@ -66,32 +64,24 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             for each in group.channels()
             if len(each) > 1 and each.dtype.kind in "iuf"
         ]
-        starts = [np.datetime64(each.properties[START], "us") for each in found if START in each.properties]
-        origin = min(starts, default=np.datetime64(0, "us"))
-        yield TdmsSource({_channel(file, each, origin): each for each in found})
+        yield TdmsSource({_channel(file, each): each for each in found})
 
 
-def _channel(file: Any, channel: Any, origin: np.datetime64) -> SourceChannel:
+def _channel(file: Any, channel: Any) -> SourceChannel:
     own = channel.properties
-    interval_s = float(own.get(INTERVAL, 0.0))
     facts = [
-        ("dt", interval_s),
         *own.items(),
         *file[channel.group_name].properties.items(),
         *file.properties.items(),
     ]
     rate_hz, trouble = stated_rate_hz(facts)
-    is_placed = START in own or OFFSET in own
-    start = np.datetime64(own[START], "us") if START in own else origin
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
         sample_rate_hz=rate_hz,
         unit=str(own.get(UNIT, "")),
-        start_s=(start - origin) / np.timedelta64(1, "s") + float(own.get(OFFSET, 0.0))
-        if is_placed
-        else None,
-        start_error_s=START_ERROR_S if START in own else 0.0,
+        start_s=told_start_s(own.items()),
+        start_error_s=START_ERROR_S,
         time_trouble=trouble,
     )

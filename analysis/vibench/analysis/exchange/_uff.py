@@ -260,7 +260,8 @@ def _skip_text(file: BinaryIO) -> None:
 def _channel(number: int, header: list[str]) -> SourceChannel:
     rates = [rate for line in header[:5] if (rate := exact_rate_hz(line)) is not None]
     label = header[0].strip()
-    start, second = _real(header[6][30:43]), SECONDS.get(header[7][46:66].strip().casefold())
+    unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
+    second = SECONDS.get(unit.casefold())
     return SourceChannel(
         name=str(number),
         samples=int(header[6][10:20]),
@@ -268,16 +269,13 @@ def _channel(number: int, header: list[str]) -> SourceChannel:
         sample_rate_hz=rates[0] if rates else None,
         origin=next(filter(None, map(read_origin, header[:5])), None),
         unit=header[8][46:66].strip().removesuffix("NONE"),
-        rate_bounds_hz=_rate_bounds(header),
+        rate_bounds_hz=None if increment is None else rate_bounds(increment, DIGITS * increment, unit),
         start_s=start * second if start is not None and second is not None else None,
         start_error_s=DIGITS * abs(start) * second if start is not None and second is not None else 0.0,
+        time_trouble=f"states its start in {unit!r}, which is no unit of time"
+        if start and second is None
+        else "",
     )
-
-
-def _rate_bounds(header: list[str]) -> tuple[float, float] | None:
-    """Take the increment of time for what its digits are worth; None where it is none, or in another unit."""
-    increment = _real(header[6][43:56])
-    return None if increment is None else rate_bounds(increment, DIGITS * increment, header[7][46:66].strip())
 
 
 def _real(text: str) -> float | None:
