@@ -145,11 +145,7 @@ def write_csv(content: Table, path: Path) -> Path:
 
 
 def _text(cell: float | str) -> str:
-    match cell:
-        case float():
-            return f"{cell:.{_DIGITS}g}"
-        case _:
-            return str(cell)
+    return f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)
 
 
 def write_tables(tables: Sequence[Table], folder: Path) -> tuple[Path, ...]:

@@ -231,11 +231,7 @@ def pieces_between(
 def longest_window_s(tables: ChainTables, drive: Drive) -> float:
     """Return the most time that a window may take: none reaches beyond a piece of the drive."""
     window = float(tables.windows[0])
-    match drive:
-        case Harmonic():
-            return window
-        case _:
-            return min(window, _grid(tables, drive)[0])
+    return window if isinstance(drive, Harmonic) else min(window, _grid(tables, drive)[0])
 
 
 def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:

@@ -278,11 +278,7 @@ def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) 
         )
 
     def serialise(answer: Fields | bytes) -> bytes:
-        match answer:
-            case bytes():
-                return answer
-            case _:
-                return bytes(response(**answer).SerializeToString())
+        return answer if isinstance(answer, bytes) else bytes(response(**answer).SerializeToString())
 
     handler = unary.get(method.name) or _not_simulated(method.name)
     return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
