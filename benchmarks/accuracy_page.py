@@ -41,7 +41,6 @@ def accuracy_document(benchmark: AccuracyBenchmark, picture: str) -> str:
         What was measured.
     picture
         Path of the figure, relative to the page.
-
     """
     return "\n".join(_lines(benchmark, picture)) + "\n"
 
@@ -205,7 +204,6 @@ def main() -> None:
     pictures = tradeoff_figure(benchmark).save(given.markdown.parent / "images")
     picture = Path(os.path.relpath(pictures[0], given.markdown.parent)).as_posix()
     given.markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
-
 
 if __name__ == "__main__":
     main()

@@ -211,7 +211,6 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
         Responses at every drive level, the first figure.
     score
         How many claims hold at each damping.
-
     """
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
     missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""

@@ -208,7 +208,6 @@ class Labelled:
         ------
         InvalidRequest
             When xarray is not installed.
-
         """
         try:
             import xarray  # noqa: PLC0415 - optional, and slow to load

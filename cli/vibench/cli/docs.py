@@ -51,7 +51,6 @@ def build(target: Path, extent: str) -> None:
     ------
     MissingLibrary
         When Sphinx and its extensions are not installed.
-
     """
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:

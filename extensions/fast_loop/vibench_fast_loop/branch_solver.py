@@ -85,7 +85,6 @@ class BranchSolver:
         Amplitude of the base's displacement, at the start.
     step_hz
         A step of one.
-
     """
 
     def __init__(
@@ -184,7 +183,6 @@ def residual_of(base_m: Coefficients, level_m: float) -> Vector:
         Displacement of the base from the first harmonic on, phases against the first coefficient [m].
     level_m
         What it should be [m].
-
     """
     rest = base_m[1:] / level_m
     return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])

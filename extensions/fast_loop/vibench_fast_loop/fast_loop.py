@@ -99,7 +99,6 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     LimitExceeded
         With the largest multiplier of the loop and how far it would hold, or with why that is not known.
         Nothing was played.
-
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "whether the fast loop holds the branch is not known: "
@@ -216,7 +215,6 @@ def branch_hold(
     Returns
     -------
     None where the model has no motion to begin with.
-
     """
     spring = spring_of(plant.specimen)
     if spring.kinks:
@@ -296,7 +294,6 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
     Returns
     -------
     Magnitudes, shape (points,).
-
     """
     rate_hz = plant.timing.rate_hz
     courses = [motion_slopes(plant.specimen, branch, point, rate_hz) for point in points]
@@ -320,7 +317,6 @@ def motion_slopes(
     Returns
     -------
     Stiffness, damping, periods and parts, as `loop_multiplier` takes them.
-
     """
     spring = spring_of(specimen)
     drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))

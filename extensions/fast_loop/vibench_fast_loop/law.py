@@ -60,7 +60,6 @@ def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Lin
         As far as it is known; the law is made for its latency.
     weights
         What is weighed.
-
     """
     step, volt, shown, cost, unknown, noise = _weighed(plant, weights)
     gain = _gain(step, volt[:, None], cost, np.eye(1))
@@ -86,7 +85,6 @@ def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights())
         Which is answered: 0 the base's acceleration, 1 m0's velocity.
     weights
         What is weighed.
-
     """
     problem, step_s = _weighed(plant, weights), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
@@ -180,7 +178,6 @@ def loop_multiplier(
         Over how many periods the slopes go; as many as take a whole number of samples, or nearly so.
     parts
         Of a sample: contacts are shorter.
-
     """
     stretches = _joined(plant, law, parts)
     into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)

@@ -90,7 +90,6 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
     Returns
     -------
     An error that is not finite where the changes tell nothing.
-
     """
     rows = 2 * motion.periods * _EACH
     steps = motion.period / _EACH
@@ -121,7 +120,6 @@ def envelope_deviation(signal: Vector, period: float) -> float:
         At least some twenty periods, shape (samples,).
     period
         Of the drive [samples].
-
     """
     half = round(_HALF * period)
     turn = np.exp(-2j * np.pi * np.arange(len(signal)) / period)

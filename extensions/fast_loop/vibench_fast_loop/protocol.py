@@ -153,7 +153,6 @@ class LoopController(RealTimeController, Protocol):
         ------
         InstrumentLost
             When nobody answers.
-
         """
 
     def silence(self, ramp_s: float) -> LoopReport:

@@ -54,7 +54,6 @@ class VirtualController:
         Rig time [s].
     grid_rate_hz
         Steps a second of the world that it samples; a whole number of them from sample to sample.
-
     """
 
     def __init__(self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float) -> None:

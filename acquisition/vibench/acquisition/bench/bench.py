@@ -75,7 +75,6 @@ class BenchLock:
         ------
         InstrumentBusy
             When another process holds one of its instruments, or something else lies in a lock's place.
-
         """
         lock = cls([])
         if rig.virtual is not None or rig.plays_back:
@@ -310,7 +309,6 @@ def open_bench(
         When another program has this bench open.
     InstrumentError
         When an instrument cannot be opened; the others are then closed again.
-
     """
     rig = config if isinstance(config, Rig) else load_rig(config)
     has_sensors = rig.virtual is None and not rig.plays_back

@@ -29,7 +29,6 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
         ``"@py"`` for pyvisa-py, empty for the system's VISA.
     server
         Address of a DAQmx device server, ``"host:port"``; None: the driver on this computer.
-
     """
     remarks: list[str] = []
     resources: tuple[str, ...] = ()

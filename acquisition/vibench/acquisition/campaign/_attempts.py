@@ -90,7 +90,6 @@ class Attempts:
         ------
         AcquisitionError
             What the last attempt failed with; it stands in the journal.
-
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)

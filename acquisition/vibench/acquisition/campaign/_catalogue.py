@@ -189,7 +189,6 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     ------
     RecordingError
         When there is no such folder, or ``catalogue.sqlite`` is something else.
-
     """
     if not folder.is_dir():
         raise RecordingError(f"{folder} is no folder; give the folder that the recordings are in.")
@@ -322,7 +321,6 @@ def verify_recordings(
     ------
     RecordingError
         When there is no such place, or the key cannot be read.
-
     """
     forget_checks()
     if not place.exists():

@@ -322,7 +322,6 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     ------
     RecordingError
         When there is no journal, or it is not one.
-
     """
     if not path.is_file():
         raise RecordingError(f"{path} does not exist, or is no file; give the path of a campaign's journal.")

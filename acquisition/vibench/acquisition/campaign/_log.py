@@ -267,7 +267,6 @@ class CommandMessenger:
         ------
         ConfigurationError
             When it is empty, a quotation mark is missing, or there is no such program.
-
         """
         try:
             arguments = tuple(shlex.split(command))

@@ -164,7 +164,6 @@ def planned_recordings(
     ------
     RecordingError
         When recordings exist and ``existing`` refuses that, or a complete one was made by another plan.
-
     """
     points = campaign.points()
     match existing:

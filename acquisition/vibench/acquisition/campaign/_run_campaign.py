@@ -255,7 +255,6 @@ def run_campaign(
         When the bench has changed and ``changed_bench`` refuses that.
     AcquisitionError
         Whatever a failing run raises, when ``after_failure`` says stop, or an instrument is lost.
-
     """
     existing = chosen(ExistingRecordings, existing)
     after_failure = chosen(AfterFailure, after_failure)
@@ -337,7 +336,6 @@ class ReconnectingBench:
         ------
         AcquisitionError
             When an instrument is still not there. The bench is closed then; reopen again.
-
         """
         before, self._bench = self._bench, None
         if before is not None:
@@ -441,7 +439,6 @@ def estimate_campaign(
         When the rig lacks what a measurement is played with.
     LimitExceeded
         When feedback on it does not hold the motions that one asks for.
-
     """
     for each in campaign.measurements:
         require_played(each, rig)

@@ -58,7 +58,6 @@ def last_check(rig_name: str) -> CheckResult | None:
     ----------
     rig_name
         As the hardware configuration says it.
-
     """
     return _read(archive_path(rig_name))
 
@@ -184,7 +183,6 @@ def check_bench(
         Ends the check from another thread.
     new_reference
         Compare with nothing: what has changed since was meant.
-
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed(bench.rig)
@@ -219,7 +217,6 @@ def require_fresh(
         Where recordings will go.
     switch
         Lets others end a check that is made now.
-
     """
     if bench.rig.plays_back:
         return None

@@ -63,7 +63,6 @@ def bench_report(
         Lets others end the check, within a block of samples.
     amplitude_vpp
         Of the sine; absent, two per cent of the amplitude limit, or less, so that no stop is touched [V].
-
     """
     if bench.rig.plays_back:
         raise ConfigurationError(

@@ -46,7 +46,6 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
     ----------
     volts
         Shape (samples,), more than one period.
-
     """
     angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)

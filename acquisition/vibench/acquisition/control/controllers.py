@@ -54,7 +54,6 @@ def feedback_controller(
     ConfigurationError
         When the rig lacks a channel that feedback listens to, or no package offers the controller; before
         anything is yielded.
-
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     kind = measurement.excitation.kind

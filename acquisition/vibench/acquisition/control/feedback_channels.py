@@ -151,7 +151,6 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
     ------
     LimitExceeded
         The run then ramps down.
-
     """
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:

@@ -65,7 +65,6 @@ class Equaliser:
         ------
         LimitExceeded
             When it needs more than the plan's largest setting.
-
         """
         plan = self._plan
         density = self.target * 10 ** (level_db / 10) / self._gain
@@ -87,7 +86,6 @@ class Equaliser:
         ------
         LimitExceeded
             When a density is past its abort line, or the base hardly answers.
-
         """
         heard = Heard(self._density(drive), self._density(base), self._density(response), _kurtosis(base))
         self._require_answer(heard)

@@ -217,7 +217,6 @@ class PhaseSearch:
         ----------
         sensor_phase_deg
             Standard uncertainty of the phase that all tries share [degrees].
-
         """
         nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]

@@ -49,7 +49,6 @@ def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.
     ----------
     frequency_hz, transmissibility
         Shape (points,), around the resonance.
-
     """
     if 2 * len(frequency_hz) <= _UNKNOWNS:
         return None

@@ -53,7 +53,6 @@ class GainEstimator:
         ----------
         modelled, target
             Base acceleration of the linear model at this setting, and the one to be held [m/s2].
-
         """
         if not len(base):
             return

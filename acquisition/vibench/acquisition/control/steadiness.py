@@ -105,7 +105,6 @@ class Stroboscope:
     ----------
     drives
         Periods of the drive in one of the motion.
-
     """
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
@@ -178,7 +177,6 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
     ----------
     turns
         Cycles per sample.
-
     """
     sample = np.arange(len(signal))
     low = np.minimum(starts.astype(np.int64), len(signal) - 2)
@@ -250,7 +248,6 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
         Fourier coefficients of each drive period, shape (periods, orders).
     noise
         Rms of them in silence, all orders together; unit of the points.
-
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)

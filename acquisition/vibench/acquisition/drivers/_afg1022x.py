@@ -79,7 +79,6 @@ class AFG1022X(ScpiInstrument):
         InstrumentLost, InstrumentBusy, InstrumentError
             When nothing, another program, or another instrument answers; the output is then off,
             as far as the instrument could be reached.
-
         """
         generator = cls(config)
         leave = generator.disconnect  # another instrument gets no further commands
@@ -135,7 +134,6 @@ class AFG1022X(ScpiInstrument):
             When the memory reads back differently.
         LimitExceeded
             When points, repetition or amplitude are outside what instrument or bench allow.
-
         """
         codes = self.model.codes(waveform)
         panel_vpp = amplitude_vpp * codes.panel_factor
@@ -201,7 +199,6 @@ class AFG1022X(ScpiInstrument):
         ------
         InstrumentLost
             When the generator could not be reached: the output may be ON, and the operator must act.
-
         """
         if self._is_silent_and_closed:
             return

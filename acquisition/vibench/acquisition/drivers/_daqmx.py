@@ -90,7 +90,6 @@ def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:
         When the server does not answer.
     InstrumentError
         When this computer has no driver.
-
     """
     session = daqmx_session(server)
     try:
@@ -132,7 +131,6 @@ def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | No
         When coupling or sensor current read back differently.
     DaqError
         When the device refuses a setting.
-
     """
     task.ai_channels.add_ai_voltage_chan(
         channel.physical,
@@ -253,7 +251,6 @@ class DaqmxDigitizer:
         ------
         InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError, SettingRefused
             As `_daqmx_errors` tells them apart. Nothing stays reserved then.
-
         """
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
         with ExitStack() as undo:
@@ -303,7 +300,6 @@ class DaqmxDigitizer:
             When the device or its server is gone.
         InstrumentError
             When the samples do not come in time, or nothing is running.
-
         """
         if not self._is_running:
             raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")

@@ -121,7 +121,6 @@ def daqmx_call(doing: str) -> Iterator[None]:
     ----------
     doing
         ``"reading cDAQ1Mod1"``: the start of the sentence.
-
     """
     try:
         yield

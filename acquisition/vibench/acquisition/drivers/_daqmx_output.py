@@ -59,7 +59,6 @@ class DaqmxOutput:
             When the device takes another sample rate than the one asked for.
         InstrumentError
             As `_daqmx_errors` tells them apart; nothing stays reserved then.
-
         """
         output = cls(physical, config, digitizer)
         output._to_zero()
@@ -93,7 +92,6 @@ class DaqmxOutput:
             When a sample is past the limit of the bench, or no number. Nothing was written.
         DataLost
             When the output ran dry before: it has stopped.
-
         """
         peak_v = float(np.max(np.abs(volts), initial=0.0))
         if not peak_v <= self._config.limit_v:  # so that a NaN does not pass
@@ -123,7 +121,6 @@ class DaqmxOutput:
         ------
         InstrumentLost
             When the device or its server is gone: the output then runs dry by itself.
-
         """
         if self._task is None:
             return

@@ -110,7 +110,6 @@ class GeneratorModel:
         ------
         LimitExceeded
             When the waveform has too few or too many points, is not finite, leaves -1 to 1, or is constant.
-
         """
         values = np.asarray(waveform, dtype=np.float64)
         fewest, most = self.memory_points

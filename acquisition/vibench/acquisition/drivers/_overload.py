@@ -23,7 +23,6 @@ def overload_ranges(
         One for each channel.
     first_sample
         Position of the block in the run.
-
     """
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)

@@ -46,7 +46,6 @@ class ScpiInstrument:
         Replaces ``{c}`` in the headers of settings.
     settle_s
         Pause that the instrument needs after each command [s]; it needs none after an answer.
-
     """
 
     def __init__(

@@ -138,7 +138,6 @@ class SoundCardDigitizer:
             When a calibration is missing, or an input is to be coupled to DC or fed with a current.
         InstrumentLost, InstrumentError
             When there is no such card, or it does not take the rate.
-
         """
         _require_calibration(rig)
         channels = channels_of(rig)

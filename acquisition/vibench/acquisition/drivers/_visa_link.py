@@ -36,7 +36,6 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
         When another program holds it.
     InstrumentError
         When the VISA library itself cannot be used.
-
     """
     manager = _manager(visa_library)
     try:

@@ -64,7 +64,6 @@ def announced(address: EngineAddress, what: str, press: Callable[[StopLevel, str
     ------
     AcquisitionError
         When the state folder cannot be written: nobody could stop what cannot be found.
-
     """
     told = Announcement.model_validate({**facts_of_this_process(what), "address": address})
     with reached(press, told):
@@ -103,7 +102,6 @@ def the_engine(pid: int | None) -> Announcement:
     ------
     EngineError
         When there is none, or more than one and none was named.
-
     """
     chosen = [each for each in announced_engines() if pid in (None, each.pid)]
     if chosen:
@@ -135,7 +133,6 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     ------
     EngineError
         When there is none.
-
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained)
@@ -161,7 +158,6 @@ def require_ended(engine: Announcement) -> None:
     ------
     EngineGone
         When it was killed; the sentence says to switch the amplifier off.
-
     """
     if engine.was_killed:
         raise EngineGone(f"The engine was killed. {SWITCH_OFF}")
@@ -236,7 +232,6 @@ def exchanged(
         When the connection has ended; it is closed then.
     AcquisitionError
         What the engine refuses with.
-
     """
     usual_s = connection.gettimeout()
     patience_s = (usual_s or PATIENCE_S) + work_s
@@ -307,7 +302,6 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
             When no answer comes within ``patience_s`` [s], now or later.
         EngineGone
             When nobody listens there.
-
         """
         return cls(connected(address, chosen(ConnectionRole, role), patience_s))
 

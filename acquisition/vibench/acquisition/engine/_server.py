@@ -296,7 +296,6 @@ def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterato
     ------
     AcquisitionError
         When the state folder cannot be written: nobody could stop what cannot be found.
-
     """
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))

@@ -114,7 +114,6 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
     ------
     EngineGone
         When it does not start.
-
     """
     supervision = chosen(Supervision, supervision)
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
@@ -178,7 +177,6 @@ def stop_engine(
         When the process has ended, or when it could neither be told nor anything be put down.
     EngineError
         When a hold is asked of a program that is no engine.
-
     """
     level = chosen(StopLevel, level)
     reason = reason.encode(errors="replace").decode()  # a terminal gives what is no text as surrogates

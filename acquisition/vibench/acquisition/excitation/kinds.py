@@ -141,7 +141,6 @@ def present_word(word: str) -> str:
     ----------
     word
         Name of a kind of excitation, of this version or of an earlier one.
-
     """
     return _PRESENT_WORDS.get(word, word)
 
@@ -164,7 +163,6 @@ def rows_by_kind(
     ------
     KeyError
         When a row is given for a word that is no kind.
-
     """
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():

@@ -67,7 +67,6 @@ def flat_periods(
     -------
     tuple of arrays
         ``realisations`` arrays of shape (points,), read-only: who asks again is given the same.
-
     """
     return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
 
@@ -91,7 +90,6 @@ def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisat
     -------
     Samples
         Shape (points,), in the unit of ``peaks``.
-
     """
     candidates = [_period(lines, seed, (realisation, each), points, peaks) for each in range(CANDIDATES)]
     return min(candidates, key=lambda period: float(np.max(np.abs(period)))) * (points / 2)
@@ -118,7 +116,6 @@ def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None
     ------
     ConfigurationError
         Which says what would be allowed.
-
     """
     image_hz = points * repetition_hz - stop_hz
     if image_hz < NEAREST_IMAGE_RATIO * stop_hz:

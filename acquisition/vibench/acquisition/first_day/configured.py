@@ -390,7 +390,6 @@ def first_day(
         When a pair of wires is not confirmed; nothing has played then.
     InstrumentError
         When an instrument fails.
-
     """
     folder = config.absolute().parent
     again = f"begin again with --from {in_a_command(config)} and the name of a new one"

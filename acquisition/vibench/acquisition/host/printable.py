@@ -16,7 +16,6 @@ def printable(text: str) -> str:
     ----------
     text
         From a file, a folder or an instrument.
-
     """
     if text.isprintable():
         return text

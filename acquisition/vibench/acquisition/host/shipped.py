@@ -57,7 +57,6 @@ def named(given: Path | str, folder: str) -> Path:
     ------
     ConfigurationError
         When a bare name is neither; it lists the names that there are.
-
     """
     path = Path(given).expanduser()
     if path.suffix or path.name != str(path) or path.is_file():

@@ -35,7 +35,6 @@ def load_toml(path: Path, model: type[Model]) -> Model:
     ------
     ConfigurationError
         When the file is missing, is not TOML, or says something the model does not allow.
-
     """
     try:
         content = toml_table(path)
@@ -106,7 +105,6 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
         What it was given: it tells keys of the file from the model's names of kinds of value.
     within
         Where to look; nothing is said of the rest.
-
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
@@ -235,7 +233,6 @@ def save_toml(model: BaseModel, path: Path) -> None:
     ------
     ConfigurationError
         When the file cannot be written.
-
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -79,7 +79,6 @@ def missing_package(name: str) -> str | None:
     Returns
     -------
     The sentence; None where no package of ours offers that name.
-
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -98,7 +97,6 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
     ----------
     kind
         Group of entry points.
-
     """
     return tuple(sorted({row.name for row in _rows(kind)}))
 
@@ -117,7 +115,6 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     ------
     ConfigurationError
         When no package offers the name, two do, or the package that does cannot be imported.
-
     """
     found = {row.value: row for row in _rows(kind) if row.name == name}
     if not found:
@@ -167,7 +164,6 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     ------
     ConfigurationError
         As `plug_in` does.
-
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)

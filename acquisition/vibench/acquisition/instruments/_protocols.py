@@ -183,7 +183,6 @@ class FunctionGenerator(Protocol):
         ------
         LimitExceeded
             When the generator makes no such sweep by itself; see `GeneratorDescription.longest_sweep_s`.
-
         """
 
     def set_frequency(self, frequency_hz: float) -> None:
@@ -245,7 +244,6 @@ class Digitizer(Protocol):
             When samples were overwritten before they were read.
         InstrumentLost
             When the device or its server is gone.
-
         """
 
     @property
@@ -294,7 +292,6 @@ class AnalogOutput(Protocol):
             When a sample is past the limit of the bench. Nothing was written.
         DataLost
             When the output ran dry: it has stopped.
-
         """
 
     def arm(self) -> None:
@@ -332,7 +329,6 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
     ------
     InstrumentError
         When the block holds none, of other channels, or no finite volts; or what `Digitizer.read` raises.
-
     """
     block = digitizer.read(samples)
     rows = len(digitizer.roles)

@@ -138,7 +138,6 @@ def load_campaign(path: Path | str) -> Campaign:
     ------
     ConfigurationError
         With file, key, what was given and what is allowed.
-
     """
     return load_toml(named(path, "campaigns"), Campaign)
 

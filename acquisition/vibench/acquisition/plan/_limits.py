@@ -157,7 +157,6 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
         Naming every violation with value, limit, source and remedy. Nothing was moved.
     ConfigurationError
         When a recording is played back that was made with another plan.
-
     """
     require_own_plan(measurement, rig)
     checks = limit_checks(measurement, rig)
@@ -393,7 +392,6 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
         Setting that would do without stops; never exceeded [V].
     rig
         Says what specimen stands on the table.
-
     """
     model = RigModel(rig)
     per_vpp = 0.5 * rig.generator.terminal_factor()
@@ -435,7 +433,6 @@ def expected_under_check(
         Peak at the generator's terminal [V].
     quantity
         Of base or specimen, which says the unit: SI, such as m/s2 for an acceleration.
-
     """
     model = RigModel(rig)
     free = terminal_v * model.transfer(quantity, _KNOWN_HZ)
@@ -454,7 +451,6 @@ def nearest_expected(measured: float, expected: ComplexArray) -> float:
         Amplitude of the base [m/s2].
     expected
         As `expected_under_check` gives it, shape (n,) [m/s2].
-
     """
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

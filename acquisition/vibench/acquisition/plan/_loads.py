@@ -182,7 +182,6 @@ def needed_vpp(
         Of the sine.
     on_table
         Feedback asks for the bare table, smooth over frequency, and measures what the specimen does to it.
-
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()

@@ -249,7 +249,6 @@ def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
         What is played at its end.
     measurement
         Says how long a ramp takes, and in what steps.
-
     """
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
@@ -307,7 +306,6 @@ def half_cosine(progress: float) -> float:
     -------
     float
         0 to 1.
-
     """
     return 0.5 * (1 - cos(pi * progress))
 

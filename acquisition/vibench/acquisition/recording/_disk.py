@@ -52,7 +52,6 @@ def sole_use(path: Path) -> Iterator[None]:
     ------
     RecordingError
         When another process is recording to it.
-
     """
     with closing(OpenFile(path)) as file:
         if not file.is_locked_alone():

@@ -71,7 +71,6 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         A second of it or so, shape (samples,); lost samples are NaN.
     sample_rate_hz
         Of the samples; nothing is found below 20 kHz.
-
     """
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
@@ -123,7 +122,6 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
         Of the samples.
     dropouts
         Those found in it.
-
     """
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
         return velocity.size
@@ -217,7 +215,6 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
         Shape (samples,); it is left as it is.
     dropouts
         As `found_dropouts` gives them.
-
     """
     mended, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:

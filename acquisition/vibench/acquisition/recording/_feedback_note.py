@@ -395,7 +395,6 @@ def feedback_note(event: Event) -> FeedbackNote | None:
     ------
     RecordingError
         When it is a note of a version that this program does not know.
-
     """
     if event.kind not in _KINDS:
         return None

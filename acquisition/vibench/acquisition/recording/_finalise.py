@@ -345,7 +345,6 @@ def recover(path: Path | str) -> Path:
     ------
     RecordingError
         When there is nothing to recover, the file is still being recorded, or is not ours.
-
     """
     path = Path(path)
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path

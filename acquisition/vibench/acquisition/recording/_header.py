@@ -310,6 +310,5 @@ def coupling_cut_hz(coupling: str) -> float:
     ----------
     coupling
         ``"AC"``, or ``"DC"``: direct voltage passes, and 0 is given.
-
     """
     return _AC_CUT_HZ if coupling == "AC" else 0.0

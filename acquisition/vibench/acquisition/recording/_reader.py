@@ -55,7 +55,6 @@ def open_hdf5(path: Path) -> h5py.File:
     ------
     RecordingError
         One sentence for each way in which it is not a readable recording.
-
     """
     _require_file(path)
     try:
@@ -255,7 +254,6 @@ class Recording(RecordingDescription):
         ------
         RecordingError
             When there is no such channel or range, or the file is damaged there.
-
         """
         channel = self.channel(role)
         counts = self.read_counts(role, start, stop)
@@ -324,7 +322,6 @@ class Recording(RecordingDescription):
         ------
         RecordingError
             When the key cannot be read.
-
         """
         found = self._check_own_seal(SealDepth(depth), key)
         noted = noted_seals(self.path)
@@ -395,7 +392,6 @@ class Recording(RecordingDescription):
         ------
         RecordingError
             When the recording is not finished, an axis does not fit, or the disk refuses.
-
         """
         self._require_finished("added to")
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
@@ -445,7 +441,6 @@ def open_recording(path: Path | str) -> Recording:
     ------
     RecordingError
         When the file is missing, empty, cut short, damaged, no recording, or from a newer version.
-
     """
     handle = OpenRecording(Path(path))
     try:

@@ -110,7 +110,6 @@ def seal_key(path: Path | None = None) -> SealKey | None:
     ------
     RecordingError
         When the file cannot be read, or is too short to be a secret.
-
     """
     named = os.environ.get(KEY_VARIABLE, "") if path is None else str(path)
     if not named:
@@ -382,7 +381,6 @@ def opened(uri: str) -> sqlite3.Connection:
     ----------
     uri
         Address of the file with its mode, as SQLite spells it.
-
     """
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
@@ -402,7 +400,6 @@ def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connecti
     ------
     sqlite3.Error
         Whatever the first use raised, after closing.
-
     """
     try:
         yield connection

@@ -117,7 +117,6 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
     RecordingError
         When the name is not ``NAME.h5``, a file of that name exists in any of its three forms, or
         the disk has no room for the planned samples.
-
     """
     path = Path(path)
     if path.suffix != layout.SUFFIX:
@@ -187,7 +186,6 @@ class RecordingWriter:
         RecordingError
             When the block does not fit (shape, order, volts that are no counts, end of the room),
             or the disk has failed. What was committed is kept.
-
         """
         self._check(block)
         # A converter's own counts are recorded as they are.
@@ -233,7 +231,6 @@ class RecordingWriter:
         RecordingError
             When the disk failed on the way. The samples committed before are kept, in ``NAME.h5``
             or in ``NAME.h5.part``; the text says which.
-
         """
         if state not in ENDINGS:
             raise RecordingError(

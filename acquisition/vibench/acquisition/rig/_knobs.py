@@ -175,7 +175,6 @@ def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
         Shows a question and returns the answer: ``input``, or a dialogue's.
     operator
         Who answers.
-
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -224,7 +223,6 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
     ------
     CheckFailed
         When it is asked, and the sheet is older or about other settings.
-
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -329,7 +327,6 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
         Whose sheets are read.
     today
         Their ages are counted to it.
-
     """
     channels = channels_of(rig)
     sensors = {channel.sensor: channel.sensor_calibrated for channel in channels if channel.sensor_calibrated}
@@ -356,7 +353,6 @@ def check_calibrations(rig: Rig, today: date) -> None:
     ------
     CheckFailed
         When one has run out; it names each.
-
     """
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:

@@ -26,7 +26,6 @@ def load_rig(path: Path | str) -> Rig:
     ------
     ConfigurationError
         With file, key, what was given and what is allowed.
-
     """
     path = named(path, "hardware_configs")
     rig = load_toml(path, Rig)
@@ -70,7 +69,6 @@ def with_faults(rig: Rig, script: Path) -> Rig:
     ------
     ConfigurationError
         When the rig is a real one, whose faults come by themselves.
-
     """
     if rig.virtual is None:
         raise ConfigurationError(
@@ -95,7 +93,6 @@ class GeneratorDriver(Protocol):
         ------
         InstrumentError
             When none answers, or another one; nothing stays open then.
-
         """
 
 
@@ -118,7 +115,6 @@ class OutputDriver(Protocol):
             Full name: ``"Dev1/ao0"``.
         digitizer
             What the digitizer's driver of the same name has opened; both start together.
-
         """
 
 

@@ -427,7 +427,6 @@ def run_measurement(
     AcquisitionError
         As `run.Run` says; the generator is silent then, and the recording, if it had started, is
         finished as failed.
-
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
     # The signals stay caught until the run has been left: impatience must not interrupt the silencing.

@@ -79,7 +79,6 @@ def judged(
     ------
     CheckFailed
         Saying what does not fit and where to look.
-
     """
     quiet = quiet[:, round(STILL_SHARE * quiet.shape[1]) :]
     drive = _row(channels, Role.DRIVE_VOLTAGE)
@@ -106,7 +105,6 @@ def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -
     ----------
     volts
         Shape (samples,) [V]; any length of more than a period.
-
     """
     time_s = np.arange(len(volts)) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s

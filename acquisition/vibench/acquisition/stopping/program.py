@@ -217,7 +217,6 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     ------
     AcquisitionError
         When there is no state folder and none can be made.
-
     """
     found = []
     for path, told in _announcements(model):
@@ -362,7 +361,6 @@ def reached(press: Press, program: Program) -> Iterator[None]:
     ------
     AcquisitionError
         When the state folder cannot be written: nobody could stop what cannot be found.
-
     """
     entry = (press, program)
     try:
@@ -449,7 +447,6 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
     ------
     AcquisitionError
         When the state folder cannot be written: nobody could stop what cannot be found.
-
     """
 
     def press(level: StopLevel, reason: str) -> None:

@@ -58,7 +58,6 @@ def rotation(points: Reals) -> Rotation:
     ----------
     points
         Shape (periods, coordinates).
-
     """
     centred = points - points.mean(axis=0)
     count = len(centred)
@@ -231,7 +230,6 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     ------
     InvalidRequest
         When the drive's frequency is not positive and finite.
-
     """
     if not 0.0 < drive_hz < math.inf:
         raise InvalidRequest(f"a drive of {drive_hz} Hz is none; give a positive frequency")

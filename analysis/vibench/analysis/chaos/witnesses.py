@@ -27,7 +27,6 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
     Returns
     -------
     Shape (n - delays + 1, delays * channels), oldest value first.
-
     """
     columns = series.reshape(series.shape[0], -1)
     if delays < 1:
@@ -62,7 +61,6 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
         Only points before this index take part, so that both can be followed beyond it.
     floor
         Neighbours at this distance or nearer do not count: noise decides about them.
-
     """
     tree = cKDTree(points[:last])
     wanted = np.arange(last)
@@ -91,7 +89,6 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
     Returns
     -------
     The nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n, tried).
-
     """
     tried = min(count + 2 * apart - 1, len(points))
     index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
@@ -151,7 +148,6 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
         Neighbours are at least this many steps apart in time.
     noise
         Standard deviation of the noise on one coordinate, in the coordinates' unit.
-
     """
     count, dimensions = points.shape
     last = count - steps
@@ -243,7 +239,6 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
         Shape (n,), at least 200 values.
     seed
         Of the frequencies c.
-
     """
     count = series.size
     if count < FEWEST:
@@ -326,7 +321,6 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
     Returns
     -------
     The surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
-
     """
     values = np.sort(series)
     wanted = np.abs(np.fft.rfft(series - series.mean()))
@@ -384,7 +378,6 @@ def surrogate_test(
         `prediction_error` or `time_symmetry`.
     seed
         Of the surrogates.
-
     """
     matched = _with_matching_ends(series)
     rng = np.random.default_rng(seed)

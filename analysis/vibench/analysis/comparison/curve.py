@@ -129,7 +129,6 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     ------
     NotEnoughData
         When the two have no frequency in common.
-
     """
     for each in (curve, reference):
         if not each.is_single_valued:
@@ -224,7 +223,6 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
         Measured or predicted.
     most
         How many are given.
-
     """
     known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
     frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])

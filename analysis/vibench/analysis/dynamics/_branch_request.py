@@ -178,7 +178,6 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     ------
     NotEnoughData
         When the drive had fewer than two frequencies.
-
     """
     known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
     place, level = frequency_hz[known], drive_amplitude_m[known]

@@ -210,7 +210,6 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
     ------
     InvalidRequest
         When the recording cannot be read, or a run is not possible.
-
     """
     for cells in request.lengths:
         chain = request.chain(cells)

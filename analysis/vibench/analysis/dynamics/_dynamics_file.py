@@ -87,7 +87,6 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     ------
     InvalidRequest
         When the name is taken, or nothing can be written there.
-
     """
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
@@ -113,7 +112,6 @@ def read_diagram(path: Path) -> BranchDiagram:
     ------
     InvalidRequest
         When the file is not there, or holds none.
-
     """
     if not path.is_file():
         raise InvalidRequest(f"{path} does not exist, or is no file; give a file that vibench branches wrote")
@@ -137,7 +135,6 @@ def branch_curves(path: Path) -> tuple[Curve, ...]:
     ------
     InvalidRequest
         When the file holds none, or branches along the level, which no recording's frequencies fit.
-
     """
     found = read_diagram(path).curves()
     if not found:
@@ -167,7 +164,6 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
     ------
     InvalidRequest
         When the name is taken, or nothing can be written there.
-
     """
     with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _SPECTRUM_UNITS.items():
@@ -185,7 +181,6 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
     ------
     InvalidRequest
         When the name is taken, or nothing can be written there.
-
     """
     with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _LINEAR_UNITS.items():

@@ -45,7 +45,6 @@ def motion_classes(results: MapResults, start: int = 0) -> Reals:
     -------
     ndarray
         Of the shape of what varies.
-
     """
     motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)

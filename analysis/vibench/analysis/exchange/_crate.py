@@ -79,7 +79,6 @@ def pack_folder(
     InvalidRequest
         When the licence or the organisation's page is no address, the page has no organisation, a link leads
         out of the folder, or the zip exists or is refused.
-
     """
     _require_addresses(facts)
     paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)

@@ -85,7 +85,6 @@ def excerpt(
         When the stretch lies outside the recording, or a channel is named twice.
     NotEnoughData
         When the recording holds no samples.
-
     """
     wanted = tuple(roles) or recording.roles
     if len(set(wanted)) != len(wanted):

@@ -46,7 +46,6 @@ def new_file(path: Path) -> Iterator[Path]:
     ------
     InvalidRequest
         When ``path`` or its unfinished form exists, the folder does not, or the disk refuses.
-
     """
     unfinished = path.with_name(path.name + UNFINISHED)
     for each in (path, unfinished):
@@ -202,7 +201,6 @@ def export_samples(
         When the recording is not as it was sealed.
     NotEnoughData
         When results are asked for and none is saved.
-
     """
     require_intact(excerpt.recording)
     return EXPORTERS[to].export(excerpt, path, results, observer)
@@ -228,7 +226,6 @@ def export_functions(
     ------
     InvalidRequest
         When the format has no place for them, a name is taken, or the disk refuses; nothing is left of it.
-
     """
     write = EXPORTERS[to].write_functions
     if write is None:

@@ -166,7 +166,6 @@ def import_recording(
         When the file is damaged.
     RecordingError
         When ``out`` exists or cannot be written. Nothing is left of a failed import.
-
     """
     with opened_source(path) as source:
         found = [find_channel(source, each.source, path) for each in mapping.channels]

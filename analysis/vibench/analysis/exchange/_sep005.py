@@ -23,7 +23,6 @@ def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
     list of dict
         For each channel ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` where
         SEP 005 has a letter for it, ``start_timestamp`` of the first sample, and ``group``, the recording.
-
     """
     recording = excerpt.recording
     rate = recording.sample_rate_hz

@@ -83,7 +83,6 @@ def opened_source(path: Path) -> Iterator[Source]:
         When there is no such file, or no reader for its suffix.
     UnusableData
         When it is not what its suffix says, or holds nothing that can be a channel.
-
     """
     if not path.is_file():
         raise InvalidRequest(f"{path} does not exist, or is no file; give the path of a file to import")

@@ -48,7 +48,6 @@ def xarray_dataset(
         When xarray is not installed, or the stretch lies outside the recording.
     UnusableData
         When the recording is not as it was sealed.
-
     """
     try:
         import xarray  # noqa: PLC0415 - an optional extra

@@ -58,7 +58,6 @@ def branches_figure(
         Responses of stepped sines and sweeps; drawn where frequency changes.
     tracked
         Resonances at every level; drawn over a phase resonance, whose first panel is its frequency.
-
     """
     with styled():
         holdable = diagram.holdable

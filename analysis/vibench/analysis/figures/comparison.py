@@ -57,7 +57,6 @@ def comparison_figure(
         Becomes the files' name.
     pair
         The curve and its reference, whose difference is drawn below.
-
     """
     if not curves:
         raise InvalidRequest("a figure of no curves was asked for; choose one or more")

@@ -66,7 +66,6 @@ def map_figure(
         Branches that are overlaid on a diagram along one quantity.
     levels
         Of recordings, overlaid on a map of frequency and amplitude as lines.
-
     """
     with styled():
         if len(results.plan.varied) == 1:

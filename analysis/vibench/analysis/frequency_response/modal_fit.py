@@ -139,7 +139,6 @@ class Leakage:
             Numbers of the lines, rising.
         value, spread
             Of the transmission there; the standard deviation of either part of it bounds the result.
-
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
@@ -247,7 +246,6 @@ class Lines:
         Their transmission; its spread is the standard deviation that weights them.
     chosen
         Which of its lines are fitted, where they are known at all.
-
     """
 
     def __init__(self, band: FrequencyResponse, chosen: Flags) -> None:
@@ -361,7 +359,6 @@ def modal_fit(
         (2 modes,).
     background
         What is added to the modes.
-
     """
     target, behind = lines.independent(lines.value), lines.independent(background(lines.frequency_hz))
 

@@ -93,7 +93,6 @@ def repeated_response(
     repetitions
         Of every realisation, where they were measured on the same drive before; measured if absent. A draw
         of a measurement has them: how its resonances scatter among realisations is not asked again.
-
     """
     if request.cuts_segments:
         raise InvalidRequest(

@@ -92,7 +92,6 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
     -------
     Amplitudes (a sine of amplitude 1 has magnitude 1), shape (..., periods, lines); line k is k times the
     repetition frequency; lines past `TRUSTED_BAND` of the sample rate are left out.
-
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
     # Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches.
@@ -219,7 +218,6 @@ def best_linear_approximation(
         Periods per realisation.
     frequency_hz
         Of the lines.
-
     """
     count = len(drive)
     through = np.sum(base * np.conj(drive), axis=0)
@@ -283,7 +281,6 @@ def _without_drift(
         Relative deviations of the realisations, shape (realisations, lines).
     value, frequency_hz, noise_variance, sd
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
-
     """
     count, lines = off.shape
     stretch = frequency_hz * np.gradient(value, frequency_hz) / value if lines > 1 else np.zeros_like(value)
@@ -372,7 +369,6 @@ class PeriodicSums:
         Probability that a pair of bounds holds the truth, one line at a time.
     begun_with
         Realisations of other sums.
-
     """
 
     def __init__(
@@ -408,7 +404,6 @@ class PeriodicSums:
             What stands below and above the fraction bar.
         repetition
             Of this drive, where it was measured before.
-
         """
         if not drive.size == base.size == response.size:
             sizes = f"{drive.size}, {base.size} and {response.size}"
@@ -462,7 +457,6 @@ class PeriodicSums:
         orders
             Of the lines that are driven, as multiples of the repetition frequency; where they are not known,
             those that carry drive: a converter's noise and images of a held waveform may pass for it.
-
         """
         if not self._realisations:
             raise NotEnoughData("no realisation was added; give at least one")

@@ -108,7 +108,6 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
     ------
     InvalidRequest
         For anything else.
-
     """
     words = text.split("/")
     known = {each.value: each for each in Quantity}
@@ -198,7 +197,6 @@ class FrequencyResponseRequest:
         ------
         NotEnoughData
             When the record does not hold two segments of the length asked for.
-
         """
         wished = self._wished(samples, sample_rate_hz)
         # Beyond the record first: what is beyond all numbers is no whole one.

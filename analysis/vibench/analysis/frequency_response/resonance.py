@@ -62,7 +62,6 @@ def resonances(
     ------
     InvalidRequest
         When fewer than eight lines lie in the band.
-
     """
     band = frequency_response.between(low_hz, high_hz)
     if band.frequency_hz.size < _LEAST_LINES:
@@ -94,7 +93,6 @@ def scattered_resonances(
         From all realisations.
     without
         The same without each of them.
-
     """
     widened = []
     for each in found:

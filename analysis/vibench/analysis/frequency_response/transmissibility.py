@@ -43,7 +43,6 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         Mean square of the drive that the estimates rest on, to any scale, shape (lines,).
     freedom
         Degrees of freedom of each line's own variance.
-
     """
     # Averages that overlap nearly wholly are worth hardly more than one.
     freedom = max(freedom, 1.0)
@@ -167,7 +166,6 @@ def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: f
         The estimate H, shape (lines,).
     n_eff
         Independent averages.
-
     """
     s_xx, s_yy, s_rr = (products[i, i].real for i in range(3))
     s_xy, s_rx = products[0, 1], products[2, 0]
@@ -299,7 +297,6 @@ def transmissibility(
         For fewer than two valid segments.
     UnusableData
         For samples that are not finite and not marked invalid.
-
     """
     signals = (x, y) if reference is None else (x, y, reference)
     sums = FrequencyResponseSums(

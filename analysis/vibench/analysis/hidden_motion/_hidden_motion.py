@@ -183,7 +183,6 @@ def hidden_motion(
         sealed.
     NotEnoughData
         When the stretch is too short.
-
     """
     require_checked(recording)
     described = tracked_specimen(specimen_of(recording.bench) if specimen is None else specimen)
@@ -226,7 +225,6 @@ def hidden_motion_in_samples(
         When samples are not finite, or the rate is too low.
     NotEnoughData
         When there are too few.
-
     """
     acceleration, velocity = (np.asarray(each, dtype=np.float64) for each in (base_acceleration, m0_velocity))
     if acceleration.shape != velocity.shape or acceleration.ndim != 1:
@@ -398,7 +396,6 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
     ------
     RecordingError
         When the recording is not finished, or the disk refuses.
-
     """
     arrays = {**_channels(motion), **_tracked_impacts(motion), **_free_impacts(motion)}
     settings = {"told": motion.to_dict(), "sentences": list(motion.sentences)}

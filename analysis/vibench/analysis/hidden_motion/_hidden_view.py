@@ -58,7 +58,6 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
     ------
     AnalysisError
         As `hidden_motion` does.
-
     """
     # The window takes the words above when it begins, and what works them out loads scipy.stats.
     from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415

@@ -224,7 +224,6 @@ class LiveTwin:
             When its stops cannot be tracked.
         UnusableData
             When the bench lacks one of the two channels.
-
         """
         channels = {each.role.value: each for each in channels_of(rig)}
         require_channels(rig.name, tuple(channels))
@@ -319,7 +318,6 @@ class LiveTwin:
             Of the base [m/s2] and of m0 [m/s], shape (samples,).
         frequency_hz
             Of the sine that is played, for a forecast; None under anything else.
-
         """
         if first_sample != self.next_sample:
             self._begin_anew(first_sample)

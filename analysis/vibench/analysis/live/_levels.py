@@ -44,7 +44,6 @@ class LevelMeters:
         Of each channel, in the unit of the samples, shape (channels,).
     sample_rate_hz
         Tells how long peaks are held.
-
     """
 
     def __init__(self, full_scale: Reals, sample_rate_hz: float) -> None:

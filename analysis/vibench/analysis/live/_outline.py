@@ -58,7 +58,6 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     ------
     InvalidRequest
         When there is no column.
-
     """
     if columns < 1:
         raise InvalidRequest(f"{columns} columns were asked for; a picture has 1 or more")
@@ -87,7 +86,6 @@ def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
     -------
     ndarray
         Shape (columns,).
-
     """
     shown = min(samples, columns)
     return np.arange(shown, dtype=np.int64) * samples // max(shown, 1)
@@ -105,7 +103,6 @@ def zigzag(low: Reals, high: Reals) -> Reals:
     -------
     ndarray
         Shape (..., 2 columns).
-
     """
     return np.stack((low, high), axis=-1).reshape(*low.shape[:-1], -1)
 
@@ -134,7 +131,6 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     -------
     tuple of ndarray
         Lower and upper edge, shape (..., columns).
-
     """
     low, high = envelope(samples, columns)
     if samples.shape[-1] <= columns:
@@ -267,7 +263,6 @@ class RecordingOverview:
         ------
         InvalidRequest
             For a stretch or a width of nothing.
-
         """
         begin, end = max(0, start), min(stop, self.recording.samples)
         if not (begin < end and columns >= 1 and roles):
@@ -349,7 +344,6 @@ def overview_levels(
         Open.
     on_read
         Told how many samples were read, and of how many.
-
     """
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
@@ -375,7 +369,6 @@ def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     ------
     InvalidRequest
         When the file keeps none.
-
     """
     kept = recording.read_overview(role)
     if kept is None:

@@ -45,7 +45,6 @@ def portrait(
         Samples in physical units, about `portrait_samples` of them.
     delay_s
         By how much the response channel lags the drive channel.
-
     """
     look = look_samples(sample_rate_hz)
     drive = np.asarray(window.values[drive_row], dtype=np.float64)

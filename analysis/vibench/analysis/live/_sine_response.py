@@ -143,7 +143,6 @@ def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: f
         Samples in physical units; more than are needed do no harm.
     rows
         Which channels are drive, base acceleration and response velocity.
-
     """
     look = look_samples(sample_rate_hz)
     newest = np.asarray(window.values[list(rows), -look:], dtype=np.float64)

@@ -148,7 +148,6 @@ class LiveSpectra:
             The band that is looked at.
         delay_s
             By how much the response channel lags the base channel.
-
         """
         used = self._used()
         if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
@@ -252,7 +251,6 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
     ------
     RecordingError, InvalidRequest, NotEnoughData
         When the file, the channel or the stretch cannot be pictured.
-
     """
     with open_recording(request.path) as recording:
         rate_hz = recording.sample_rate_hz

@@ -235,7 +235,6 @@ class LiveView:
         By how much the response channel lags the base channel.
     lead_in_s
         Until then the motion comes up and settles: it makes no point of a course, and no Poincaré point.
-
     """
 
     def __init__(

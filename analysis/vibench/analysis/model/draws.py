@@ -286,7 +286,6 @@ def voltage_source(
         A shaker to take instead of the described one; each draw takes another of its uncertainty.
     draws
         How many, at most.
-
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     volts = recorded_voltage(recording, rig)

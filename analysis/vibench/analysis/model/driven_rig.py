@@ -58,7 +58,6 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         On the table.
     shaker
         Its numbers, as fitted; by default those of the bench configuration.
-
     """
     if RESPONSE not in recording.roles:
         raise UnusableData(

@@ -86,7 +86,6 @@ def predict(
     accuracy
         Quick by default: Response I in chaos scatters by more than any accuracy removes, and flight is
         exact at every level.
-
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]

@@ -131,7 +131,6 @@ def similarity(
         When the frequencies differ, or a setting has no meaning.
     NotEnoughData
         When no point has a value in both curves.
-
     """
     if not np.array_equal(reference.frequency_hz, model.frequency_hz):
         raise InvalidRequest(

@@ -118,7 +118,6 @@ def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[Colli
     Returns
     -------
     The numbers, or None and a sentence that says why no recording tells them.
-
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -151,7 +150,6 @@ def numbers_from_statistics(
     Returns
     -------
     The numbers, or None and a sentence that says why they are not determined.
-
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:

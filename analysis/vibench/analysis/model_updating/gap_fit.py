@@ -64,7 +64,6 @@ def fit_gap(
         Where the linear specimen comes from, for its covariance.
     confidence
         Of drive and linear specimen within the bounds.
-
     """
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]
     if not found:

@@ -106,7 +106,6 @@ def fit_specimen(
         calibrations state it; taken as exact when 0.
     is_nonlinear
         Whether realisations scatter more than noise does: friction and not damping; None when not known.
-
     """
     free = tuple(free)
     allowed = (*LINEAR, *ALSO_FREE)

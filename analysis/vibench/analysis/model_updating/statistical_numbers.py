@@ -79,7 +79,6 @@ def posterior(
         Of the drawing.
     rounds
         How many runs each box holds.
-
     """
     rng = np.random.default_rng(seed)
     parameters, statistics = np.empty((0, len(box))), np.empty((0, observed.size))
@@ -139,7 +138,6 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
         Of runs, shape (draws, statistics).
     observed
         Shape (statistics,).
-
     """
     size = (parameters - parameters[:-1].mean(axis=0)) / (parameters[:-1].std(axis=0) + 1e-12)
     terms = np.column_stack([np.ones(len(size)), size, size**2])
@@ -190,7 +188,6 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
         Samples a second.
     drive_hz
         Of a sine; None where the drive has no one frequency.
-
     """
     velocity = motion[1]
     parts = (*_in_bands(motion, rate_hz), _spread(velocity), _spread(_displacement(velocity, rate_hz)))
@@ -209,7 +206,6 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
         Of base acceleration and m0's velocity, white, per sample, shape (2,).
     rate_hz
         Samples a second.
-
     """
     length, first = _bands(rate_hz)
     floor = 2 * np.log(noise_rms) + np.log(np.sum(np.hanning(length) ** 2) * _ABOVE_NOISE)
@@ -318,7 +314,6 @@ def statistical_numbers(
     ------
     AnalysisError
         When rig, law or samples forbid it, or no specimen gives these statistics.
-
     """
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)

@@ -73,7 +73,6 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
         How near it comes.
     is_nonlinear
         Whether realisations scatter beyond noise; None where nobody can tell.
-
     """
     tried = []
     for assumption, allowed, told in _ways(lines, is_nonlinear=is_nonlinear):

@@ -272,7 +272,6 @@ def update_model(
     NotEnoughData
         When nothing could be fitted: no noise, no motion that can be tracked, and no sweep or pair of
         dwells that tells the gap.
-
     """
     if not results.results:
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")

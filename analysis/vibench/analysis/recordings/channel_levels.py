@@ -170,7 +170,6 @@ def require_moving_channels(levels: Sequence[ChannelLevel]) -> None:
     ------
     UnusableData
         One sentence that names every such channel and what to look at.
-
     """
     used = (DRIVE, BASE, *RESPONSE_ROLES)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]

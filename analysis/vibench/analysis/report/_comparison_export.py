@@ -58,7 +58,6 @@ def write_comparison(
     ------
     InvalidRequest
         When the suffix names nothing that a comparison can become, or there is nothing to write.
-
     """
     try:
         kind = ExportKind(path.suffix.removeprefix(".").lower())

@@ -332,7 +332,6 @@ def findings(results: CampaignResults) -> Iterator[str]:
     Returns
     -------
     Sentences: of a fit to all of them first, then of each recording, after its name.
-
     """
     yield from results.model_said
     for each in results.in_order:

@@ -109,7 +109,6 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
     ----------
     figures_folder
         Where PNG, SVG and CSV of each figure are saved too; None saves none.
-
     """
     figures = list(dict.fromkeys(_figures(page)))
     environment = Environment(

@@ -408,7 +408,6 @@ def write_report(
     ------
     NotEnoughData
         When there are neither results nor failures to report.
-
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
@@ -490,7 +489,6 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
     ----------
     failure
         Why there is no simulation, where one was tried.
-
     """
     laid = result.laid
     if laid is None:
@@ -519,7 +517,6 @@ def check_warnings(results: CampaignResults, checks: frozenset[str] | None = Non
     Returns
     -------
     A sentence for each check of a recording that ended with a warning.
-
     """
     for result in results.results:
         for check in result.analysis.checks:

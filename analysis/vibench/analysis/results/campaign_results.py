@@ -72,7 +72,6 @@ def overlay(
         How many runs of a colliding motion are made from slightly different starts under the voltage.
     stage
         Told what is being computed.
-
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
     stage(f"simulating {simulation.value}")
@@ -202,7 +201,6 @@ def analyse_files(
     ------
     NotEnoughData
         When no path is given.
-
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
@@ -257,7 +255,6 @@ def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResul
         Of the whole.
     parts
         Results of one recording or more each.
-
     """
     return CampaignResults(
         name,
@@ -306,7 +303,6 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
     ------
     NotEnoughData
         When there are none.
-
     """
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:
@@ -345,7 +341,6 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
     A budget each for A0 and Responses I and II of a dwell, the largest of both of a sweep or of steps,
     and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). Those of a
     recording that lasted until its results were known are widened, see `Budget.widened`.
-
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
     has_chosen_end = result.analysis.facts.measurement.until is not None

@@ -54,7 +54,6 @@ def compare_recording(
     ------
     AnalysisError, RecordingError
         When nothing in it is usable, in one sentence.
-
     """
     with open_recording(path) as recording:
         result, failures = result_of(recording, simulation, request)
@@ -82,7 +81,6 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
     ------
     NotEnoughData
         When the recording is of another kind, or of one frequency.
-
     """
     result, _ = kept_result(compared)
     found = drive_level(result)
@@ -102,7 +100,6 @@ def recorded_response(path: Path) -> RecordedLevel:
         When the recording is of another kind, or of one frequency.
     RecordingError
         When the file is no recording.
-
     """
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [

@@ -42,7 +42,6 @@ def analyse(
     ------
     AnalysisError
         With one sentence that names the file, when nothing in it is usable.
-
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:

@@ -49,7 +49,6 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
         When the excerpt holds no segment of what was played, or its analysis finds nothing.
     UnusableData
         When the recording is not as it was sealed.
-
     """
     require_checked(excerpt.recording)
     played = _played_parts(excerpt)

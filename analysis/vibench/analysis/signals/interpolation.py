@@ -50,7 +50,6 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
     Returns
     -------
     Shape (m,) or (channels, m), exact to about 1e-9 of the signal up to `TRUSTED_BAND` of the sample rate.
-
     """
     channels = np.ascontiguousarray(np.atleast_2d(samples), dtype=np.float64)
     values = np.empty((len(channels), positions.size))

@@ -88,7 +88,6 @@ def converted_signal(
     low_hz, high_hz
         The band to keep, 0 < low < high <= half the sample rate; choose ``low_hz`` well below the
         lowest line of interest and above the drift.
-
     """
     if not 0 < low_hz < high_hz <= sample_rate_hz / 2:
         raise InvalidRequest(

@@ -77,7 +77,6 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
         Distance D between the starts of neighbouring segments [samples].
     used
         Which segments of the record were averaged, in the order of time.
-
     """
     count = int(np.count_nonzero(used))
     if count == 0:

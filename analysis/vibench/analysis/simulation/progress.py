@@ -203,7 +203,6 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
     ------
     ValueError
         When it cannot be followed.
-
     """
     plan = MapRequest(
         **request.model_dump(exclude={"frequency_hz", "amplitude_m"}),

@@ -111,7 +111,6 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
         The vibrometer's noise, as if it were white.
     silent
         What was heard before anything played.
-
     """
     heard_m = silent.rms_m if silent.is_known else 0.0
     if rest.rms_m <= max(_EXPLAINED * sensor.rms_m, _SILENT * heard_m, SMALL * motion_m):
@@ -153,7 +152,6 @@ def slow_change(parts: Complexes | Reals) -> float:
     ----------
     parts
         Amplitudes of successive equal parts of a record, shape (parts,).
-
     """
     count, mean = parts.size, np.mean(parts)
     off = parts / mean - 1
@@ -327,7 +325,6 @@ def dwell_response(
         Response velocity before anything played, where it was recorded [m/s].
     bridged
         Samples at which the response is a bridge over a drop-out; empty where there is none.
-
     """
     displacement = converted_signal(
         response,

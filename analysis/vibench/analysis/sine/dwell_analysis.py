@@ -80,7 +80,6 @@ def stroboscope(
         Where in the period to look.
     delay_s
         By how much the response channel lags the drive channel [s].
-
     """
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")

@@ -65,7 +65,6 @@ def jumps(
     smooth
         Where the motion is smooth: a jump has one such side at least. A chaotic response leaps about
         without jumping from one state to another. All, when absent.
-
     """
     if not time_s.shape == frequency_hz.shape == response.shape:
         raise InvalidRequest(

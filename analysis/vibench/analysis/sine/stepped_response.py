@@ -91,7 +91,6 @@ def stepped_response(
         Of the segments that the steps were recorded as.
     setting_vpp
         Tells the generator's setting during a step [V].
-
     """
     stretches = channels.stretches(label)
     whole = [each for each in stretches if each.is_complete]

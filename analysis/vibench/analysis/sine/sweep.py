@@ -59,7 +59,6 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
         The recorded generator voltage, shape (samples,).
     low_hz, high_hz
         Between these the drive frequency stays; components well outside are ignored.
-
     """
     if drive.size < _LEAST_CYCLES * sample_rate_hz / low_hz:
         raise NotEnoughData(
@@ -226,7 +225,6 @@ class SweepSums:
         Length of one interval; half orders need two cycles of half the drive frequency.
     clock
         Of the drive, where it was measured before: blocks need no drive then.
-
     """
 
     def __init__(
@@ -307,7 +305,6 @@ class SweepSums:
             By how much the response channel lags the base channel [s].
         linear
             Transmission of the specimen without contact, which is swept in the same way for comparison.
-
         """
         motion, swept, velocity, phase = self._analysed(delay_s, linear)
         harmonics, harmonics_hz = self._harmonics(velocity, phase)

@@ -82,7 +82,6 @@ class SegmentSpectra:
             Shape (channels, samples), following the block before without a gap.
         valid
             Which samples may be used, shape (samples,); a segment that touches an invalid one is left out.
-
         """
         marks = np.ones(block.shape[1], dtype=np.bool_) if valid is None else valid
         data = np.concatenate((self._carry, block), axis=1) if self._carry.shape[1] else block
@@ -287,7 +286,6 @@ def amplitude_spectrum(
         Shape (samples,); the mean is removed, so that an offset does not hide the lowest lines.
     window
         Hann by default; between lines it reads up to 15 % low, where flat top stays within 0.1 %.
-
     """
     count = samples.size
     if count < 2:
@@ -350,7 +348,6 @@ class SpectrogramSums:
         Rows end here.
     segment_s
         Length of one Fourier transform; half of it overlaps the next.
-
     """
 
     def __init__(

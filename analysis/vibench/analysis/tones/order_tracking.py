@@ -86,7 +86,6 @@ def tracked_together(
         after the last whole interval is not used.
     interval_samples
         Must hold at least two periods of the smallest distance between orders.
-
     """
     count = phase_rad.size // interval_samples
     if count == 0:

@@ -51,7 +51,6 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
         Where to look; both at least two lines away from 0 and from half the sample rate.
     count
         At most this many.
-
     """
     if spectrum.window is not Window.HANN:
         raise InvalidRequest(f"peaks are placed in Hann spectra only; this one is {spectrum.window.value}")
@@ -119,7 +118,6 @@ def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSin
         Shape (samples,), some ten cycles or more.
     near_hz
         Where the sine should be, within 20 %.
-
     """
     return _kept_sine(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), sample_rate_hz, near_hz)
 
@@ -233,7 +231,6 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
         Of the base acceleration [(m/s2)^2 / Hz].
     low_hz, high_hz
         The band.
-
     """
     kept = (density.frequency_hz >= low_hz) & (density.frequency_hz <= high_hz) & (density.frequency_hz > 0)
     factor = np.abs(
@@ -283,7 +280,6 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     independent
         Independent noise values in the window, at most the number of samples; for coloured noise
         twice its rms frequency times the duration.
-
     """
     if np.isnan(noise_sd):
         return NoiseLift(np.nan, np.nan)

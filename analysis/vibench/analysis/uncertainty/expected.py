@@ -204,7 +204,6 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
         The plan.
     rig
         What it is played on: its specimen, and what it states of sensors and noise.
-
     """
     stated = stated_uncertainties(rig.model_dump(mode="json"))
     match measurement.excitation:

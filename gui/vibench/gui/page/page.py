@@ -45,7 +45,6 @@ def file_kind(path: Path) -> FileKind:
     ------
     ConfigurationError
         In one sentence, when it is nothing that the window opens.
-
     """
     if path.is_dir():
         return FileKind.FOLDER
@@ -159,7 +158,6 @@ class SideAndPicture(QSplitter):
         The right part.
     foot
         What stays in sight below the left part: the buttons that act on it.
-
     """
 
     WIDEST_SIDE = 0.55

@@ -88,7 +88,6 @@ class Scrolled(QScrollArea):
         For screen readers.
     content
         What is scrolled.
-
     """
 
     LEAST_EM = 7, 3

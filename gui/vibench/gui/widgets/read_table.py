@@ -68,7 +68,6 @@ class ReadTable(QTableWidget):
         What stands there while there is no row.
     wide
         The column that takes what is left; the last one if absent.
-
     """
 
     def __init__(

@@ -180,7 +180,6 @@ def independent_state(
         x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
     tolerance
         Relative error of a step. Ask with two to see the error of the answer itself.
-
     """
     law, numbers = law_of(specimen), numbers_of(specimen, drive)
     time_s, state = 0.0, np.array(initial_state, dtype=np.float64)

@@ -93,7 +93,6 @@ def measure_accuracy(
     ------
     ArithmeticError
         When a motion is not of the kind it is called, or the independent solution gives up.
-
     """
     found: list[MotionBenchmark] = []
     for motion in motions:

@@ -50,7 +50,6 @@ def balanced_branches(
     Yields
     ------
     Branches of the drive's own period: subharmonic motions have no such balance.
-
     """
     structure, spring = structure_of(specimen), spring_of(specimen)
     shape = OrbitShape.MIRRORED if options.kept is HarmonicSet.ODD else OrbitShape.REPEATED

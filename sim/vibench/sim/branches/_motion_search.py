@@ -69,7 +69,6 @@ def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) 
         The drive's phase must be zero.
     search
         Starts and their seed.
-
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []

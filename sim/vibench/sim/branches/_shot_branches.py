@@ -157,7 +157,6 @@ def shot_branches(
     ------
     Branches with the stability, the events and the error of each point; chaos and quasi-periodic motions
     are none.
-
     """
 
     def starts(drive: Harmonic) -> Iterator[BranchStart[PeriodicOrbit]]:
@@ -251,7 +250,6 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
         Magnitude of the largest Floquet multiplier over the whole period of the motion; same shape.
     periods
         Drive periods of the motion.
-
     """
     size = np.asarray(multiplier, dtype=np.float64)
     rate = np.where(size > 1.0 + NEUTRAL, np.log(np.maximum(size, 1.0)), 0.0)
@@ -271,7 +269,6 @@ def least_growth_time_s(loop_time_s: float) -> float:
     ------
     ValueError
         When it is not positive and finite.
-
     """
     if not 0.0 < loop_time_s < math.inf:
         msg = f"A loop time of {loop_time_s} s is not allowed: positive and finite."

@@ -86,7 +86,6 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
     ------
     ValueError
         When there is no cell.
-
     """
     if not 1 <= cells <= MOST_CELLS:
         msg = f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}."

@@ -41,7 +41,6 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     ------
     ValueError
         When a frequency is not positive.
-
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
@@ -101,7 +100,6 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
     ------
     ValueError
         When a wave number is not finite.
-
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
     if not np.all(np.isfinite(phase)):
@@ -158,7 +156,6 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     ------
     ValueError
         When a frequency is negative.
-
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

@@ -210,7 +210,6 @@ def integrate_chain(
     ------
     ValueError
         When an argument is not allowed, the run would take hours, or the drive is over before the run is.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)

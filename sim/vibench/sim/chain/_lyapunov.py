@@ -80,7 +80,6 @@ def chain_lyapunov_exponent(
     ValueError
         When an argument is not allowed, the run would take hours, or the duration holds too few intervals
         for an error.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz

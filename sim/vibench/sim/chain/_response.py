@@ -87,7 +87,6 @@ def chain_response(
     ValueError
         When the drive has no amplitude, the window is longer than the run or shorter than one period, or the
         run would take hours.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     if chain.size == 1:
@@ -186,7 +185,6 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
         Of the state times exp(-i omega t) from the start to the end of the lines, shape (6 cells,).
     line_s
         How long they were [s].
-
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
@@ -218,7 +216,6 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
     -------
     Shape (..., cells) [J]. Without damping and with the base at rest their sum stays as it is. The energy
     that a Hunt and Crossley contact stores is that of its Hertz spring.
-
     """
     motion = np.asarray(states, dtype=np.float64)
     x, y, z = (motion[..., k] for k in range(MASSES_PER_CELL))
@@ -251,7 +248,6 @@ def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> M
         Shape (n, cells, 6) [m, m/s].
     base_m
         Displacement of the base, shape (n,) or one number [m].
-
     """
     found = [block_mean(row) for row in chain_energies(chain, states, base_m).T]
     return MeanEnergies(

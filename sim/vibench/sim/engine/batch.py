@@ -260,7 +260,6 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     What was seen of each; None of one that was lost, which stays where it was.
 
     Raises ValueError when the specimen is not batchable, or a motion is on a stop.
-
     """
     first = runs[0]
     engine = first.engine

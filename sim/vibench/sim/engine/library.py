@@ -37,7 +37,6 @@ def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     ------
     ValueError
         When a text is not of this form.
-
     """
     known: dict[str, StructureType] = {}
     for text in texts:

@@ -387,7 +387,6 @@ class CubicRun:
             Filled on the way.
         first_from_s, last_to_s
             Where the run begins in the first interval and ends in the last, since their starts [s].
-
         """
         drive = self._engine.new("CubicDrive", base=pieces, first_from=first_from_s)
         drive["last_to"] = self._interval_s if last_to_s is None else last_to_s

@@ -165,7 +165,6 @@ def lyapunov_exponent(
     ------
     ValueError
         When an argument is not allowed, or the duration holds fewer than 32 intervals.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)

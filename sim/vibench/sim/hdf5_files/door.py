@@ -82,7 +82,6 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
         When HDF5 cannot open it.
     UnsafeHdf5
         When it points outside itself, or its sizes cannot be.
-
     """
     file = h5py.File(path, "r", locking=locking)
     try:
@@ -108,7 +107,6 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
     ------
     UnsafeHdf5
         At a link that leaves the file, when that is not allowed; links inside a file are left alone.
-
     """
     seen = {_address(file)}
     links = 0

@@ -60,7 +60,6 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     ----------
     numbers
         Of the motion that each start came to, shape (rows, columns): `MapResults.motion_numbers[:, 0]`.
-
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
     uncertain = {step: _uncertain(numbers, step, steps[-1]) for step in steps}
@@ -141,7 +140,6 @@ def kick_stability(
     ------
     InvalidStudy
         When more than the start varies, or there is no kick.
-
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks are asked for; give 1 or more.")

@@ -377,7 +377,6 @@ class Map(GridPlan):
         ------
         ValueError
             When a scene of these numbers is not allowed.
-
         """
         said = self._numbers(place)
         frequency_hz = said["frequency_hz"]

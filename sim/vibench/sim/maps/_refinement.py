@@ -76,7 +76,6 @@ def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
         Steps between the points of the first lattice, a power of 2.
     seed
         Of the choice of cells that are audited.
-
     """
     shape = seen.is_known.shape
     sketch = _Sketch(seen)

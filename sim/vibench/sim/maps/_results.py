@@ -95,7 +95,6 @@ def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
         Of the motion that each point came to, shape (rows, starts, columns).
     found
         The refinement's plan, with nothing missing.
-
     """
     codes = cell_codes(numbers).reshape(-1)
     starts = np.moveaxis(numbers, 1, 2).reshape(len(codes), -1)
@@ -263,7 +262,6 @@ def open_map(path: Path | str) -> MapResults:
     ------
     StudyError
         When it is no map's file, or another version's.
-
     """
     path = Path(path)
     plan = read_plan(path, Map)

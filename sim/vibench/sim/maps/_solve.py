@@ -73,7 +73,6 @@ def solve_map(
     ------
     StudyError
         In one sentence: a file of another map, a cluster that does not answer, a full disk, ...
-
     """
     with executor_of(workers, cluster, map_solver(plan)) as executor, store_of(plan, out, existing) as store:
         compute_map(plan, executor, store, observer, cancelled)

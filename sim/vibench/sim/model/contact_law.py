@@ -42,7 +42,6 @@ def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw
         A word of `CONTACT_LAWS`, and what its form asks for behind a colon.
     contact_stiffness, gap_m
         What a fitted law is fitted to: k_contact [N/m^1.5] of the paper's stops, and the clearance [m].
-
     """
     reference = Reference(contact_stiffness, gap_m)
     name, _, detail = text.strip().partition(":")

@@ -70,7 +70,6 @@ def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> f
     ------
     ValueError
         When the radius is not positive.
-
     """
     if not 0.0 < radius_m < math.inf:
         msg = f"Sphere radius {radius_m} m is not allowed: it must be positive and finite."

@@ -53,7 +53,6 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     ------
     ValueError
         When a frequency is negative or not finite.
-
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

@@ -87,7 +87,6 @@ def fit_power_law(
     shares
         Part of that force which each power takes; they must add up to 1. The paper leaves it open; the
         default is equal parts.
-
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):

@@ -140,7 +140,6 @@ def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
     -------
     tuple of ndarray
         M [kg], C [N s/m] and K [N/m], each of shape (2, 2).
-
     """
     whole = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
     mass, damping, stiffness = (JOIN.T @ matrix @ JOIN for matrix in whole)
@@ -181,7 +180,6 @@ def gong2025(
     ------
     ValueError
         When damping time, gap or contact law is not allowed.
-
     """
     if not 0.0 <= damping_time_s < math.inf:
         msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."

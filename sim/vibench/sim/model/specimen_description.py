@@ -235,7 +235,6 @@ class SpecimenDescription(_Described):
         ------
         ValueError
             In one sentence, when a number or the law is not allowed.
-
         """
         gap = self.gap_m if gap_m is None else gap_m
         lower, upper = gap if isinstance(gap, tuple) else (None, gap)
@@ -300,7 +299,6 @@ def load_specimen(specimen: str | Path) -> SpecimenDescription:
     ------
     UnknownSpecimenError
         In one sentence, when there is none, or when the file does not describe one.
-
     """
     try:
         return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})

@@ -18,7 +18,6 @@ def toml_table(path: Path) -> dict[str, Any]:
     ------
     UnreadableTomlError
         In one sentence, when the file is missing, is no text, or is not TOML.
-
     """
     try:
         # Editors on Windows begin a file with a byte-order mark.
@@ -73,7 +72,6 @@ def fault_in_words(fault: Mapping[str, Any]) -> str:
     ----------
     fault
         One of the ``errors()`` of a pydantic ``ValidationError``.
-
     """
     plain = _IN_WORDS_OF_TOML.get(fault["type"])
     said = str(fault["msg"]) if plain is None else plain.format(**fault.get("ctx", {}))

@@ -147,7 +147,6 @@ def integrate(
     ------
     ValueError
         When an argument is not allowed, or the drive is over before the run is.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
@@ -310,7 +309,6 @@ def follow_samples(
     first, last
         Samples at which the run begins and ends; the whole drive if absent. The samples around them
         still shape the spline.
-
     """
     accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)

@@ -53,7 +53,6 @@ def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, mo
         Largest change of a state over its scale that counts as the same.
     most
         Longest period tried.
-
     """
     points = section / scales
     for period in range(1, min(most, len(points) // 2) + 1):
@@ -89,7 +88,6 @@ def flow_derivative(
     -------
     The state at the end, shape (6,), and its derivative by ``state``, shape (6, 6); NaN when the run was
     lost.
-
     """
     run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
     run.carry(np.eye(DIRECTIONS))

@@ -83,7 +83,6 @@ class OpenFile:
     ------
     OSError
         When it cannot be opened.
-
     """
 
     def __init__(self, path: Path) -> None:

@@ -115,7 +115,6 @@ def balance(
     Returns
     -------
     The motion; look at ``outcome`` first. After NO_SOLUTION its numbers are those of the best attempt.
-
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         msg = f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: both must be positive."

@@ -218,7 +218,6 @@ def follow(
         Sign of the first step, and range, of the family's scaled parameter.
     steps
         Lengths and tolerances.
-
     """
     gathered = _Gathered([], [])
     parameter = family.path.parameter

@@ -151,7 +151,6 @@ def trace(
     Yields
     ------
     The start, then every point, folds between them; the last says why it is the last.
-
     """
     along = np.zeros(len(start))
     along[-1] = math.copysign(1.0, toward)

@@ -39,7 +39,6 @@ def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
     Returns
     -------
     Shape (n,), n < m; a double zero is given once.
-
     """
     kept, powers = _sum_equal_exponents(
         np.asarray(coefficients, dtype=np.float64), np.asarray(exponents, dtype=np.float64)
@@ -137,7 +136,6 @@ def first_order_states(
     ------
     ValueError
         When frequency or amplitude is not allowed.
-
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
         msg = (

@@ -99,7 +99,6 @@ def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> 
         Angular frequency of the drive, positive [rad/s].
     harmonics
         Shape (m,), zero and above.
-
     """
     turn = harmonics.astype(np.float64)[:, None, None]
     dynamic = _dynamic(structure, omega * turn)

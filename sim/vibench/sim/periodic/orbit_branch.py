@@ -111,7 +111,6 @@ def periodic_branch(
     ------
     ValueError
         When the orbit did not converge, or ``stop`` is not allowed.
-
     """
     parameter = chosen(Parameter, parameter)
     path = path_from(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m)
@@ -147,7 +146,6 @@ def periodic_branch_within(
     ------
     ValueError
         When the orbit did not converge, or lies outside.
-
     """
     value = parameter_value(path, orbit.drive)
     family, start = _family_at(orbit, path, value, range_scale(low, high, value))

@@ -145,7 +145,6 @@ def phase_resonance_branch(
     ValueError
         When there is no damping, no mode in the band has this phase, or several do, no motion is found at the
         lower level, it already reaches the stops, or `of` is no word of `PhaseReference`.
-
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     if not any(specimen.dampings):

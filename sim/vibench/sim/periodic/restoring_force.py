@@ -195,7 +195,6 @@ def spring_of(specimen: Specimen) -> RestoringForce:
     ------
     ValueError
         When the stops are rigid, whose force is not finite.
-
     """
     lower, upper = specimen.gaps_m
     match specimen.contact:

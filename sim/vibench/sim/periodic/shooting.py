@@ -231,7 +231,6 @@ def periodic_orbit(
     ------
     ValueError
         When the drive has a phase, or no amplitude.
-
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         msg = f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."

@@ -197,7 +197,6 @@ class SettlingCourse:
         Nominal cost of following chaos on by its states alone; zero does not follow it on.
     by_itself_s
         Until then it is not followed in a batch; see `StatesAlone`.
-
     """
 
     def __init__(

@@ -104,7 +104,6 @@ def repetition(
         Drive periods in which the slowest mode without contact fades by e.
     sharpness
         What counts as the same.
-
     """
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
@@ -151,7 +150,6 @@ def is_drifting(section: Floats, omega: float) -> bool:
         States once a drive period, shape (n, 6).
     omega
         Angular frequency of the drive [rad/s].
-
     """
     points = section / np.repeat([1.0, omega], 3)
     periods = range(1, min(MOST_PERIODS, len(points) // (2 * DRIFT_PARTS)) + 1)

@@ -80,7 +80,6 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
         The motion where it began.
     path
         What was seen of it, from there until it had settled.
-
     """
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
@@ -362,7 +361,6 @@ def ensemble_of(
         Time in which the slowest mode without contact fades by e.
     error_of
         Asked once for each motion.
-
     """
     reached, escape = several.reached, several.escape
     groups = motions_among(reached)
@@ -457,7 +455,6 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
         What it came to.
     motion
         It without stops.
-
     """
     if never_touches(scene.specimen, motion):
         return StartMemory.KEPT

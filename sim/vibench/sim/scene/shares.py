@@ -80,7 +80,6 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     ------
     ValueError
         When there are no trials, more counted than tried, or no such probability.
-
     """
     if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
         msg = (

@@ -90,7 +90,6 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     ------
     ValueError
         When the specimen cannot be followed in time, or not from such a start.
-
     """
     question = chosen(Question, question)
     if scene.target is not None:
@@ -120,7 +119,6 @@ def settle_scene(scene: Scene) -> ScenePrediction:
     ------
     ValueError
         When the specimen cannot be followed in time, or not from such a start.
-
     """
     return solve_scene(scene, Question.MOTION)
 
@@ -148,7 +146,6 @@ def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) 
     ------
     ValueError
         When one of them cannot be followed in time, or not from its start.
-
     """
     found: list[Solved] = []
     together: list[Scene] = []
@@ -228,7 +225,6 @@ def solve_ensemble(
     ------
     ValueError
         When fewer than 4 starts are asked for, or the specimen cannot be followed in time.
-
     """
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
@@ -315,7 +311,6 @@ class _Begun:
         What is asked.
     method, motion
         As planned, and the motion as long as nothing is touched.
-
     """
 
     def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:

@@ -92,7 +92,6 @@ def stated_errors(
         Of the slowest mode without contact [1/s], zero or negative.
     follow
         How other starts are followed.
-
     """
     answer = seen.window.responses_m
     # Who looks more closely may find that it does not repeat yet, and take the lines over another length.

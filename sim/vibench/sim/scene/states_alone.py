@@ -50,7 +50,6 @@ class StatesAlone:
     by_itself_s
         Until then it is not followed in a batch [s]: on the way to its attractor a motion carries each
         error along. A whole number of drive periods, where batches begin.
-
     """
 
     def __init__(

@@ -48,7 +48,6 @@ class LinearMotion:
             At the amplifier's input, peak, shape (n,) or one for all [V].
         gap_m
             Clearance that p is held in; infinite without stops.
-
         """
         free = (
             self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
@@ -83,7 +82,6 @@ def linear_motion(
         On the table; None for a bare one, whose m0 and p are zero.
     frequency_hz
         Zero and above, shape (n,) [Hz].
-
     """
     s = np.asarray(2j * np.pi * np.atleast_1d(frequency_hz), dtype=np.complex128)
     impedance: ComplexArray = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h

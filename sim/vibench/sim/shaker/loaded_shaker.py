@@ -184,7 +184,6 @@ class LoadedShaker:
             Length of a step [s]; a hundredth of the shortest period of interest errs by 1e-3.
         start
             The specimen's x, y, z, vx, vy, vz [m, m/s], absolute, shape (6,).
-
         """
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
@@ -260,7 +259,6 @@ class LoadedShaker:
         ------
         MotionFailed
             When the motion is no longer finite; this shaker cannot go on.
-
         """
         drive, motion = (
             np.ascontiguousarray(drive_v, np.float64),

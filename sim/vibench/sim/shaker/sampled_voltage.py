@@ -90,7 +90,6 @@ def follow_voltage(
     ------
     MotionFailed
         When the motion is no longer finite.
-
     """
     ratio = ceil(FINEST_STEP_HZ / sample_rate_hz)
     step_s = 1 / (sample_rate_hz * ratio)

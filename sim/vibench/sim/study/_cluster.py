@@ -42,7 +42,6 @@ class ClusterExecutor:
     ------
     ClusterLost
         When nobody answers at the address, no worker comes, or a worker has no vibench or another one.
-
     """
 
     def __init__(

@@ -113,7 +113,6 @@ class ThreadExecutor:
     ------
     InvalidStudy
         When fewer than one worker is asked for.
-
     """
 
     def __init__(self, workers: int | None = None, solver: Solver = solve_scene) -> None:

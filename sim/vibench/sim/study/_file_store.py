@@ -210,7 +210,6 @@ class FileStore:
     ------
     StudyError
         When the file is another study's, is being written by another run, or is no study's file.
-
     """
 
     def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], OpenFile] = sole_writer) -> None:

@@ -57,7 +57,6 @@ def read_arrays(path: Path, plan: GridPlan) -> Arrays:
     ------
     StudyError
         When the file cannot be read, or is of another kind than the plan.
-
     """
     with _open_store(path, type(plan)) as file:
         return _arrays(file, plan)
@@ -203,7 +202,6 @@ class GridResults(Generic[Plan]):
         ------
         InvalidStudy
             When there is no such column, axis or value.
-
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"
@@ -281,7 +279,6 @@ def open_study(path: Path | str) -> StudyResults:
     ------
     StudyError
         When it is no study's file, or another version's.
-
     """
     path = Path(path)
     study = read_plan(path, Study)

@@ -59,7 +59,6 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     continued
         Identity of the scene whose end is this one's start, if it continues one. It stands for the state and
         the phase at the start, which follow from it.
-
     """
     content = _scenes.dump_python(scene, mode="python")
     # A name changes no motion.
@@ -270,7 +269,6 @@ def solve_study(
     ------
     StudyError
         In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
-
     """
     solver = study_solver(study)
     with executor_of(workers, cluster, solver) as executor, store_of(study, out, existing) as store:
@@ -337,6 +335,5 @@ def run_study(
     ------
     StudyError
         When the store or the executor fails; what was kept before is kept.
-
     """
     return run_points(Expansion(study), executor, store, observer, cancelled)

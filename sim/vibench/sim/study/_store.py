@@ -210,7 +210,6 @@ def prediction_at(
         Which point.
     frequency_hz, amplitude_m, accuracy, start
         What the study asked there.
-
     """
     numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
     x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))

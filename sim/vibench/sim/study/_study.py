@@ -45,7 +45,6 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
     -------
     tuple of float
         Ascending.
-
     """
     if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
         raise ValueError(
@@ -299,7 +298,6 @@ class Study(GridPlan):
         ------
         ValueError
             When a scene of these numbers is not allowed.
-
         """
         model, damping, gap, amplitude, _, frequency = place
         return Scene(
@@ -380,7 +378,6 @@ def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]
         Of the base displacement [m], in any order.
     gaps_m
         Clearances at stops [m], in any order; infinite where there is no stop.
-
     """
     gaps_m = tuple(gaps_m)
     largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)

@@ -45,7 +45,6 @@ def read(task: Task, samples: int, timeout_s: float) -> Reading:
     ------
     DaqmxRefusal
         -200279 for lost samples, -200278 past the end, -200284 if nothing at all came in time.
-
     """
     require_inputs(task)
     check_memory(samples, len(task.inputs))
@@ -205,7 +204,6 @@ def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s
     DaqmxRefusal
         -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full buffer,
         -200290 after an underflow.
-
     """
     require_outputs(task)
     for row, channel in enumerate(task.outputs):

@@ -96,7 +96,6 @@ class DaqServer:
     ------
     ConfigurationError
         When the address cannot be used.
-
     """
 
     def __init__(

@@ -81,7 +81,6 @@ class AFG1022(ScpiInstrument):
         Serial number, part of the VISA address.
     quirks, panel, terminal
         Habits of the firmware; settings of the front panel; load, clock error and noise of the output.
-
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
@@ -131,7 +130,6 @@ class AFG1022(ScpiInstrument):
         NDArray
             Shape (count,) [V], into the load of ``Terminal``. Commands act at the rig time at which
             they arrived, or at the end of what was already rendered if that is later.
-
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)

@@ -229,7 +229,6 @@ class ScpiInstrument:
         Answer to ``*IDN?``.
     commands
         What it obeys besides the common commands.
-
     """
 
     def __init__(
@@ -394,7 +393,6 @@ class ScpiSocket:
         0 takes a free one; see ``port`` and ``resource_name``.
     host
         Address to listen on. SCPI has no password: anyone who reaches the port commands the generator.
-
     """
 
     def __init__(self, device: ScpiDevice, port: int = 0, host: str = LOOPBACK) -> None:

@@ -402,7 +402,6 @@ def load_fault_script(path: Path | str) -> FaultScript:
     ------
     ConfigurationError
         With file, key, what was given and what is allowed.
-
     """
     return load_toml(named(path, "hardware_configs/faults"), FaultScript)
 

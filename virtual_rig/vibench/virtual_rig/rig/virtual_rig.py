@@ -66,7 +66,6 @@ class VirtualRig:
         Of `socket_resource`; 0 takes a free one.
     disk
         Whether a script of faults may trouble the recordings that this process makes.
-
     """
 
     def __init__(

@@ -393,7 +393,6 @@ def plug_in_remote(address: str) -> RemoteUsbDevice:
     ------
     InstrumentLost
         When no rig answers there.
-
     """
     device = RemoteUsbDevice(address)
     plug_in(device)
