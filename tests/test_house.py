@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_570,
-    "analysis": 32_300,
-    "cli": 5_090,
-    "extensions": 2_750,
-    "gui": 12_610,
+    "acquisition": 27_950,
+    "analysis": 31_590,
+    "cli": 5_050,
+    "extensions": 2_730,
+    "gui": 12_480,
     "native": 6_600,
-    "sim": 21_560,
+    "sim": 20_480,
     "studies": 3_220,
-    "virtual_rig": 8_510,
+    "virtual_rig": 8_430,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 
