@@ -61,7 +61,7 @@ from vibench.virtual_rig import VirtualRig
 from vibench_fast_loop import continuation_controller as _continuation_controller
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
-from vibench_fast_loop.law import designed_law
+from vibench_fast_loop.law import design_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 NOISES = (
@@ -264,7 +264,7 @@ def model_loss(rig: Rig, branch: Branch, leg: np.ndarray, latency_ms: float) -> 
     table = amplifier_of(rig), shaker_of(rig), specimen_of(rig)
     plant = SampledPlant(*table, LoopTiming(rig.controller.rate_hz, 1e-3 * latency_ms))
     multipliers, hertz = (
-        branch_multipliers(plant, designed_law(plant), branch, leg),
+        branch_multipliers(plant, design_law(plant), branch, leg),
         branch.frequencies_hz[leg],
     )
     beyond = np.flatnonzero(multipliers > 1)

@@ -21,7 +21,7 @@ from vibench.sim import Harmonic
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
-from vibench_fast_loop.law import LawWeights, designed_law
+from vibench_fast_loop.law import LawWeights, design_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 SUBSTEPS = 40
@@ -72,7 +72,7 @@ def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
 
 def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -> list[float]:
     """Give the largest multiplier of a period with both observers that know the stops."""
-    scale, law = plant.scales, designed_law(plant)
+    scale, law = plant.scales, design_law(plant)
     shown, step = plant.shown * scale, plant.step[0] * scale / scale[:, None]
     true, volts = struck(plant, slopes)
     seen, seen_volts = struck(plant, believed)
@@ -126,7 +126,7 @@ def main() -> None:
         count = round(rig.controller.rate_hz / hertz)
         timing = LoopTiming(count * hertz, given.latency)
         plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen, timing)
-        usual = branch_multipliers(plant, designed_law(plant), branch, [point])
+        usual = branch_multipliers(plant, design_law(plant), branch, [point])
         states = PeriodMap(specimen).orbit(
             branch.states[point], Harmonic(hertz, LEVEL_M), 2 * count * SUBSTEPS
         )

@@ -17,7 +17,7 @@ from vibench.acquisition.first_day.configured import QUESTIONS, configured, valu
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app
-from vibench.cli.bench_new import _configured_at_terminal, _operator_at_terminal, _wired_at_terminal
+from vibench.cli.bench_new import _configure, _confirm_wire, _operator_at_terminal
 from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -139,7 +139,7 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
         stop_on_signal(switch),
         pytest.raises(CheckStopped, match=r'before anything played.*--bench "my own'),
     ):
-        _wired_at_terminal(Path("my own.toml"), "the T-piece")
+        _confirm_wire(Path("my own.toml"), "the T-piece")
     assert switch.request is None
 
 
@@ -149,7 +149,7 @@ def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeyp
 
     monkeypatch.setattr("typer.prompt", stopped)
     with pytest.raises(CheckStopped, match="nothing is written"):
-        _configured_at_terminal(LAB, tmp_path / "lab.toml", seen(), "note")
+        _configure(LAB, tmp_path / "lab.toml", seen(), "note")
     with pytest.raises(CheckStopped, match="nothing is written"):
         _operator_at_terminal()
     assert not list(tmp_path.iterdir())

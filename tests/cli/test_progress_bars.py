@@ -6,7 +6,7 @@ from threading import Event
 from rich.console import Console
 from rich.progress import Progress
 
-from vibench.cli.progress_bars import LINE_INTERVAL_S, shown
+from vibench.cli.progress_bars import LINE_INTERVAL_S, show_bars
 
 
 class Log(io.StringIO):
@@ -25,7 +25,7 @@ class Log(io.StringIO):
 
 def test_without_a_terminal_progress_is_one_line_each_time():
     log = Log()
-    with shown(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
+    with show_bars(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
         bars.update(bars.add_task("noise", total=60), completed=15)
         bars.add_task("opening", total=None)
         log.written.clear()
@@ -35,6 +35,6 @@ def test_without_a_terminal_progress_is_one_line_each_time():
 
 def test_what_ends_before_ten_seconds_leaves_no_line():
     log = Log()
-    with shown(Progress(console=Console(file=log))) as bars:
+    with show_bars(Progress(console=Console(file=log))) as bars:
         bars.add_task("noise", total=60)
     assert (LINE_INTERVAL_S, log.getvalue()) == (10.0, "")

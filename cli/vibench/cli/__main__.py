@@ -104,7 +104,7 @@ class LateCommand(TyperCommand):
             need_space(self._place.space_mb, self._place.advice)
         command = typer.main.get_command(self._place.load())
         command.name = self.name
-        with told_in_full([] if named.get("resilient_parsing") else args):
+        with explain_refusals([] if named.get("resilient_parsing") else args):
             context = command.make_context(info_name, [*args], *given, **named)
         if not named.get("resilient_parsing"):
             for extra in self._place.extras:
@@ -117,7 +117,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 
 
 @contextmanager
-def told_in_full(args: Sequence[str]) -> Iterator[None]:
+def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     """Refuse arguments with nothing in them, and say of an option what stands there and what may."""
     words = ["", *(part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each]))]
     empty = next((before for before, word in pairwise(words) if not word), None)
@@ -131,13 +131,13 @@ def told_in_full(args: Sequence[str]) -> Iterator[None]:
         yield
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
-            _name_what_was_given(error, words)
+            _add_given_value(error, words)
         if args:  # without any, the message is the help
             error.message = printable(error.message)
         raise
 
 
-def _name_what_was_given(error: typer.BadParameter, words: Sequence[str]) -> None:
+def _add_given_value(error: typer.BadParameter, words: Sequence[str]) -> None:
     error.message = error.message.removeprefix("Value error, ")
     names = () if error.param is None else error.param.opts
     given = next((word for before, word in pairwise(words) if before in names), None)
@@ -167,7 +167,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
             self.commands = {name: LateCommand(name, place) for name, place in places.items()}
 
         def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
-            with told_in_full([] if named.get("resilient_parsing") else args):
+            with explain_refusals([] if named.get("resilient_parsing") else args):
                 return super().make_context(info_name, args, *given, **named)
 
     return LateCommands

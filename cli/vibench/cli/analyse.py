@@ -39,9 +39,9 @@ from vibench.sim.maps import MapResults, open_map
 from .exit_code import ExitCode
 from .options import Fields, RequestOptions, option
 from .output import bold, console, errors, print_json
-from .paths import AllowExternal, AsJson, external_data, room_for_folder, unused
+from .paths import AllowExternal, AsJson, external_data, free_path, room_for_folder
 from .progress_bars import reading_bar
-from .specimen_option import SpecimenOption, described
+from .specimen_option import SpecimenOption, read_specimen
 
 
 class DrivenBy(StrEnum):
@@ -158,7 +158,7 @@ def analyse(
         raise InvalidRequest(
             "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
         )
-    laid = None if specimen is None else described(specimen).specimen()
+    laid = None if specimen is None else read_specimen(specimen).specimen()
     if hidden and laid is not None:
         tracked_specimen(laid)
     overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
@@ -193,13 +193,13 @@ def _analyse(
     # "." has no name of its own.
     place = recording if recording.name.strip(".") else recording.resolve()
     name = place.name.removesuffix(".part").removesuffix(".h5")
-    folder = unused(place.parent / f"{name}_analysis") if out is None else out
+    folder = free_path(place.parent / f"{name}_analysis") if out is None else out
     has_report = out is not None or not as_json
     if has_report:
         room_for_folder(folder)
     with reading_bar() as observer:
         simulation, draws = simulated
-        updated = None if fit is None else fitted_to(paths, name, observer, fit)
+        updated = None if fit is None else fit_specimen(paths, name, observer, fit)
         laid = laid if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, laid, draws)
         motions = list(hidden_motions(results, laid, observer, hidden))
@@ -228,12 +228,12 @@ def _analyse(
         console.print(sentence)
     if results.results and has_report:
         diagrams, maps = overlays
-        place = unused(folder / "report.html")
+        place = free_path(folder / "report.html")
         report = write_report(results, place, folder / "figures", diagrams, motions, maps)
         if not as_json:
             console.print("The report:", bold(report.resolve()))
         if updated is not None and updated.fitted:
-            specimen_file = unused(folder / "specimen.toml")
+            specimen_file = free_path(folder / "specimen.toml")
             save_toml(updated.description, specimen_file)
             if not as_json:
                 console.print("The specimen:", bold(specimen_file.resolve()))
@@ -255,7 +255,7 @@ def hidden_motions(
                 errors.print(f"error: {facts.name}: no hidden motion: {error}")
 
 
-def fitted_to(
+def fit_specimen(
     paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
@@ -267,11 +267,11 @@ def complain_about(results: CampaignResults) -> None:
     """End with a sentence for each recording without a result, or whose result has no simulation."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
-        errors.print(f"{word}: {_named(failure)}")
+        errors.print(f"{word}: {_with_recording(failure)}")
     if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _named(failure: AnalysisFailure) -> str:
+def _with_recording(failure: AnalysisFailure) -> str:
     """Return the sentence, with the recording's name where it does not say it itself."""
     return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

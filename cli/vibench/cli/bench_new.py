@@ -104,7 +104,7 @@ def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
     return found
 
 
-def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) -> str:
+def _ask(question: Question, choices: Sequence[str], held: str) -> str:
     for number, choice in enumerate(choices, start=1):
         console.print(f"  {number}: {choice}")
     answer = str(typer.prompt(f"{question.text} [{held}]", default="", show_default=False))
@@ -114,28 +114,28 @@ def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) ->
 
 
 @contextmanager
-def _stopped_by_hand() -> Iterator[None]:
+def _allow_interrupt() -> Iterator[None]:
     try:
         yield
     except typer.Abort as stop:
         raise CheckStopped("the first day was stopped at its questions; nothing is written") from stop
 
 
-@_stopped_by_hand()
+@_allow_interrupt()
 def _operator_at_terminal() -> str:
     return _name_in_a_comment(str(typer.prompt("Who sets up this bench?")))
 
 
-@_stopped_by_hand()
-def _configured_at_terminal(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
-    return configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
+@_allow_interrupt()
+def _configure(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
+    return configured(template, target, seen, _ask, note, refuse=_report_refusal)
 
 
-def _asked_again(error: ConfigurationError) -> None:
+def _report_refusal(error: ConfigurationError) -> None:
     console.print(f"! {error}")
 
 
-def _wired_at_terminal(target: Path, pair: str) -> str:
+def _confirm_wire(target: Path, pair: str) -> str:
     """Ask whether a wire is plugged in; nothing plays meanwhile, and Ctrl-C ends the program at once."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -162,7 +162,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     operator = _operator_at_terminal() if given is None else given.operator
     note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
     if given is None:
-        rig = _configured_at_terminal(template, target, seen, note)
+        rig = _configure(template, target, seen, note)
     else:
         rig = configured(template, target, seen, given.ask, note, given.questions)
     console.print()
@@ -179,6 +179,6 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
 
 def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPage:
     confirm: Confirm | None = None if given is None or rig.virtual is not None else given.knobs
-    wired, switch = partial(_wired_at_terminal, target) if given is None else given.wired, StopSwitch()
+    wired, switch = partial(_confirm_wire, target) if given is None else given.wired, StopSwitch()
     with open_bench(rig, confirm) as bench, stop_on_signal(switch, "bench new"):
         return first_day(bench, target, operator, wired, switch)

@@ -24,7 +24,7 @@ from vibench.analysis.dynamics import (
 )
 from vibench.sim import Parameter
 
-from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
 from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
@@ -88,9 +88,9 @@ def branches(
 
     def tell(number: int, line: BranchLine) -> None:
         if not as_json:
-            console.print(_told(number, line, asked.along))
+            console.print(_branch_in_words(number, line, asked.along))
 
-    lines, elapsed_s, is_complete = computed(branch_lines(asked), tell)
+    lines, elapsed_s, is_complete = compute_parts(branch_lines(asked), tell)
     diagram = BranchDiagram(asked, lines, elapsed_s)
     if as_json:
         print_answer(diagram.to_dict(), is_complete=is_complete)
@@ -115,7 +115,7 @@ def _drive(
                 f"--amplitude {amplitude} and --like were both given, and the recording has its own level; "
                 "leave --amplitude out (--frequency START:STOP may stay, within the recording's own range)"
             )
-        curves, level = _recorded(like)
+        curves, level = _recorded_curves(like)
         low, high = level[0][0], level[-1][0]
         if frequency is not None:
             chosen = range_of(frequency, Parameter.FREQUENCY, (2,))
@@ -169,12 +169,12 @@ def _along(amplitude: Range, frequency: Range) -> dict[str, object]:
     }
 
 
-def _recorded(path: Path) -> tuple[Sequence[Curve], tuple[tuple[float, float], ...]]:
+def _recorded_curves(path: Path) -> tuple[Sequence[Curve], tuple[tuple[float, float], ...]]:
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     return [each for each in found.curves if each.origin is CurveOrigin.MEASURED], level_of_drive(found)
 
 
-def _told(number: int, line: BranchLine, along: Parameter) -> str:
+def _branch_in_words(number: int, line: BranchLine, along: Parameter) -> str:
     scale, unit = (1.0, "Hz") if along is Parameter.FREQUENCY else (1e6, "µm")
     place = scale * line.along(along)
     named = ", ".join(

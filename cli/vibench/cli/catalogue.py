@@ -32,12 +32,12 @@ def show_catalogue(
         _show(entries)
     for each in entries:
         if each.is_bad:
-            errors.print(f"error: {_named(each)}")
+            errors.print(f"error: {_recording_name(each)}")
     if any(each.is_bad for each in entries):
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _named(entry: CatalogueEntry) -> str:
+def _recording_name(entry: CatalogueEntry) -> str:
     return entry.reason if entry.path in entry.reason else f"{entry.path}: {entry.reason}"
 
 

@@ -16,12 +16,12 @@ from vibench.analysis.dynamics import (
 from vibench.sim import USUAL_SPECIMEN, Parameter
 from vibench.sim.chain import MOST_CELLS
 
-from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
 from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
 from .range_option import range_of
-from .specimen_option import SPECIMEN, described, specimen_request
+from .specimen_option import SPECIMEN, read_specimen, specimen_request
 
 FILE = "chain.h5"
 OPTIONS = (*SPECIMEN[1:], "duration_s", "settle_s", "exponent_s", "accuracy")
@@ -57,7 +57,7 @@ def chain(
         options,
         first,
         amplitude,
-        others=tuple(described(each) for each in others),
+        others=tuple(read_specimen(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),
     )
@@ -67,9 +67,9 @@ def chain(
 
     def tell(_number: int, run: ChainRun) -> None:
         if not as_json:
-            console.print(_told(run))
+            console.print(_run_in_words(run))
 
-    runs, elapsed_s, is_complete = computed(chain_runs(asked), tell)
+    runs, elapsed_s, is_complete = compute_parts(chain_runs(asked), tell)
     found = ChainAnswer(asked, runs, elapsed_s)
     if as_json:
         print_answer(found.to_dict(), is_complete=is_complete)
@@ -128,7 +128,7 @@ def _is_above(first: str, second: str) -> bool:
         return False
 
 
-def _told(run: ChainRun) -> str:
+def _run_in_words(run: ChainRun) -> str:
     """Say a run in a line: the first and the last cell stand for all."""
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]

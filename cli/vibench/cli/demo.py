@@ -30,7 +30,7 @@ from .exit_code import ExitCode
 from .measure import the_bench
 from .options import option
 from .output import bold, console, leave_output_to_json, print_json
-from .paths import AsJson, unused
+from .paths import AsJson, free_path
 from .progress_bars import analysis_bar
 
 LOOK_S = 1.0
@@ -102,7 +102,7 @@ def demo(
 
     if as_json:
         leave_output_to_json()
-    folder = unused(Path("vibench_demo")) if out is None else out
+    folder = free_path(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/paper.toml"))
     console.print("The experiment of Gong et al. (2025), section 5, on a virtual rig.")
     console.print()

@@ -12,7 +12,7 @@ from vibench.analysis.report import ImageKind
 from vibench.sim.study import software
 
 from .exit_code import ExitCode
-from .interruption import told_to_stop
+from .interruption import watch_interrupt
 from .output import bold, console, errors, print_json
 from .paths import room_for_folder
 
@@ -36,7 +36,7 @@ def room_for(file: str, out: Path | None) -> None:
         raise InvalidRequest(f"{out / file} exists, and nothing is ever overwritten; choose another folder")
 
 
-def computed(
+def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
     """Compute part by part, telling each with its number; Ctrl-C ends after the one under way.
@@ -47,7 +47,7 @@ def computed(
     began = time.perf_counter()
     is_complete = True
     try:
-        with told_to_stop() as is_stopped:
+        with watch_interrupt() as is_stopped:
             for part in parts:
                 found.append(part)
                 tell(len(found), part)

@@ -19,7 +19,7 @@ from vibench.acquisition.engine import (
 )
 
 from .output import console, errors, words
-from .progress_bars import shown
+from .progress_bars import show_bars
 
 INTERVAL_S = 0.1
 """How often the terminal is drawn [s]."""
@@ -38,7 +38,7 @@ class EngineBars:
 
     def __init__(self, on: Console = console) -> None:
         self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
-        self._shown = shown(self._bars)
+        self._shown = show_bars(self._bars)
         self._whole: TaskID | None = None
         self._one: TaskID | None = None
         self._name = ""

@@ -7,7 +7,7 @@ from types import FrameType
 
 
 @contextmanager
-def told_to_stop() -> Iterator[Callable[[], bool]]:
+def watch_interrupt() -> Iterator[Callable[[], bool]]:
     """Give a question: whether Ctrl-C has been pressed since."""
     before = signal.getsignal(signal.SIGINT)
     pressed: list[int] = []

@@ -23,7 +23,7 @@ from vibench.sim.maps import (
 )
 from vibench.sim.study import ExistingStudy, plausibility_warnings
 
-from .interruption import told_to_stop
+from .interruption import watch_interrupt
 from .options import option
 from .output import bold, console, print_json, print_warnings
 from .paths import AllowExternal, AsJson, external_data, room_for_folder
@@ -93,7 +93,7 @@ def map_motions(
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with (
         external_data(allow_external),
-        told_to_stop() as is_stopped,
+        watch_interrupt() as is_stopped,
         study_bar(asked.grid.size) as observer,
     ):
         results = solve_map(asked, out / FILE, existing, workers, cluster, observer, is_stopped)

@@ -94,7 +94,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
     return out / usual.name if out.is_dir() else out
 
 
-def unused(path: Path) -> Path:
+def free_path(path: Path) -> Path:
     """Return a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1
     while candidate.exists():

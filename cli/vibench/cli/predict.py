@@ -27,14 +27,14 @@ from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
 from .found_motions import forgetting_text, motions_table, share_text
-from .interruption import told_to_stop
+from .interruption import watch_interrupt
 from .options import Fields, RequestOptions, option, option_name
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 from .range_option import frequencies
-from .specimen_option import AXES, SPECIMEN, described
+from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
@@ -81,7 +81,7 @@ def predict(
     typed = {name: value for name, value in given.items() if value is not None}
     _refuse_beside_target(typed.keys() | options.typed.keys())
     asked = options.request(
-        specimen=described(choice.typed.get("specimen")),
+        specimen=read_specimen(choice.typed.get("specimen")),
         **{axis: (choice.typed[name],) for axis, name in AXES.items() if name in choice.typed},
         amplitudes_m=(amplitude,),
         frequencies_hz=frequencies(frequency),
@@ -94,7 +94,7 @@ def predict(
     )
     began = time.monotonic()
     points: Sequence[ScenePrediction] = []
-    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
+    with watch_interrupt() as is_stopped, study_bar(asked.grid.size) as observer:
         if asked.grid.size == 1 and out is None and cluster is None and study_solver(asked) is solve_scene:
             # One point needs neither a queue nor a file.
             taken_s, kept, where = [math.nan], 1, asked.coordinates(0)

@@ -22,7 +22,7 @@ LINE_INTERVAL_S = 10.0
 
 
 @contextmanager
-def shown(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
+def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
     """Draw progress bars on a terminal; print a line of them every few seconds into anything else."""
     if bars.console.is_terminal:
         with bars:
@@ -59,7 +59,7 @@ MINUTES_OF_AN_HOUR = 60.0
 @contextmanager
 def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
     """Show one bar while inside; gives the function that draws a progress on it."""
-    with shown(bars):
+    with show_bars(bars):
         bar = bars.add_task(what, total=total, left="")
 
         def draw(progress: Progress) -> None:
@@ -105,6 +105,6 @@ def _duration(seconds: float) -> str:
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
     """Show a progress bar; yields the callback that takes the number of new values."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
-    with shown(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
+    with show_bars(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)
         yield lambda done: bars.advance(bar, done)

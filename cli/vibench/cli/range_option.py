@@ -80,24 +80,24 @@ def frequencies(text: str) -> tuple[float, ...]:
     try:
         numbers = [_number(part) for part in text.split(":")]
     except ValueError as error:
-        raise _refused(text, f"{error}; {_ADVICE}") from error
+        raise _refusal(text, f"{error}; {_ADVICE}") from error
     if len(numbers) not in (1, _RANGE_PARTS):
-        raise _refused(text, f"{len(numbers)} numbers are neither a frequency nor a range; {_ADVICE}")
+        raise _refusal(text, f"{len(numbers)} numbers are neither a frequency nor a range; {_ADVICE}")
     if numbers[0] <= 0.0:
-        raise _refused(text, f"{numbers[0]:g} Hz is not above 0; {_ADVICE}")
+        raise _refusal(text, f"{numbers[0]:g} Hz is not above 0; {_ADVICE}")
     if len(numbers) == 1:
         return (numbers[0],)
     start, stop, step = numbers
     if step <= 0.0:
-        raise _refused(text, f"a step of {step:g} Hz is not above 0; {_ADVICE}")
+        raise _refusal(text, f"a step of {step:g} Hz is not above 0; {_ADVICE}")
     if start > stop:
         way = f"give {stop:g}:{start:g}:{step:g}, and --start down to come from above"
-        raise _refused(text, f"the start of {start:g} Hz lies above the stop of {stop:g} Hz; {way}")
+        raise _refusal(text, f"the start of {start:g} Hz lies above the stop of {stop:g} Hz; {way}")
     try:
         return frequency_range(start, stop, step)
     except ValueError as error:
-        raise _refused(text, f"{error}; give a larger step") from error
+        raise _refusal(text, f"{error}; give a larger step") from error
 
 
-def _refused(text: str, why: str) -> InvalidRequest:
+def _refusal(text: str, why: str) -> InvalidRequest:
     return InvalidRequest(f"--frequency was given as {text!r}: {why}")

@@ -14,7 +14,7 @@ from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
 from .options import option
 from .output import bold, console, paragraph, print_json
 from .paths import AsJson, room_for_folder
-from .specimen_option import described
+from .specimen_option import read_specimen
 
 
 def show_specimen(
@@ -43,7 +43,7 @@ def show_specimen(
     if specimen is None:
         _list(as_json)
         return
-    table = described(specimen)
+    table = read_specimen(specimen)
     facts = figures_of(table.specimen())
     if as_json:
         gaps_m = [gap_m if math.isfinite(gap_m) else str(gap_m) for gap_m in table.specimen().gaps_m]
@@ -53,7 +53,7 @@ def show_specimen(
     else:
         console.print(": ".join(filter(None, (table.name, table.about))))
         for name, value in facts.items():
-            console.print(f"  {_heading(name)}: {_shown(value)}")
+            console.print(f"  {_heading(name)}: {_value_in_words(value)}")
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
@@ -73,7 +73,7 @@ def figures_of(specimen: Specimen) -> dict[str, object]:
 def _draw(specimen: str | None, folder: Path) -> None:
     from vibench.analysis.report import contact_forces_figure
 
-    table = described(specimen)
+    table = read_specimen(specimen)
     laws = [each.example for each in CONTACT_LAWS.values()] if specimen is None else [table.contact]
     drawn = contact_forces_figure({law: table.specimen(law) for law in laws})
     room_for_folder(folder)
@@ -102,13 +102,16 @@ def _heading(name: str) -> str:
     return f"{words} [{_UNITS[ending]}]" if ending else words
 
 
-def _shown(value: object) -> str:
+def _value_in_words(value: object) -> str:
     match value:
         case {"kind": kind, **numbers}:
-            return ", ".join([str(kind), *(f"{name} {_shown(each)}" for name, each in numbers.items())])
+            return ", ".join(
+                [str(kind), *(f"{name} {_value_in_words(each)}" for name, each in numbers.items())]
+            )
         case list() | tuple():
             return ", ".join(
-                f"({_shown(each)})" if isinstance(each, tuple) else _shown(each) for each in value
+                f"({_value_in_words(each)})" if isinstance(each, tuple) else _value_in_words(each)
+                for each in value
             )
         case float():
             return f"{value:.6g}"

@@ -20,7 +20,7 @@ SpecimenOption = Annotated[
 Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
-def described(specimen: str | None) -> SpecimenTable:
+def read_specimen(specimen: str | None) -> SpecimenTable:
     """Read the specimen that an option names, the paper's where it names none.
 
     Raises InvalidRequest when there is none, or when the file does not describe one.
@@ -40,7 +40,7 @@ def specimen_request(
 
     ``amplitude`` is what was typed, read before. Raises InvalidRequest with the option that is not allowed.
     """
-    request = options.request(described=described(specimen), **others)
+    request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])
     print_warnings(plausibility_warnings(ends_m, request.shaken.gaps_m))
     return request

@@ -12,7 +12,7 @@ from vibench.analysis.dynamics import (
 )
 from vibench.sim import Parameter
 
-from .dynamics_answer import SHOWN, computed, keep, leave, print_answer, room_for
+from .dynamics_answer import SHOWN, compute_parts, keep, leave, print_answer, room_for
 from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
@@ -36,7 +36,7 @@ def spectrum(
     from vibench.analysis.report import exponent_spectrum_figure
 
     room_for(FILE, out)
-    points, elapsed_s, _ = computed(spectrum_points(asked), lambda _number, _point: None)
+    points, elapsed_s, _ = compute_parts(spectrum_points(asked), lambda _number, _point: None)
     is_complete = len(points) == len(asked.values)
     found = ExponentSpectrum(asked, points, elapsed_s)
     if as_json:

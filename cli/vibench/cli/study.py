@@ -17,7 +17,7 @@ from vibench.sim.study import (
 )
 
 from .exit_code import ExitCode
-from .interruption import told_to_stop
+from .interruption import watch_interrupt
 from .options import option
 from .output import console, errors, print_json, print_warnings
 from .paths import AllowExternal, AsJson, external_data
@@ -50,7 +50,7 @@ def study(
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with (
         external_data(allow_external),
-        told_to_stop() as is_stopped,
+        watch_interrupt() as is_stopped,
         study_bar(asked.grid.size) as observer,
     ):
         results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
@@ -105,7 +105,7 @@ class KeptStudies:
         """Solve a study, or what is missing of it."""
         self._folder.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
-        with told_to_stop() as is_stopped, study_bar(study.grid.size) as observer:
+        with watch_interrupt() as is_stopped, study_bar(study.grid.size) as observer:
             results = solve_study(
                 study,
                 self._folder / f"{digest}.h5",

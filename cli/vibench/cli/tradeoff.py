@@ -26,7 +26,7 @@ from vibench.sim.study import Study
 from .options import Fields, RequestOptions, option, validated
 from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder
-from .progress_bars import shown
+from .progress_bars import show_bars
 from .specimen_option import AXES, SPECIMEN, described
 
 _SHORTEST_S = 0.05
@@ -61,7 +61,7 @@ def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
     if out is not None:
         room_for_folder(out)
     columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
-    with shown(Progress(*columns, TimeElapsedColumn(), console=errors)) as bars:
+    with show_bars(Progress(*columns, TimeElapsedColumn(), console=errors)) as bars:
         bar = bars.add_task("", total=_STEPS)
 
         def step(name: str) -> None:

@@ -35,7 +35,7 @@ from vibench.sim.operating_system.this import lower_priority
 
 from .options import option
 from .output import console
-from .specimen_option import SpecimenOption, described
+from .specimen_option import SpecimenOption, read_specimen
 from .watch import Pid
 
 NICE = 5
@@ -204,7 +204,7 @@ def _following(
     status = client.status()
     if status.bench is None:
         raise EngineError("the bench was closed before the twin could look at it; start the twin again")
-    known_as = specimen_of(rig) if specimen is None else described(specimen).specimen()
+    known_as = specimen_of(rig) if specimen is None else read_specimen(specimen).specimen()
     baseline = kept_baseline(baseline_path(rig, known_as))
     live = LiveTwin(
         rig,

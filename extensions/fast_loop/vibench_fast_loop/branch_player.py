@@ -116,7 +116,7 @@ class BranchPlayer:
 
     def _averaged(self, frequency_hz: float) -> tuple[LoopLook, Vector, int]:
         base, m0 = self.fast.motions(self._blocks, frequency_hz)
-        seen = _settled(np.hstack([base, m0]))
+        seen = _settled_part(np.hstack([base, m0]))
         mean, degrees = seen.mean(axis=0), len(seen) - 1
         squares = 0.5 * np.sum(np.abs(seen - mean) ** 2, axis=0)
         known = max(self._degrees + degrees, 1.0)
@@ -126,7 +126,7 @@ class BranchPlayer:
         return look, squares, degrees
 
 
-def _settled(seen: Coefficients) -> Coefficients:
+def _settled_part(seen: Coefficients) -> Coefficients:
     """Leave out the first half of the blocks for as long as it differs from the second."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]

@@ -94,43 +94,41 @@ def _branch(loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> Control
     yield from player.run(Phase(RunState.ARMED, None, HUSH_S))
     tone = player.tone(start)
     yield from player.run(ramp(RunState.RAMPING_UP, tone, loop.measurement))
-    points, end = yield from _followed(loop, player, solver)
+    points, end = yield from _follow(loop, player, solver)
     loop.note(BranchEndNote(points=points, end=end))
     yield from player.run(ramp(RunState.RAMPING_DOWN, tone, loop.measurement))
     yield from loop.say()
 
 
-def _followed(
-    loop: SineLoop, player: BranchPlayer, solver: BranchSolver
-) -> Controller[tuple[int, BranchEnd]]:
+def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[int, BranchEnd]]:
     plan = player.plan
     way = 1.0 if plan.begin == "up" else -1.0
     points: list[Seen] = []
     length, failed = 1.0, 0
-    found = yield from _begun(player, solver)
+    found = yield from _first_motion(player, solver)
     while True:
         if found is None:
             length *= 0.5
             if length < _SHORTEST_STEP or not points:
                 return len(points), BranchEnd.LOST
             failed += 1
-            yield from _probed(player, solver, points[-1], 2 if failed == 1 else len(points[-1].unknowns))
+            yield from _probe(player, solver, points[-1], 2 if failed == 1 else len(points[-1].unknowns))
         else:
             seen, tries = found
             setting = solver.setting(seen.unknowns)
             if points and not plan.low_hz <= setting.frequency_hz <= plan.high_hz:
                 return len(points), BranchEnd.RANGE
-            yield from _recorded(loop, player, setting, len(points), tries)
+            yield from _record(loop, player, setting, len(points), tries)
             points.append(seen)
             failed = 0
             if len(points) == plan.most_points:
                 return len(points), BranchEnd.POINTS
             if tries <= _EASY:
                 length = min(length * _GROWTH, 1.0)
-        found = yield from _corrected(player, solver, solver.next(points, length, way))
+        found = yield from _correct(player, solver, solver.next(points, length, way))
 
 
-def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
+def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
     """Raise what is played until the base has its level: the first motion that is met from rest."""
     foreseen = solver.first()
     unknowns = foreseen.unknowns.copy()
@@ -138,7 +136,7 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     unknowns[1] += _ABOVE if above else -_BELOW
     slope, before, most = _SLOPES[0], None, _LOWERED if above else 1.0
     for tries in range(1, _FIRST_TRIES + 1):
-        seen: Seen = yield from _seen(player, solver, unknowns)
+        seen: Seen = yield from _look_at(player, solver, unknowns)
         wrong = float(seen.residual[0])
         if _is_sine(seen.residual, player.plan.tolerance):
             return seen, tries
@@ -153,38 +151,38 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     if abs(wrong) > _NEAR:
         return None
     # Level and harmonics that move each other settle slowly by what changes of all of them have told.
-    yield from _probed(player, solver, seen, len(seen.unknowns))
-    return (yield from _corrected(player, solver, replace(foreseen, unknowns=seen.unknowns)))
+    yield from _probe(player, solver, seen, len(seen.unknowns))
+    return (yield from _correct(player, solver, replace(foreseen, unknowns=seen.unknowns)))
 
 
-def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
+def _probe(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
     """Go back to the last point, and learn again what the first of the unknowns do, each alone.
 
     Frequency and first coefficient are what usually changed. What is believed of the harmonics was learnt
     on the way, from changes of all at once, and can leave equations that near a fold have no solution.
     """
-    here = yield from _seen(player, solver, last.unknowns)
+    here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
         unknowns = last.unknowns.copy()
         unknowns[column] += _PROBE if column < 2 else _PROBE_HARMONIC
-        beside = yield from _seen(player, solver, unknowns)
+        beside = yield from _look_at(player, solver, unknowns)
         solver.probe(column, here, beside)
 
 
-def _corrected(
+def _correct(
     player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen
 ) -> Controller[tuple[Seen, int] | None]:
     """Find the point of the branch beside a foreseen one; gives it and how many settings were tried."""
     unknowns = foreseen.unknowns
     for tries in range(1, _MOST_TRIES + 1):
-        seen = yield from _seen(player, solver, unknowns)
+        seen = yield from _look_at(player, solver, unknowns)
         if _is_sine(seen.residual, player.plan.tolerance) and is_new(seen, foreseen):
             return seen, tries
         unknowns = solver.corrected(seen, foreseen)
     return None
 
 
-def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
+def _look_at(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
     plan, setting = player.plan, solver.setting(unknowns)
     level_m = level_at(plan, setting.frequency_hz)
     look = yield from player.looked(setting, level_m)
@@ -196,7 +194,7 @@ def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Contr
     return seen
 
 
-def _recorded(
+def _record(
     loop: SineLoop, player: BranchPlayer, setting: LoopSetting, number: int, tries: int
 ) -> Controller[None]:
     look = yield from player.recorded(setting, player.plan.segment(number, setting.frequency_hz))
@@ -253,14 +251,14 @@ def perturbed_stability(
     count = plan.perturbed_periods // (2 * _EACH)
     changes = _changes(count, number)
     first_v = _FIRST_SIZE * abs(setting.reference_v[0])
-    told = yield from _changed(player, setting, first_v * changes[:_TRIAL], None)
-    seen = max(envelope_deviation(each, period) for each in _joined(told, channels))
+    told = yield from _play_changes(player, setting, first_v * changes[:_TRIAL], None)
+    seen = max(envelope_deviation(each, period) for each in _join(told, channels))
     size_v = first_v * min(plan.perturbation / max(seen, _NEVER), _MOST_SIZE / _FIRST_SIZE)
     segment = plan.perturbed(number, frequency_hz, size_v)
     course = np.concatenate([-changes[-_LEAD:], changes, -changes, np.zeros((1, len(_CHANGED)))])
-    told = yield from _changed(player, setting, size_v * course, segment)
+    told = yield from _play_changes(player, setting, size_v * course, segment)
     after = yield from player.looked(setting, abs(before.base_m[0]))
-    return stability_note(_fitted(told, channels, period, count), number, plan.perturbation, before, after)
+    return stability_note(_fit(told, channels, period, count), number, plan.perturbation, before, after)
 
 
 def _changes(count: int, seed: int) -> Coefficients:
@@ -269,7 +267,7 @@ def _changes(count: int, seed: int) -> Coefficients:
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
 
-def _changed(
+def _play_changes(
     player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
 ) -> Controller[list[PhaseSamples]]:
     """Go from change to change along half cosines, without a step."""
@@ -284,19 +282,19 @@ def _changed(
     return told
 
 
-def _joined(told: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
+def _join(told: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
     """Join base and m0 of all phases."""
     rows = [channels.rows(each) for each in told]
     return np.concatenate([base for _, base, _ in rows]), np.concatenate([m0 for _, _, m0 in rows])
 
 
-def _fitted(
+def _fit(
     told: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
     """Fit what was recorded; nothing is known where samples are missing between phases (a run was held)."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(told)):
         return OpenLoopMultiplier(nan, nan)
-    base, m0 = _joined(told, channels)
+    base, m0 = _join(told, channels)
     return open_loop_multiplier(
         PerturbedMotion(base, m0, period, round(_LEAD * _EACH * period), count * _EACH)
     )

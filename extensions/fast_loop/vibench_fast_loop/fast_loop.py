@@ -29,7 +29,7 @@ from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
 
 from .branch_continuation import BranchContinuation
-from .law import LinearLaw, designed_law, loop_multiplier, loop_transfer, pd_law
+from .law import LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law
 from .plant import LoopTiming, SampledPlant
 from .protocol import LoopBlock, LoopFeedback
 
@@ -88,7 +88,7 @@ def fast_loop(rig: Rig) -> FastLoop:
     timing = LoopTiming(controller.rate_hz, controller.latency_s)
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), timing)
     sample = None if controller.pd_of is None else list(LoopInput).index(controller.pd_of)
-    return FastLoop(rig, plant, designed_law(plant) if sample is None else pd_law(plant, sample))
+    return FastLoop(rig, plant, design_law(plant) if sample is None else pd_law(plant, sample))
 
 
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:

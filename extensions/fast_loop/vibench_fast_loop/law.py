@@ -48,7 +48,7 @@ class LinearLaw:
     """Shape (1, 2)."""
 
 
-def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
+def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
     """Design the law that takes motion out of the spring between m1 and m2.
 
     Linear-quadratic Gaussian (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch. 9), the
@@ -61,7 +61,7 @@ def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Lin
     weights
         What is weighed.
     """
-    step, volt, shown, cost, unknown, noise = _weighed(plant, weights)
+    step, volt, shown, cost, unknown, noise = _weigh(plant, weights)
     gain = _gain(step, volt[:, None], cost, np.eye(1))
     covariance = solve_discrete_are(step.T, shown.T, unknown + 1e-12 * np.eye(plant.size), noise)
     filtered = np.linalg.solve(shown @ covariance @ shown.T + noise, shown @ covariance).T
@@ -71,7 +71,7 @@ def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Lin
 
 
 def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
-    """Design a law of two gains, by the measure of `designed_law`: for a controller that takes no other.
+    """Design a law of two gains, by the measure of `design_law`: for a controller that takes no other.
 
     ``u = -(kp s + kd d)`` of one sample s, its rate of change behind a low-pass ``d += a ((s - before) / step
     - d)``, ``a = step / (tau + step)``. Both gains and tau are those of the least expected cost (W. S. Levine
@@ -86,7 +86,7 @@ def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights())
     weights
         What is weighed.
     """
-    problem, step_s = _weighed(plant, weights), plant.timing.step_s
+    problem, step_s = _weigh(plant, weights), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
     size = 0.1 / weights.relative_m / omega ** (2 - sample)
 
@@ -117,7 +117,7 @@ class _Weighed(NamedTuple):
     noise: Table
 
 
-def _weighed(plant: SampledPlant, weights: LawWeights) -> _Weighed:
+def _weigh(plant: SampledPlant, weights: LawWeights) -> _Weighed:
     scale = plant.scales
     step, volt = plant.step
     step = step * scale / scale[:, None]
@@ -179,7 +179,7 @@ def loop_multiplier(
     parts
         Of a sample: contacts are shorter.
     """
-    stretches = _joined(plant, law, parts)
+    stretches = _tables_of_step(plant, law, parts)
     into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)
     rate, part_s = np.roll(relative, 3), plant.timing.step_s / parts
     springs, dampers = np.broadcast_arrays(np.asarray(stiffness) - plant.stiffness, damping)
@@ -202,13 +202,13 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 
     The phases are those at the moments of the samples; the motion is that without stops.
     """
-    before, after = _joined(plant, law, 1)
+    before, after = _tables_of_step(plant, law, 1)
     played = np.concatenate([plant.stretches()[0][1], np.zeros(len(law.step)), [1.0]])
     turn = np.exp(2j * np.pi * frequency_hz * plant.timing.step_s)
     return complex(np.linalg.solve(turn * np.eye(len(before)) - after @ before, after @ played)[0])
 
 
-def _joined(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
+def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
     """Stretches of a step of plant, memory of the law, and the volt it gives, which all of them need."""
     own, memory = plant.size, len(law.step)
     answer = np.hstack([law.direct @ plant.shown, law.output])

@@ -102,7 +102,7 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
     left = _parts(known)
     right = _parts([_envelope(motion.m0, turn, motion.period, 1)[at]])
     signs: Table = np.repeat([1.0, -1.0], rows // 2)[:, None]
-    left, right = (signs * _centred(each) for each in (left, right))
+    left, right = (signs * _detrend(each) for each in (left, right))
     scale: Vector = np.maximum(left.std(axis=0), np.finfo(np.float64).tiny)
     left /= scale
     other = np.roll(left, rows // 2, axis=0)
@@ -124,7 +124,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
     half = round(_HALF * period)
     turn = np.exp(-2j * np.pi * np.arange(len(signal)) / period)
     seen = _envelope(signal, turn, period, 0)[half:-half]
-    deviation = np.hypot(*_centred(_parts([seen])).T)
+    deviation = np.hypot(*_detrend(_parts([seen])).T)
     return float(np.sqrt(np.mean(deviation**2)) / abs(seen.mean()))
 
 
@@ -170,7 +170,7 @@ def _parts(columns: list[Complexes]) -> Table:
     return np.column_stack([part for each in columns for part in (each.real, each.imag)])
 
 
-def _centred(table: Table) -> Table:
+def _detrend(table: Table) -> Table:
     """Take mean and drift out."""
     line = np.column_stack([np.ones(len(table)), np.linspace(-1, 1, len(table))])
     return np.asarray(table - line @ np.linalg.lstsq(line, table, rcond=None)[0])

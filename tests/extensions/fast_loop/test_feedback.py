@@ -14,7 +14,7 @@ from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
-from vibench_fast_loop.law import LawWeights, LinearLaw, designed_law, loop_multiplier, loop_transfer, pd_law
+from vibench_fast_loop.law import LawWeights, LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 RATE_HZ = 10_240.0
@@ -90,7 +90,7 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
     found = branch()
     unstable = np.flatnonzero(~found.is_stable)
     assert unstable.size > 100
-    law = designed_law(plant())
+    law = design_law(plant())
     softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
     wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
     for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
@@ -137,7 +137,7 @@ def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
 
 def test_a_late_law_loses_motions_that_need_none_and_that_is_told():
     late = plant(2e-3)
-    hold = branch_hold(late, designed_law(late), 3e-6, 94.0, (90.0, 112.0))
+    hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))
     found = branch()
     stable = np.flatnonzero(found.frequencies_hz > 112.0)[0]
     assert found.is_stable[stable]
@@ -148,7 +148,7 @@ def test_a_late_law_loses_motions_that_need_none_and_that_is_told():
 def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     largest = [
-        branch_multipliers(each, designed_law(each), branch(), unstable).max()
+        branch_multipliers(each, design_law(each), branch(), unstable).max()
         for each in map(plant, (1e-4, 5e-4, 1.5e-3))
     ]
     assert largest[0] < 0.95
@@ -158,7 +158,7 @@ def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
 
 def test_what_is_played_moves_the_base_as_the_transfer_says():
     model = plant(specimen=LINEAR)
-    law = designed_law(model)
+    law = design_law(model)
     step, volt = model.step
     state, memory, shown, turns = np.zeros(model.size), np.zeros(len(law.step)), [], []
     for k in range(20_000):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench_fast_loop.fast_loop import motion_slopes
-from vibench_fast_loop.law import designed_law
+from vibench_fast_loop.law import design_law
 from vibench_fast_loop.open_loop_multiplier import (
     OpenLoopMultiplier,
     PerturbedMotion,
@@ -35,7 +35,7 @@ def modulations(rng, draws, per_period, count):
 def held(index, draws, rng):
     """Answers of base and m0 to changes of a volt, and to noise: shape (samples, 2, draws) each."""
     table, (wave, _, periods, _) = plant(), motion_slopes(HARDENING, branch(), index, RATE_HZ)
-    law, per_period = designed_law(table), len(wave) / periods
+    law, per_period = design_law(table), len(wave) / periods
     count = round((LEAD + 2 * CHANGES + 1) * HOLD * per_period)
     volts = np.hstack([modulations(rng, draws, per_period, count), np.zeros((count, draws))])
     noise = np.dstack(

@@ -9,7 +9,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.system import System
 
 from vibench.acquisition import ConfigurationError
-from vibench.virtual_rig.daqmx.channels import assigned_names, expand
+from vibench.virtual_rig.daqmx.channels import channel_names, expand
 from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with
 
 
@@ -117,6 +117,6 @@ def test_lists_and_ranges_of_names_are_understood(text, names):
 
 
 def test_one_name_for_many_channels_is_numbered():
-    assert assigned_names("force", ("a", "b")) == ("force0", "force1")
-    assert assigned_names("x, y", ("a", "b")) == ("x", "y")
-    assert assigned_names("", ("a", "b")) == ("a", "b")
+    assert channel_names("force", ("a", "b")) == ("force0", "force1")
+    assert channel_names("x, y", ("a", "b")) == ("x", "y")
+    assert channel_names("", ("a", "b")) == ("a", "b")

@@ -15,7 +15,7 @@ from vibench.virtual_rig.world.sensors import (
     NoiseStream,
     RandomDropouts,
     Vibrometer,
-    shown,
+    sensor_volts,
 )
 from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
@@ -39,25 +39,25 @@ def accelerometer(noise_m_per_s2=0.0, **config):
 
 
 def test_a_steady_velocity_shows_as_volts_by_the_decoders_range():
-    volts = shown(vibrometer(), np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
+    volts = sensor_volts(vibrometer(), np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
 
 def test_velocity_beyond_full_scale_is_clipped():
-    volts = shown(vibrometer(), np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
+    volts = sensor_volts(vibrometer(), np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
     assert np.min(volts) == -FULL_SCALE_V
     assert np.count_nonzero(volts == -FULL_SCALE_V) > 190
 
 
 def test_the_vibrometers_noise_has_the_density_that_is_configured():
     density = 2e-8
-    volts = shown(vibrometer(noise_density=density), np.zeros(200_000), 0)
+    volts = sensor_volts(vibrometer(noise_density=density), np.zeros(200_000), 0)
     rms = np.std(volts) * FULL_SCALE_M_PER_S / FULL_SCALE_V
     assert rms == pytest.approx(density * np.sqrt(GRID_RATE_HZ / 2), rel=0.01)
 
 
 def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
-    acceleration = shown(accelerometer(noise_m_per_s2=0.005), np.zeros(200_000), 0)
+    acceleration = sensor_volts(accelerometer(noise_m_per_s2=0.005), np.zeros(200_000), 0)
     acceleration /= RIG.accelerometer.sensitivity_v_per_m_per_s2
     spectrum = np.abs(np.fft.rfft(acceleration)) ** 2 * 2 / len(acceleration) ** 2
     in_band = np.fft.rfftfreq(len(acceleration), 1 / GRID_RATE_HZ) < FULL_BAND_HZ
@@ -66,7 +66,9 @@ def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
 
 def test_the_accelerometer_clips_at_its_full_scale():
     limit = RIG.accelerometer.full_scale_v
-    volts = shown(accelerometer(), np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0)
+    volts = sensor_volts(
+        accelerometer(), np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0
+    )
     assert volts[-1] == limit
 
 
@@ -85,7 +87,7 @@ def test_a_delay_that_cannot_be_simulated_is_refused():
 def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
     instrument = vibrometer()
     instrument.disturb(Disturbance(150, 160, 1.0))
-    first, second = (shown(instrument, np.full(100, 0.01), start) for start in (100, 200))
+    first, second = (sensor_volts(instrument, np.full(100, 0.01), start) for start in (100, 200))
     assert np.all(first[50:60] == FULL_SCALE_V)
     assert np.count_nonzero(first == FULL_SCALE_V) == 10
     quiet = 0.01 / FULL_SCALE_M_PER_S * FULL_SCALE_V
@@ -104,8 +106,8 @@ def test_dropouts_come_at_random_as_often_as_configured():
 
 def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
     steps = 5 * PAGE  # a multiple of 640
-    whole = shown(vibrometer(dropouts_per_s=200.0), np.zeros(steps), 0)
+    whole = sensor_volts(vibrometer(dropouts_per_s=200.0), np.zeros(steps), 0)
     instrument = vibrometer(dropouts_per_s=200.0)
-    parts = [shown(instrument, np.zeros(640), start) for start in range(0, steps, 640)]
+    parts = [sensor_volts(instrument, np.zeros(640), start) for start in range(0, steps, 640)]
     assert np.count_nonzero(whole) > 500
     assert np.array_equal(np.concatenate(parts), whole)

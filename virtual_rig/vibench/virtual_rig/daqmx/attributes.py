@@ -26,7 +26,7 @@ from ..analogue import Coupling
 from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem
 from .channels import OutputChannel
-from .data_calls import asked_available, default_samples, newest
+from .data_calls import count_available, default_samples, newest
 from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
 from .errors import DaqmxRefusal, member, unsupported_value
 from .tasks import Task, TaskState
@@ -119,7 +119,7 @@ def _set_rate(task: Task, rate_hz: float) -> None:
     task.timing.kind = SampleTimingType.SAMPLE_CLOCK
 
 
-def _watched(task: Task) -> Acquisition:
+def _running_acquisition(task: Task) -> Acquisition:
     """Return the running acquisition of a device that detects overloads."""
     match task.side:
         case AnalogInputs(overloads=Overloads.DETECTED):
@@ -135,13 +135,13 @@ def _watched(task: Task) -> Acquisition:
 
 
 def _overloads_exist(task: Task) -> bool:
-    acquisition = _watched(task)
+    acquisition = _running_acquisition(task)
     acquisition.look_for_overloads()
     return bool(acquisition.overloaded.any())
 
 
 def _overloaded_names(task: Task) -> str:
-    flags = _watched(task).overloaded
+    flags = _running_acquisition(task).overloaded
     return ", ".join(channel.name for channel, is_over in zip(task.inputs, flags, strict=True) if is_over)
 
 
@@ -215,7 +215,7 @@ READ: Attributes = {
     "NUM_CHANS": Attribute(lambda task: len(task.channels)),
     "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
     "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
-    "AVAIL_SAMP_PER_CHAN": Attribute(asked_available),
+    "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
     "0x31E8": Attribute(default_samples),  # not named in the protocol: how many a read of "all" brings
     "OVERLOADED_CHANS_EXIST": Attribute(_overloads_exist),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),

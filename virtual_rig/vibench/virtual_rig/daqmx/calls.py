@@ -25,7 +25,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
 from .acquisition import Acquisition, LogSettings, Overflow, ReferenceTrigger
-from .channels import InputChannel, OutputChannel, assigned_names, expand
+from .channels import InputChannel, OutputChannel, channel_names, expand
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
 from .generation import Generation
@@ -180,7 +180,7 @@ def _add_inputs(system: DaqmxSystem, request: Any) -> Fields:
     _require_volts(request)
     terminal = member(TerminalConfiguration, pick(request, "terminal_config"), "AI_TermCfg")
     places = system.inputs(request.physical_channel)
-    for place, name in zip(places, assigned_names(request.name_to_assign_to_channel, places), strict=True):
+    for place, name in zip(places, channel_names(request.name_to_assign_to_channel, places), strict=True):
         device = system.device(place)
         assert device.inputs is not None
         limits = request.min_val, request.max_val
@@ -192,7 +192,7 @@ def _add_outputs(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
     _require_volts(request)
     places = system.outputs(request.physical_channel)
-    for place, name in zip(places, assigned_names(request.name_to_assign_to_channel, places), strict=True):
+    for place, name in zip(places, channel_names(request.name_to_assign_to_channel, places), strict=True):
         device = system.device(place)
         assert device.outputs is not None
         task.add(OutputChannel(name, place, device, device.outputs, request.min_val, request.max_val))

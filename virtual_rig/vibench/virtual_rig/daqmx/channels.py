@@ -144,7 +144,7 @@ def _expand_one(part: str) -> Iterable[str]:
     return (f"{found['stem']}{number}" for number in range(first, last + step, step))
 
 
-def assigned_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
+def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of virtual channels: the physical ones, or what was given, numbered if they are many.
 
     A list or range with as many names as there are channels is used as it is.

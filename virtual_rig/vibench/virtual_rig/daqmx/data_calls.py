@@ -99,7 +99,7 @@ def newest(task: Task) -> int:
     return task.acquisition.acquired if task.acquisition else 0
 
 
-def asked_available(task: Task) -> int:
+def count_available(task: Task) -> int:
     """Answer how many wait: who asks again without reading polls, and only then a rig lets some come."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.asked_at == acquisition.position:
@@ -289,7 +289,7 @@ _READ_BITS = {"I16": 16, "I32": 32}
 def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
     reading = _read_what_fits(task_of(system, request), request)
     # Write a ReadAnalogF64Response, ready to send: status, array, samples per channel.
-    raw = np.ascontiguousarray(_laid_out(reading.volts, request), dtype="<f8").tobytes()
+    raw = np.ascontiguousarray(_lay_out(reading.volts, request), dtype="<f8").tobytes()
     array = _ARRAY_TAG + varint(len(raw)) + raw
     return b"".join((_STATUS_TAG, varint(reading.status), array, _COUNT_TAG, varint(reading.samples)))
 
@@ -333,7 +333,7 @@ def _binary_reader(bits: int) -> Call:
             detail = f"{task.inputs[0].inputs.bits}-bit samples need the 32-bit call\nTask Name: {task.name}"
             raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
         reading = _read_what_fits(task, request)
-        counts = _laid_out(_counts(task, reading), request)
+        counts = _lay_out(_counts(task, reading), request)
         return {
             "status": reading.status,
             "read_array": counts.astype(np.int64).ravel().tolist(),
@@ -377,7 +377,7 @@ def _read_what_fits(task: Task, request: Any) -> Reading:
     return read(task, wanted, request.timeout)
 
 
-def _laid_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
+def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
     """One row after the other, or one scan after the other; rows keep the distance the caller's array has."""
     if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
         return values.T

@@ -239,10 +239,10 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
             f"The simulated {product_type} cannot be called {name!r}: another device is; "
             "nothing was started, choose another name"
         )
-    return Catalogue(tuple(_renamed(device, old.name, name) for device in devices))
+    return Catalogue(tuple(_rename(device, old.name, name) for device in devices))
 
 
-def _renamed(device: Device, old: str, new: str) -> Device:
+def _rename(device: Device, old: str, new: str) -> Device:
     modules = tuple(new if module == old else module for module in device.modules)
     chassis = new if device.chassis == old else device.chassis
     return replace(device, name=new if device.name == old else device.name, modules=modules, chassis=chassis)

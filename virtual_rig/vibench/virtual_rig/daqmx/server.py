@@ -188,7 +188,7 @@ class DaqServer:
 
     def _answer(self, name: str, call: Callable[[Any], Fields | bytes]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
-            with _refusals_reported(context), self._rig.changed:
+            with _report_refusals(context), self._rig.changed:
                 self._check_faults(name)
                 if self.faults.take_restart():
                     self._system.reset()
@@ -212,7 +212,7 @@ class DaqServer:
 
     def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-            with _refusals_reported(context), self._rig.changed:
+            with _report_refusals(context), self._rig.changed:
                 self.faults.check(name, self._rig.now_s)
                 listener = call(request, context)
             context.send_initial_metadata(())  # the client waits for it before it goes on
@@ -222,7 +222,7 @@ class DaqServer:
 
 
 @contextmanager
-def _refusals_reported(context: grpc.ServicerContext) -> Iterator[None]:
+def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
     """Turn a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
     try:
         try:

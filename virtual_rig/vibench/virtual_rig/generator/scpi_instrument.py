@@ -259,7 +259,7 @@ class ScpiInstrument:
             delay_s, self._next_delay_s = self._next_delay_s, 0.0
             if self._next_is_corrupted:
                 self._next_is_corrupted = False
-                data = _spoiled(data)
+                data = _spoil(data)
             return Reply(data, delay_s)
 
     def report(self, code: ErrorCode) -> None:
@@ -339,7 +339,7 @@ class ScpiInstrument:
         return None, 1
 
 
-def _spoiled(reply: bytes) -> bytes:
+def _spoil(reply: bytes) -> bytes:
     """Invert every second byte, from the first on, and leave the newline that frames the reply."""
     return bytes(byte if place % 2 else byte ^ BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
 

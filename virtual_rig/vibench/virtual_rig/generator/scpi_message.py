@@ -280,12 +280,12 @@ def units(message: bytes) -> list[Unit]:
 
 def _unit(pieces: list[bytes], *, starts_line: bool) -> Unit | None:
     """Read header and parameters from the text between two separators."""
-    first = _trimmed(pieces[0])
+    first = _trim(pieces[0])
     if not first and len(pieces) == 1:
         return None
     header_end = next((i for i, byte in enumerate(first) if byte in WHITE_SPACE), len(first))
     header = first[:header_end].decode("ascii", errors="replace")
-    parameters = [_trimmed(first[header_end:]), *(_trimmed(piece) for piece in pieces[1:])]
+    parameters = [_trim(first[header_end:]), *(_trim(piece) for piece in pieces[1:])]
     if parameters == [b""]:
         parameters = []
     return Unit(
@@ -296,7 +296,7 @@ def _unit(pieces: list[bytes], *, starts_line: bool) -> Unit | None:
     )
 
 
-def _trimmed(piece: bytes) -> bytes:
+def _trim(piece: bytes) -> bytes:
     """Drop white space around a parameter, but never a byte of a block's data."""
     piece = piece.lstrip(b" \t\r")
     if piece.startswith(b"#"):

@@ -76,12 +76,12 @@ def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
         "Control": control,
     }
     handlers = {
-        name: grpc.unary_unary_rpc_method_handler(_served(name, act)) for name, act in methods.items()
+        name: grpc.unary_unary_rpc_method_handler(_handler(name, act)) for name, act in methods.items()
     }
     return grpc.method_handlers_generic_handler(SERVICE, handlers)
 
 
-def _served(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
+def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
     """Put the outcome of a transfer in front of its answer."""
 
     def serve(request: bytes, context: grpc.ServicerContext) -> bytes:

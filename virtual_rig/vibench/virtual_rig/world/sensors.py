@@ -153,10 +153,10 @@ def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
     """
     poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
     denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
-    return RecursiveFilter(_fitted_zeros(analogue, denominator, step_s), denominator)
+    return RecursiveFilter(_fit_zeros(analogue, denominator, step_s), denominator)
 
 
-def _fitted_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: float) -> NDArray[np.float64]:
+def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: float) -> NDArray[np.float64]:
     frequency_hz = np.geomspace(_FIT_FLOOR, _FIT_BAND, _FIT_POINTS) / step_s
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
     target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
@@ -214,7 +214,7 @@ class Sensor(Protocol):
         """Return what the motion is shown with in the next steps."""
 
 
-def shown(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
+def sensor_volts(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
     """Output volts for the means of a motion over the next steps, shape (steps,)."""
     volts = np.empty(len(values))
     parts = sensor.parts(first_step, len(values))

@@ -32,7 +32,7 @@ from .sensors import (
     RandomDropouts,
     SensorParts,
     Vibrometer,
-    shown,
+    sensor_volts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
 from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
@@ -380,10 +380,10 @@ class World:
             else:
                 self.plant.move_into(motion, signals[Signal.DRIVE], noise)
                 signals[Signal.AMPLIFIER] = motion.amplifier_voltage
-                signals[Signal.BASE_ACCELERATION] = shown(
+                signals[Signal.BASE_ACCELERATION] = sensor_volts(
                     self._accelerometer, motion.base_acceleration, first
                 )
-                signals[Signal.M0_VELOCITY] = shown(self.vibrometer, motion.m0_velocity, first)
+                signals[Signal.M0_VELOCITY] = sensor_volts(self.vibrometer, motion.m0_velocity, first)
         except MotionFailed as error:
             raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
         if self._truth is not None:
