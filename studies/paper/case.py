@@ -143,7 +143,7 @@ class Option:
     about: str
     example: str
     field: str
-    """Of a case."""
+    """Field of a case."""
     read: Callable[[str], Any]
     label: Callable[[Any], str]
 

@@ -44,7 +44,7 @@ class Reproduction:
 
     @property
     def judgements(self) -> tuple[Judgement, ...]:
-        """Of all sections."""
+        """Judgements of all sections."""
         return tuple(each for section in self.sections.values() for each in section)
 
     def count(self, verdict: Verdict) -> int:

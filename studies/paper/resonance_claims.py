@@ -13,9 +13,9 @@ from .responses import linear_transmissibility, responses
 _WHOLE_HZ = 1.0
 """The paper gives whole hertz."""
 _GRID_HZ = 5.0
-"""Of a peak read off a curve every 5 Hz."""
+"""Tolerance of a peak read off a curve every 5 Hz."""
 _ROUGH_HZ = 10.0
-"""Of a peak of Response I in chaos: two steps of the coarse grid."""
+"""Tolerance of a peak of Response I in chaos: two steps of the coarse grid."""
 _AT_GAPS = f"The two highest peaks at {len(GAPS_M)} gaps, 5 to 60 µm, each at that A0; the worst of them."
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SPECTRUM_HZ = 600.0
 _RATE_HZ = 8192.0
 _STRETCHES = 600
-"""Of the outline; each has its smallest and largest value."""
+"""Number of stretches of the outline; each has its smallest and largest value."""
 _DECADES = 5.0
 
 

@@ -66,7 +66,7 @@ class Place:
     advice: str = ""
     """What to do where it cannot run."""
     help: str = ""
-    """Of a group of commands, which has no function with a docstring."""
+    """Help of a group of commands, which has no function with a docstring."""
 
     def load(self) -> typer.Typer:
         """Import the command, alone in an application of its own."""

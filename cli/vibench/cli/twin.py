@@ -44,7 +44,7 @@ POLL_S = 0.01
 IDLE_S = 0.2
 """Between two looks while nothing runs [s]."""
 PIECE_S = 0.1
-"""Of motion that is worked on at once, and told [s]."""
+"""Length of motion that is worked on at once, and told [s]."""
 LATEST_S = 3.0
 """Behind the newest sample by more than this, the twin leaves out what it was too slow for [s]."""
 SHOWN_S = 0.05
@@ -62,7 +62,7 @@ class _Following:
     specimen: Specimen
     live: LiveTwin
     rows: tuple[int, int]
-    """Of base acceleration and m0's velocity among the channels."""
+    """Rows of base acceleration and m0's velocity among the channels."""
     run_id: int = -1
     plan: str = ""
     missed: int = 0

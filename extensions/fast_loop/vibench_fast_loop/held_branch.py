@@ -54,7 +54,7 @@ class HeldBranch(Labelled):
     m0_m: Reals
     """That of m0."""
     phase_deg: Reals
-    """Of m0 over the base, as displacements."""
+    """Phase of m0 over the base, as displacements."""
     residue: Reals
     """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
     residue_acceleration: Reals
@@ -118,7 +118,7 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
 
 _HEIGHT_IN = 4.4
 _ROOM_HZ = 1.0
-"""Of the model's branch beyond the points held."""
+"""Range of the model's branch beyond the points held."""
 
 
 def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:

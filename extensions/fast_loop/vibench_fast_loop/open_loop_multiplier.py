@@ -46,7 +46,7 @@ _BLOCK = 8
 _MODEL = 0.01
 """What the expansion leaves out, as a standard error: bias of noiseless motions (docs/decisions/0069)."""
 _QUANTILE = 2.1
-"""Of Student's distribution at 95 % with the twenty degrees of freedom of as many blocks."""
+"""Quantile of Student's distribution at 95 % with the twenty degrees of freedom of as many blocks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class PerturbedMotion:
     m0: Vector
     """Velocity, in any unit, shape (samples,)."""
     period: float
-    """Of the drive [samples]."""
+    """Period of the drive [samples]."""
     first: int
     """Sample at which the changes begin to be gone through; before it lies the end of their second half."""
     periods: int

@@ -86,7 +86,7 @@ class LoopBlock(FrozenModel):
     steady: bool
     """Whether nothing was changed while it lasted."""
     output: tuple[Pair, ...]
-    """Of what is played."""
+    """Output of what is played."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
@@ -124,9 +124,9 @@ class LoopRequest(FrozenModel):
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     ask: Literal["hello", "play", "report", "silence"]
     program: LoopProgram | None = None
-    """Of "play"."""
+    """Program of "play"."""
     ramp_s: NonNegativeFloat = 0.1
-    """Of "silence" [s]."""
+    """Ramp duration of "silence" [s]."""
 
 
 @dataclass(frozen=True)

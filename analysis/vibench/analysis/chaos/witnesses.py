@@ -216,7 +216,7 @@ class ZeroOne:
     spread: float
     """Half the distance between their quartiles."""
     neighbour_correlation: float
-    """Of each value with the next."""
+    """Neighbour correlation of each value with the next."""
 
     @property
     def is_oversampled(self) -> bool:

@@ -54,7 +54,7 @@ class Curve(Labelled):
     magnitude: Reals
     """Displacement of m0 over displacement of the base; NaN where there is none."""
     relative_sd: Reals
-    """Of the magnitude; NaN where nothing is known of it."""
+    """Relative standard deviation of the magnitude; NaN where nothing is known of it."""
     note: str = ""
     """What else is to be known: averages, window, accuracy."""
     level_m: float | None = None
@@ -188,7 +188,7 @@ _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
 _CROWD_RISE = 0.3
 """Others count that rise by this share of what a peak must rise by."""
 _USUAL_HALF_WIDTH = 0.01
-"""Of the frequency; for a peak that does not fall by 3 dB on both sides."""
+"""Usual half width of the frequency; for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
 _PER_NEPER_DB = 20 / np.log(10)
 
@@ -198,10 +198,10 @@ class CurvePeak:
     """One peak of a curve."""
 
     frequency_hz: float
-    """Of the parabola through the highest point and its neighbours, in logarithms."""
+    """Frequency of the parabola through the highest point and its neighbours, in logarithms."""
     magnitude: float
     relative_sd: float
-    """Of the magnitude; NaN where nothing is known of it."""
+    """Relative standard deviation of the magnitude; NaN where nothing is known of it."""
     half_power_width_hz: float | None
     """Where the curve falls by 3 dB on both sides; None where a neighbour comes first."""
 

@@ -30,7 +30,7 @@ class LineEvent:
     index: int
     """It lies after this point of the branch, and before the next."""
     response_ii: float
-    """Of m0 there, between the two points."""
+    """Response II of m0 there, between the two points."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,9 +47,9 @@ class BranchRequest(SpecimenChoice):
     along: Parameter = Parameter.FREQUENCY
     """What changes: the drive's frequency, or its amplitude."""
     amplitude_m: PositiveFloat = 5e-6
-    """Of the base displacement, along frequency."""
+    """Amplitude of the base displacement, along frequency."""
     frequency_hz: PositiveFloat = 260.0
-    """Of the drive, along amplitude."""
+    """Frequency of the drive, along amplitude."""
     start: PositiveFloat = 50.0
     """Lower end of the range, in Hz or in m."""
     stop: PositiveFloat = 600.0
@@ -63,7 +63,7 @@ class BranchRequest(SpecimenChoice):
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
     """Longest motion that is looked for, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Of the random states."""
+    """Seed of the random states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
     """Along amplitude: follow the phase resonance of the one mode between these frequencies [Hz]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE

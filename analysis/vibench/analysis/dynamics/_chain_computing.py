@@ -59,7 +59,7 @@ class ChainRun(Labelled):
 
     cells: int
     frequency_hz: float
-    """Of a steady sine; NaN otherwise."""
+    """Frequency of a steady sine; NaN otherwise."""
     over_hz: Reals
     """Frequencies of the transmission, shape (m,): one under a steady sine."""
     transmission: Reals
@@ -77,7 +77,7 @@ class ChainRun(Labelled):
     """Largest Lyapunov exponent; NaN where it was not asked for."""
     exponent_error_per_s: float
     time_s: Reals
-    """Of the picture, shape (n,)."""
+    """Time of the picture, shape (n,)."""
     motion_m: Reals
     """x of m0 in every cell over the last periods of a steady sine; under other drives its root mean square
     in equal stretches; shape (n, cells)."""
@@ -104,7 +104,7 @@ class ChainAnswer(Labelled):
 
     @cached_property
     def gaps(self) -> tuple[BandGap, ...]:
-        """Of the endless chain without damping and contact."""
+        """Gaps of the endless chain without damping and contact."""
         return band_gaps(self.request.unit)
 
     @property
@@ -187,19 +187,19 @@ class ChainAnswer(Labelled):
 
 
 SAMPLES_PER_PERIOD = 8
-"""Of the highest frequency that matters; means of energies need no more."""
+"""Samples per period of the highest frequency that matters; means of energies need no more."""
 MOST_NUMBERS = 3e7
 """In the samples of a run: a quarter of a gigabyte."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Of a picture that shows a whole run."""
+"""Number of stretches of a picture that shows a whole run."""
 ENERGY_S = 0.5
 """Under a steady sine energies are averaged over this long, after the responses were observed."""
 SWEEP_PARTS = 120
 """Frequencies at which a swept transmission is read, but each over `FEWEST_PERIODS` or more."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
-"""Of a recorded motion, in the average that gives the transmission."""
+"""Number of segments of a recorded motion, in the average that gives the transmission."""
 X, VX = 0, 3
 
 

@@ -41,7 +41,7 @@ class ChainRequest(SpecimenChoice):
     drive: ChainDrive = ChainDrive.STEADY
     """What moves the base: nothing, a steady sine, a swept one, or what was recorded."""
     amplitude_m: PositiveFloat = 20e-6
-    """Of the base displacement under a sine."""
+    """Amplitude of the base displacement under a sine."""
     start_hz: PositiveFloat = 220.0
     """First frequency of a sine."""
     stop_hz: PositiveFloat = 220.0
@@ -57,7 +57,7 @@ class ChainRequest(SpecimenChoice):
     exponent_s: NonNegativeFloat = 0.0
     """Over which the largest Lyapunov exponent is averaged under a steady sine; 0 for none."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Of contacts; flight is exact at every level."""
+    """Accuracy of contacts; flight is exact at every level."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -90,7 +90,7 @@ class ChainRequest(SpecimenChoice):
 
     @property
     def frequencies_hz(self) -> Sequence[float]:
-        """Of a steady sine, ascending."""
+        """Frequencies of a steady sine, ascending."""
         is_one = self.start_hz == self.stop_hz
         return (self.start_hz,) if is_one else frequency_range(self.start_hz, self.stop_hz, self.step_hz)
 

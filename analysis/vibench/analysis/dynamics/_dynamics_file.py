@@ -66,7 +66,7 @@ _CHAIN_UNITS = {
     "impact_time_s": "s",
     "impact_cell": "1",
 }
-"""Of a run of a chain, a dataset each."""
+"""Units of a run of a chain, a dataset each."""
 _RUN_WORDS = (
     "cells", "frequency_hz", "observed_s", "exponent_per_s", "exponent_error_per_s", "outcome", "elapsed_s",
 )  # fmt: skip
@@ -77,7 +77,7 @@ _LINEAR_UNITS = {
     "linear_hz": "Hz",
     "attenuation_db": "dB",
 }
-"""Of the endless chain without contact."""
+"""Units of the endless chain without contact."""
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:

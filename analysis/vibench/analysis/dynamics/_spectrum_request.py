@@ -15,7 +15,7 @@ from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
-"""Of an average: its intervals are kept, some hundreds of megabytes of them."""
+"""Longest duration of an average: its intervals are kept, some hundreds of megabytes of them."""
 ROUNDING = 1e-9
 """A step that fits into the range except for rounding fits."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
@@ -28,9 +28,9 @@ class SpectrumRequest(SpecimenChoice):
     along: Parameter = Parameter.FREQUENCY
     """What changes: the drive's frequency, or its amplitude."""
     amplitude_m: PositiveFloat = 5e-6
-    """Of the base displacement, along frequency."""
+    """Amplitude of the base displacement, along frequency."""
     frequency_hz: PositiveFloat = 260.0
-    """Of the drive, along amplitude."""
+    """Frequency of the drive, along amplitude."""
     start: PositiveFloat = 240.0
     """Lower end of the range, in Hz or in m."""
     stop: PositiveFloat = 280.0
@@ -38,7 +38,7 @@ class SpectrumRequest(SpecimenChoice):
     step: PositiveFloat = 10.0
     """Between neighbouring points, in Hz or in m."""
     accuracy: Accuracy = Accuracy.REFERENCE
-    """Of contacts; the sum of the exponents is as exact."""
+    """Accuracy of contacts; the sum of the exponents is as exact."""
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
     """Over which exponents are averaged."""
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = 5.0

@@ -154,9 +154,9 @@ class TimeAxis:
     start: float
     interval: float
     uncertainty: float
-    """Of the interval; 0 where it is exact."""
+    """Uncertainty of the interval; 0 where it is exact."""
     rounding: float
-    """Of the start."""
+    """Rounding of the start."""
     runs: tuple[tuple[int, int], ...]
     """First sample, and its place in sample intervals, of each stretch without irregularity."""
     trouble: str = ""
@@ -298,7 +298,7 @@ class Piece:
     first: int
     """In the file."""
     place: int
-    """Of the first one, in sample intervals since the channel's start."""
+    """Place of the first one, in sample intervals since the channel's start."""
     samples: int
 
     @property
@@ -346,7 +346,7 @@ class Alignment:
     places: int
     """Sample intervals from the first sample of any channel to the last that all have."""
     pieces: tuple[tuple[Piece, ...], ...]
-    """Of each channel."""
+    """Pieces of each channel."""
     late_s: tuple[float, ...]
     """How much later than its place each channel was sampled, less than half an interval."""
     remarks: tuple[str, ...]

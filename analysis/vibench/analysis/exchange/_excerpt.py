@@ -42,7 +42,7 @@ class Excerpt:
 
     @property
     def values(self) -> int:
-        """Of all channels together: what a watcher counts up to."""
+        """Number of values of all channels together: what a watcher counts up to."""
         return self.samples * len(self.channels)
 
     @property

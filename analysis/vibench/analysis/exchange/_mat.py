@@ -96,7 +96,7 @@ LARGEST_BYTES = 2**31
 """A MATLAB 5 file counts the bytes of a variable with 31 bits, and many a reader those of the file."""
 VALUE_BYTES = 8
 LONGEST_NAME = 63
-"""Of a MATLAB variable; longer names of channels are cut."""
+"""Longest name of a MATLAB variable; longer names of channels are cut."""
 
 
 def require_small(excerpt: Excerpt) -> None:

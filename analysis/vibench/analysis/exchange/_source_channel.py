@@ -21,7 +21,7 @@ SECONDS = {
     **dict.fromkeys(("min", "minute", "minutes", "minuten"), 60.0),
     **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
 }
-"""Of a unit of time, by its text without regard to case."""
+"""Length in seconds of a unit of time, by its text without regard to case."""
 
 
 def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, float] | None:

@@ -321,7 +321,7 @@ _PER_LINE = 4
 _LEAST_STEP = 1e-9
 """Relative error of a frequency up to which lines count as evenly spaced."""
 _LARGEST_OFFSET = 1e-3
-"""Of a written first line from its multiple of the spacing, in spacings."""
+"""Largest offset of a written first line from its multiple of the spacing, in spacings."""
 _SPACINGS_TRIED = 1000
 """On either side of the nearest one of six digits; about every second one serves."""
 
@@ -339,7 +339,7 @@ class FunctionAxis:
     """What stands on one side of a function: a channel's motion, or nothing."""
 
     role: str = ""
-    """Of the channel."""
+    """Role of the channel."""
     label: str = "NONE"
     """Twenty characters of it stand on the axis."""
     quantity: str = ""

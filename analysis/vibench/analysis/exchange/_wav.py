@@ -66,7 +66,7 @@ ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """How sizes are written; those of RF64 files, over 4 GiB, stand elsewhere."""
 FIRST_CHUNK = 12
 UNKNOWN_SIZE = 2**32 - 1
-"""Of samples that were written to a program that takes them as they come."""
+"""Size field of samples that were written to a program that takes them as they come."""
 OFFSETS = {"u": 128.0}
 """Eight bits are stored without sign."""
 

@@ -31,7 +31,7 @@ from .style import (
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
-"""Of a third panel, where a bench is asked what it can hold."""
+"""Height [in] of a third panel, where a bench is asked what it can hold."""
 EVENT_MARKS = {
     "fold": ("o", "#d55e00"),
     "period doubling": ("s", "#009e73"),

@@ -30,7 +30,7 @@ _WAVES_IN, _RUNS_IN = 4.2, 9.0
 _SMALLEST = 1e-8
 """Transmissions below are drawn at the foot of the axis."""
 _DECADES = 4.0
-"""Of a map of motion below its largest."""
+"""Decades shown of a map of motion below its largest."""
 _NOTHING = 1e-300
 """Stands for a motion of zero where a logarithm is taken."""
 

@@ -35,7 +35,7 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
     CurveOrigin.STABLE: ("-", ":"),
     CurveOrigin.UNSTABLE: ("--", "-."),
 }
-"""Of the transmission or Response I, and of Response II."""
+"""Styles of the transmission or Response I, and of Response II."""
 _LONE = 1
 """A curve of one point is drawn as a mark."""
 _SINGLE_BAND = 0.2

@@ -229,12 +229,12 @@ _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
-"""Of a fit; one that takes more is of lines that no such modes describe."""
+"""Most steps of a fit; one that takes more is of lines that no such modes describe."""
 _STEADY_AVERAGES = 49.0
 """Averages that scatter steadied by neighbouring lines is worth."""
 _LEAST_LINES_ABOUT = 8
 _EDGE = 1e-3
-"""Of its reach within which a fit ends at a bound: it has found no minimum."""
+"""Part of its reach within which a fit ends at a bound: it has found no minimum."""
 
 
 class Lines:

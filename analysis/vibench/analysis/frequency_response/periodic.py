@@ -353,7 +353,7 @@ class _Realisation:
     base: Complexes
     response: Complexes
     covariance: Complexes
-    """Of the means of (base, response) over the periods, shape (2, 2, lines)."""
+    """Covariance of the means of (base, response) over the periods, shape (2, 2, lines)."""
 
 
 class PeriodicSums:

@@ -47,7 +47,7 @@ class FrequencyResponseView:
 
     @property
     def unit(self) -> str:
-        """Of the magnitude; empty for a plain ratio."""
+        """Unit of the magnitude; empty for a plain ratio."""
         return _UNITS[self.power]
 
     @property

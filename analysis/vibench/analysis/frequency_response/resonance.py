@@ -29,7 +29,7 @@ _LEAST_RISE = 3.0
 _MOST_MODES = 3
 """Taken for one peak."""
 _APART = (0.5, 1.5)
-"""Of a half-width, at which poles side by side start."""
+"""Part of a half-width, at which poles side by side start."""
 _LEAST_GAIN = 25.0
 """In chi square, by which a fit is better with one more mode: of its four numbers chance gives 19 once in a
 thousand."""

@@ -17,11 +17,11 @@ _ENOUGH_FREEDOM = 24.0
 _FREEDOM = 96.0
 """Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
 _FEWEST_FREEDOM = 4.0
-"""Of all lines together, below which neighbours tell no more than the line."""
+"""Fewest degrees of freedom of all lines together, below which neighbours tell no more than the line."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
-"""Of a variance, or of a shape, over what its neighbours have on average."""
+"""Part of a variance, or of a shape, over what its neighbours have on average."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:

@@ -34,7 +34,7 @@ _LEAST_P_OF_MEDIAN = 0.9
 _DEPTH_POWER = 0.8
 """Depth of a Hertz collision over its impulse: d ~ v^(4/5), and J ~ v."""
 _LAW_UNKNOWN = 0.15
-"""Of the mean depth: what another law would change in a gap."""
+"""Part of the mean depth: what another law would change in a gap."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
 """Of the depths of nine impacts in ten, over their mean: a line through impacts all alike leads nowhere."""
@@ -205,7 +205,7 @@ class _GapLine:
 
     gaps: tuple[FreeGap | None, FreeGap | None]
     residuals: Reals
-    """Of every impact, NaN on a side with too few [m]."""
+    """Residuals of every impact, NaN on a side with too few [m]."""
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
@@ -297,7 +297,7 @@ class FreeNumbers:
     tracked: TrackedSpecimen
     """The specimen with both."""
     sd: Reals
-    """Of each of them, relative, in the order of `FITTED`."""
+    """Standard deviation of each of them, relative, in the order of `FITTED`."""
     misfit: float
 
 
@@ -384,7 +384,7 @@ class Collisions(Labelled):
     """Largest."""
     speeds_before: Reals
     speeds_after: Reals
-    """Of p, towards and away from the stop [m/s]."""
+    """Speeds of p, towards and away from the stop [m/s]."""
 
     @property
     def count(self) -> int:

@@ -207,7 +207,7 @@ class _Search:
 _TELLING_LOSS = 0.15
 """Loss [s/m] from which speeds without a contact model tell more than a description."""
 _LAW_UNKNOWN = 0.3
-"""Of a depth by the described law, which may be another."""
+"""Part of a depth by the described law, which may be another."""
 _FREE_S = 3.0
 
 

@@ -18,7 +18,7 @@ _DIFFUSION_OF_GAP = 7e-6
 _DIFFUSION_OF_SPEED = 2e-5
 """... and changes its speed by this part of the gap times the highest natural frequency."""
 _DRIFT_M_PER_S2 = 1e-3
-"""Of the accelerometer's slow error in the root of a second."""
+"""Drift of the accelerometer's slow error in the root of a second."""
 _ACCELERATION_EXCESS = 1.5
 """Variance of an acceleration between samples over that of one: what linear interpolation adds."""
 _IMPULSE_SHARE = 0.003
@@ -216,11 +216,11 @@ class Smoothed:
     states: Reals
     """Shape (samples, 8)."""
     variances: Reals
-    """Of p and of its rate, shape (samples, 2)."""
+    """Variances of p and of its rate, shape (samples, 2)."""
     forces: Reals
     """Latent force on m1 and its variance, shape (samples, 2); only where one was asked for."""
     first_covariance: Reals
-    """Of the first state, shape (8, 8)."""
+    """Covariance of the first state, shape (8, 8)."""
     touched: Flags
     """Where a step met a stop."""
 
@@ -231,7 +231,7 @@ class Smoothed:
 
     @property
     def rate(self) -> Reals:
-        """Of p [m/s]."""
+        """Rate of p [m/s]."""
         return np.asarray(self.states[:, 4] - self.states[:, 5])
 
 

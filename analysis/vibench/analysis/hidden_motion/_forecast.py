@@ -14,7 +14,7 @@ from ._tracking_model import STATES, VX, W, X, Y, Z, equations, exact_flow
 
 AHEAD_S = 0.04
 LEARNT_S = 0.15
-"""Of motion that tells how the base moves."""
+"""Length of motion that tells how the base moves."""
 _HARMONICS = 3
 _YIELDING = (X, VX, W)
 """States that the base's acceleration follows: the specimen pushes the table through k0 and c0."""

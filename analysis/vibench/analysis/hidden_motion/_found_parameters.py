@@ -23,7 +23,7 @@ from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
-"""Of each restart."""
+"""Length of each restart."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
 """Of a short motion they overlap, and differ in where they begin to look."""
 _TRIAL_S = 0.25
@@ -97,7 +97,7 @@ class FoundParameter:
 
     @property
     def unit(self) -> str:
-        """Of the values, SI."""
+        """Unit of the values, SI."""
         return unit_of(self.what)
 
     @property
@@ -107,7 +107,7 @@ class FoundParameter:
 
     @property
     def half_width(self) -> float:
-        """Of the bounds."""
+        """Half width of the bounds."""
         return 0.5 * (self.high - self.low)
 
     @property

@@ -15,7 +15,7 @@ from ..tables import Labelled
 from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
-"""Of a picture: worked out in about a second."""
+"""Longest duration of a picture: worked out in about a second."""
 _NUMBERS_SHOWN = 3
 """Gaps and m1."""
 _LEAD_S = 0.15

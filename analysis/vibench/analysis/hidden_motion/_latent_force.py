@@ -23,19 +23,19 @@ _WINDOW_S = 6e-5
 """To each side of a peak."""
 _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
-"""Of the first guess of the force."""
+"""Least peak of the first guess of the force."""
 CLOSED_SHARE = 3e-4
 """Standard deviation of the force between impacts, of the first guess of the force."""
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
 """Squared normalised innovation that tells an impact that was overlooked."""
 _MEDIAN_OF_SQUARE = 0.455
-"""Of a normal variable's square."""
+"""Median of square of a normal variable's square."""
 _RERUNS = 3
 _START_UP_S = 4e-3
 """Innovations of a filter that has just started are not judged."""
 _START_SD = (1e-4, 0.3, 1.0, 0.5)
-"""Of displacements, velocities, W and B, when nothing is known yet."""
+"""Standard deviations of displacements, velocities, W and B, when nothing is known yet."""
 
 
 @dataclass(frozen=True, eq=False)

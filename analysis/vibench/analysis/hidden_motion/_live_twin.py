@@ -165,18 +165,18 @@ class LiveMotion(Labelled):
     """Under a sine only."""
     gaps_m: tuple[float, float]
     level: float
-    """Of the last block; 1 when nothing but noise is left."""
+    """Level of the last block; 1 when nothing but noise is left."""
     limit: float
     """Beyond which a block lies out; NaN while the usual level is being learnt."""
 
 
 HELD_S = 3.0
-"""Of motion that is held for finding numbers in."""
+"""Length of motion that is held for finding numbers in."""
 _NOISE_S = 0.5
 _LOOKED_S = 0.25
-"""Of the newest samples in which drop-outs are looked for."""
+"""Length of the newest samples in which drop-outs are looked for."""
 _FIND_S = 2.4
-"""Of motion that numbers are found in."""
+"""Length of motion that numbers are found in."""
 _PATIENCE = 2.0
 """After numbers were not found this many times as long is waited."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4

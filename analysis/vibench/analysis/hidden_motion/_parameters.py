@@ -20,11 +20,11 @@ class Hidden(StrEnum):
     C0 = "c0_ns_per_m"
     C2 = "c2_ns_per_m"
     FORCE = "force_at_1um_n"
-    """Of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT (1 + LOSS d')."""
+    """Force of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT (1 + LOSS d')."""
     EXPONENT = "contact_exponent"
     LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
-    """Of both sides: what statistics tell better than either."""
+    """Mean gap of both sides: what statistics tell better than either."""
 
 
 class Search(NamedTuple):

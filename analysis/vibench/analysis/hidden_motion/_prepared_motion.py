@@ -21,7 +21,7 @@ _MOST_SEGMENTS = 4096
 _PIECE = 1 << 19
 """Samples that are corrected at a time."""
 _LEAST_NOISE = 1e-6
-"""Of the signal: a channel without noise has rounding, and a filter needs a variance."""
+"""Least part of the signal: a channel without noise has rounding, and a filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
 """Median over mean of a periodogram's line of white noise, exponentially distributed."""
 _DARK_MARGIN = 8
@@ -51,9 +51,9 @@ class PreparedMotion:
     """
 
     acceleration: Samples
-    """Of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
+    """Acceleration of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
     velocity: Samples
-    """Of m0, shape (samples,) [m/s]; a bridge where the vibrometer had no light."""
+    """Velocity of m0, shape (samples,) [m/s]; a bridge where the vibrometer had no light."""
     is_dark: Flags
     """Where it had none, shape (samples,)."""
     sample_rate_hz: float

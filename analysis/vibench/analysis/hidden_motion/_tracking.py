@@ -22,13 +22,13 @@ from ._latent_force import latent_motion
 from ._prepared_motion import PreparedMotion
 
 ACQUISITION_S = 0.06
-"""Of motion that a track begins with."""
+"""Length of motion that a track begins with."""
 _WORST_MISFIT = 3.0
-"""Of an acquisition; a model that explains less is not started with."""
+"""Worst misfit of an acquisition; a model that explains less is not started with."""
 _ACQUIRED_EXCESS = 4.0
 """Factor on the covariance of what was acquired: the same samples are used again by the filter."""
 _FLIGHT_MARGIN_S = 8e-5
-"""Of flight on either side of the sample that is started with."""
+"""Length of flight on either side of the sample that is started with."""
 _PIECE_S = 0.25
 """Filtered and smoothed at a time."""
 _OVERLAP_S = 0.02
@@ -46,7 +46,7 @@ class TrackedPiece:
 
     smoothed: Smoothed
     run: Filtered
-    """Of the filter, over the same samples."""
+    """Run of the filter, over the same samples."""
 
     @property
     def first(self) -> int:

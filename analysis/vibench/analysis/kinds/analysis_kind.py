@@ -35,7 +35,7 @@ class Result(Labelled, Generic[A, L]):
 
     @property
     def kind(self) -> str:
-        """Of the excitation."""
+        """Kind of the excitation."""
         return self.analysis.facts.measurement.excitation.kind
 
 
@@ -60,8 +60,8 @@ class AnalysisKind(Generic[P, A, L]):
     lay: Callable[[A, Drawn[Any]], L]
     """Compare with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
-    """Of the response, measured or simulated, of the recording with that name."""
+    """Curves of the response, measured or simulated, of the recording with that name."""
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
-    """Of the numbers that a reader takes away."""
+    """Budgets of the numbers that a reader takes away."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()
     """Sorts the results of a family, weak to strong; without it they stay in the order given."""

@@ -9,7 +9,7 @@ from ..signals.arrays import Reals
 from ._ring import Values
 
 OVER_SHARE = 0.95
-"""Of full scale: what is louder is about to be clipped."""
+"""Share of full scale: what is louder is about to be clipped."""
 QUIET_SHARE = 0.01
 """A channel below this uses less than a hundredth of its range, or its sensor is missing."""
 QUIET_AFTER_S = 3.0

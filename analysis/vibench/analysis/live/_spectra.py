@@ -196,7 +196,7 @@ class LiveSpectra:
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
-"""Of a line under a Hann window, at half power, times the length of the window."""
+"""Hann width of a line under a Hann window, at half power, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
 """A segment is so much shorter than what is in sight, within the limits above."""
 _LOG_ROWS = 300
@@ -232,7 +232,7 @@ class DensityPicture:
 
     request: SpectrogramRequest
     unit: str
-    """Of the channel; densities are in decibels over 1 unit²/Hz."""
+    """Unit of the channel; densities are in decibels over 1 unit²/Hz."""
     time_s: tuple[float, float]
     """Left and right edge, since the recording's first sample."""
     frequency_hz: tuple[float, float]

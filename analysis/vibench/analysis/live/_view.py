@@ -34,7 +34,7 @@ from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSetti
 _SPAN_S = 78e-6
 """Between the samples of a difference: longer lets more of the motion through, shorter more noise."""
 _DAMPING_TIME_S = 2e-5
-"""Of the springs to m0: the step of the acceleration over the change of its slope."""
+"""Damping time of the springs to m0: the step of the acceleration over the change of its slope."""
 _CONTACT_S = 30e-6
 """Length of a contact: 20 to 40 us."""
 _APART_S = 100e-6
@@ -48,10 +48,10 @@ _NOISE_FACTOR = 5.2
 _SMOOTH_FACTOR = 3.0
 """Over what is left of a sine of the motion's mean frequency."""
 _REST_SHARE = 0.2
-"""Of a kink beside it: less is what is left of that one, for no kink is quite of the one shape."""
+"""Rest share of a kink beside it: less is what is left of that one, for no kink is quite of the one shape."""
 _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
-"""Of the sixth difference, for white noise."""
+"""Noise gain of the sixth difference, for white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
 """A quarter of the values of |noise| lie below this; impacts disturb most of the others at times."""
 

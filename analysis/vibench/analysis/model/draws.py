@@ -176,9 +176,9 @@ def _white(samples: Reals) -> float:
 
 
 DRAWS = 16
-"""Of a colliding motion: its band of 95 % is then known to a fifth of its width."""
+"""Number of draws of a colliding motion: its band of 95 % is then known to a fifth of its width."""
 DRAWS_WITHOUT_IMPACTS = 8
-"""Of one that never collides, whose draws differ by noise and clocks alone."""
+"""Number of draws of one that never collides, whose draws differ by noise and clocks alone."""
 START_M = 5e-9
 """Standard deviation of each mass' place at the start."""
 CLOCK_TOLERANCE = 50e-6
@@ -221,7 +221,7 @@ class SimulatedRun:
 
     @property
     def smaller_gap_m(self) -> float:
-        """Of both sides."""
+        """Smaller gap of both sides."""
         return min(self.specimen.gaps_m)
 
     @property

@@ -41,7 +41,7 @@ class DrivenRig:
     table: DrivenTable
     driven: Driven
     role: str
-    """Of the channel that holds the voltage."""
+    """Role of the channel that holds the voltage."""
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:

@@ -72,7 +72,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def median(self) -> Reals:
-        """Of the draws, shape (points,); NaN where there is none."""
+        """Median of the draws, shape (points,); NaN where there is none."""
         return _over_draws(self.draws, np.nanmedian)
 
     @cached_property
@@ -178,7 +178,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def _z_of_draws(self) -> Reals:
-        """Of each draw among the others, shape (draws, points); NaN where these are too few."""
+        """Z score of each draw among the others, shape (draws, points); NaN where these are too few."""
         left = self.count - 1
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -56,7 +56,7 @@ class AbstractOverlay(Labelled, Generic[R]):
 
     run: SimulatedRun
     response: R
-    """Of the first draw: under a voltage, one run as good as any other."""
+    """Response of the first draw: under a voltage, one run as good as any other."""
     ensemble: tuple[EnsembleCurve, ...]
     """Every compared quantity, measured and in all draws; bands only where there are draws enough."""
     escape: EscapeRate | None
@@ -102,7 +102,7 @@ class SweepOverlay(AbstractOverlay[SweptMotion]):
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} collision_regions=collisions.regions"
 
     collisions: Collisions
-    """Of the first draw."""
+    """Collisions of the first draw."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     terminal: tuple[TerminalLevel, ...]
     """Both of the first draw."""
     spectrum: EnsembleCurve
-    """Of the displacement over A0; not compared: its floor is noise that the model does not know."""
+    """Spectrum of the displacement over A0; not compared: its floor is noise that the model does not know."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:

@@ -98,7 +98,7 @@ class SimulatedChannels:
 
     recorded: RecordedChannels
     velocity: Reals
-    """Of m0, shape (samples,) [m/s]."""
+    """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
     """Times since the first sample [s], and contacts started up to them."""
     response_delay_s: float
@@ -112,7 +112,7 @@ class SimulatedChannels:
 
     @property
     def sample_rate_hz(self) -> float:
-        """Of all channels."""
+        """Sample rate of all channels."""
         return self.recorded.sample_rate_hz
 
     @property

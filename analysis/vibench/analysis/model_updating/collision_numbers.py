@@ -26,7 +26,7 @@ from .statistical_numbers import statistical_numbers
 CALM, COLLIDING = 1.01, 1.05
 """Response I over Response II: 1 for a sine; between the two nothing is said."""
 _LENGTH_S = 3.0
-"""Of a tracked stretch: the bounds of what is found are those of four restarts over it."""
+"""Length of a tracked stretch: the bounds of what is found are those of four restarts over it."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,
@@ -66,7 +66,7 @@ class CollisionNumbers:
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
-        """Of the lower and the upper side; empty unless both are determined."""
+        """Gaps of the lower and the upper side; empty unless both are determined."""
         found = tuple(each for each in self.told if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
@@ -196,7 +196,7 @@ class _Colliding:
     path: Path
     label: SegmentLabel
     middle: float
-    """Of the stretch within the longest segment of that name, 0 to 1."""
+    """Middle of the stretch within the longest segment of that name, 0 to 1."""
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:

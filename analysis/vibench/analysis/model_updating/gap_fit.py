@@ -24,7 +24,7 @@ _RELATIVE = 3
 _STEP_HZ = 0.02
 """For the curvature of the transmissibility: a hundredth of the narrowest resonance, far above rounding."""
 _STEP = 1e-4
-"""Of a logarithm, for how the relative motion depends on the linear parameters."""
+"""Step of a logarithm, for how the relative motion depends on the linear parameters."""
 _EDGE_POINTS = 41
 _APPROACH_S = 1.0
 _LEAST_INTERVALS = 3

@@ -27,14 +27,14 @@ right model refused.
 _NEIGHBOURS = 31
 """Lines whose median scatter is what is usual."""
 _MOST_OFF = np.log(1e4)
-"""Of a parameter from where the search begins, as a logarithm: further it runs away."""
+"""Largest distance of a parameter from where the search begins, as a logarithm: further it runs away."""
 LEAST_DAMPING_TIME_S = 1e-8
 """Where the search begins for a specimen that is described without damping."""
 CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
 """Where the phases of the channels are named."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
-"""Of all frequencies."""
+"""Scale factors of all frequencies."""
 _STEP = 1e-6
 """Of a logarithm, for a central difference: far above rounding, and far less than a resonance is wide."""
 
@@ -75,7 +75,7 @@ class Freedom:
     parameters: tuple[Parameter, ...] = ()
     model: Model = own_response
     starts: tuple[tuple[float, ...], ...] = ((),)
-    """Of the model's further numbers."""
+    """Starting values of the model's further numbers."""
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
 
@@ -86,9 +86,9 @@ class Descended:
 
     specimen: Specimen
     logarithms: Reals
-    """Of the free parameters."""
+    """Logarithms of the free parameters."""
     covariance: Reals
-    """Of these, where the model is right."""
+    """Covariance of these, where the model is right."""
     freedoms: Reals
     """Of the scatter that each of their uncertainties rests on: few where few lines tell it."""
     phases: tuple[float, float]
@@ -103,7 +103,7 @@ class Lines:
     frequency_hz: Reals
     measured: Complexes
     weights: Reals
-    """Of the magnitudes, then of the phases."""
+    """Weights of the magnitudes, then of the phases."""
     averages: float
     """Independent ones, from which each line's scatter was estimated."""
     correlation: tuple[float, float]

@@ -73,7 +73,7 @@ class FittedValue:
 
     @property
     def unit(self) -> str:
-        """Of the values, SI."""
+        """Unit of the values, SI."""
         return unit_of(self.parameter)
 
 

@@ -31,7 +31,7 @@ from .specimen_fit import SpecimenFit
 ROUNDS = (120, 120, 240)
 """Runs that each box holds."""
 _MARGIN = 1.25
-"""Of the largest error of a regression, within which a parameter is looked for in the next box."""
+"""Multiple of the largest error of a regression, within which a parameter is looked for in the next box."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
 """Of the statistics' scatter, by which observed ones are checked against those of runs."""
@@ -54,7 +54,7 @@ class Posterior:
     draws: Reals
     """Shape (draws, parameters)."""
     distance: float
-    """Of the observed statistics from those of runs, over that of the furthest run."""
+    """Distance of the observed statistics from those of runs, over that of the furthest run."""
 
     @property
     def fits(self) -> bool:
@@ -164,7 +164,7 @@ def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Re
 _SEGMENT_S = 0.1
 _LOWEST_HZ, _HIGHEST_HZ = 40.0, 12_000.0
 _HIGHEST_PART = 0.4
-"""Of the sample rate, within the converter's pass band."""
+"""Highest part of the sample rate, within the converter's pass band."""
 _BANDS = 18
 _ABOVE_NOISE = 4.0
 _COHERENT_HZ = 1_000.0

@@ -33,7 +33,7 @@ class Assumption(StrEnum):
     C2 = "c2"
     FRICTION = "friction"
     SENSITIVITY = "sensitivity"
-    """Of the vibrometer over that of the accelerometer: a transmission tells no more."""
+    """Relative sensitivity of the vibrometer over that of the accelerometer: a transmission tells no more."""
     EXTRA_MODE = "extra mode"
     TABLE_MASS = "table mass"
     GAPS = "gaps"

@@ -94,11 +94,11 @@ class UpdatedSpecimen(Labelled):
 
     specimen: Specimen
     values: tuple[FittedValue, ...]
-    """Of a model that fits; none where it does not."""
+    """Values of a model that fits; none where it does not."""
     collisions: CollisionNumbers | None
     """What collisions tell, tracked or from their statistics; None where neither can be."""
     linear: SpecimenFit | None
-    """Of the weakest noise; None where there is none."""
+    """Linear fit of the weakest noise; None where there is none."""
     linear_from: str
     """Recording whose transmission told damping and frequencies; empty if none did."""
     table: TableFit | None
@@ -119,7 +119,7 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def reduced_chi_square(self) -> float:
-        """Of the linear fit; NaN if there was none."""
+        """Reduced chi square of the linear fit; NaN if there was none."""
         return float("nan") if self.linear is None else self.linear.reduced_chi_square
 
     @property

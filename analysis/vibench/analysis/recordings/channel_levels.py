@@ -41,7 +41,7 @@ class ChannelLevel:
     peak: float
     """Largest magnitude [unit of the channel]."""
     full_scale: float
-    """Of the converter's input [unit of the channel]."""
+    """Full scale of the converter's input [unit of the channel]."""
     share_at_full_scale: float
     """Share of the samples within a thousandth of the full scale, or beyond."""
     flat_tops: tuple[float, ...] = ()

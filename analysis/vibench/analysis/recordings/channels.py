@@ -19,7 +19,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 ACCELEROMETER_DAMPING_RATIO = 0.02
-"""Of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
+"""Accelerometer damping ratio of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
@@ -88,7 +88,7 @@ class Channels(Protocol):
 
     @property
     def sample_rate_hz(self) -> float:
-        """Of all channels."""
+        """Sample rate of all channels."""
 
     @property
     def samples(self) -> int:
@@ -134,7 +134,7 @@ class RecordedChannels:
 
     @property
     def sample_rate_hz(self) -> float:
-        """Of all channels."""
+        """Sample rate of all channels."""
         return self.recording.sample_rate_hz
 
     @property

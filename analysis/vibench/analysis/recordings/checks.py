@@ -45,7 +45,7 @@ _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
 """Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
 _SHORTFALL = 0.15
-"""Of its peak below the setting: as much as a bench check refuses."""
+"""Shortfall of its peak below the setting: as much as a bench check refuses."""
 
 
 P = TypeVar("P")

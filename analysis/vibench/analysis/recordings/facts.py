@@ -27,9 +27,9 @@ from .channels import RESPONSE, OnRead, ignore_reading
 from .response import ACCELERATION, LOWEST_INTEGRATED_HZ, ResponseChannel, response_role
 
 MOST_BYTES = 1e9
-"""Of memory, for what need not be checked against the file's size."""
+"""Most bytes of memory, for what need not be checked against the file's size."""
 BYTES_A_SAMPLE = 80
-"""Of a stretch that is analysed at once: three channels, and what is made of them."""
+"""Bytes per sample of a stretch that is analysed at once: three channels, and what is made of them."""
 LARGEST_PACKING = 16.0
 """Converters hear noise: it packs 1.2 to 3 times, a computed sine without any 6 times."""
 

@@ -267,7 +267,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
 STEPPED: Drawing[Any, Any] = Drawing(
     _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
 )
-"""Of what is recorded step after step: a kind of another package may replace parts of it."""
+"""Drawings of what is recorded step after step: a kind of another package may replace parts of it."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(

@@ -133,7 +133,7 @@ class CampaignResults:
 
     @property
     def facts(self) -> tuple[RecordingFacts, ...]:
-        """Of every recording that has a result."""
+        """Facts of every recording that has a result."""
         return tuple(each.analysis.facts for each in self.results)
 
     @property

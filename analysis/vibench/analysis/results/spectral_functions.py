@@ -21,7 +21,7 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Of densities: segments of a second, Hann window, half overlapping."""
+"""Resolution of densities: segments of a second, Hann window, half overlapping."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})

@@ -23,7 +23,7 @@ class MeasuredLevel:
     power: float
     """A force at every p, as of power:3 at 150 Hz and 10 um."""
     state_error: float
-    """Of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
+    """State error of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
     response_i_error: float
     """Relative, of a periodic motion, against reference."""
 

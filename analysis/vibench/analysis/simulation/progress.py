@@ -53,7 +53,7 @@ BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
 """Drive periods of a motion that are shown, and samples in each."""
 MOST_CELLS = 200_000
-"""Of a map in a window; larger ones are made by `vibench map`, and opened."""
+"""Most cells of a map in a window; larger ones are made by `vibench map`, and opened."""
 
 
 class MapRequest(SpecimenChoice):
@@ -270,7 +270,7 @@ class SimulatedSignal:
     relative_m: Reals
     """p = y - z, between the stops."""
     gaps_m: tuple[float, float]
-    """Of the stops at negative and at positive p."""
+    """Gaps of the stops at negative and at positive p."""
 
 
 @dataclass(frozen=True)
@@ -291,7 +291,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Of both models together: a picture shows no more, and an afternoon computes no more."""
+"""Most points of both models together: a picture shows no more, and an afternoon computes no more."""
 
 
 class Exponent(StrEnum):
@@ -307,7 +307,7 @@ class SimulationRequest(SpecimenChoice):
     compared_with: ContactWord = "linear"
     """A second model, for similarity with the first; empty for none."""
     amplitude_m: PositiveFloat = 5e-6
-    """Of the base displacement."""
+    """Amplitude of the base displacement."""
     start_hz: PositiveFloat = 50.0
     """Lowest drive frequency."""
     stop_hz: PositiveFloat = 600.0
@@ -315,7 +315,7 @@ class SimulationRequest(SpecimenChoice):
     step_hz: PositiveFloat = 5.0
     """Between neighbouring frequencies."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Of contacts; flight is exact at every level. Below stands what each level costs and errs."""
+    """Accuracy of contacts; flight is exact at every level. Below stands what each level costs and errs."""
     duration_s: PositiveFloat = 8.0
     """Length of each run, from rest."""
     window_s: PositiveFloat = 5.0

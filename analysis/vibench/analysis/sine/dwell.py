@@ -132,7 +132,7 @@ def louder(silent: Background, sensor: Background) -> Background:
 
 _BLOCKS_OF_WINDOW = 10
 _LEAST_CYCLES = 4.0
-"""Of the drive in a block: its Hann window then holds no other order of interest."""
+"""Least cycles of the drive in a block: its Hann window then holds no other order of interest."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
 """Correlation of neighbouring blocks, which ten that scatter at random exceed once in a hundred records."""
@@ -254,13 +254,13 @@ class DwellResponse(Labelled):
     slow_change: float
     """Relative standard uncertainty that slow change of base or response adds to Response I; NaN likewise."""
     phase_rad: float
-    """Of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
     sd_phase_rad: float
     orders: tuple[float, ...]
     order_displacement: Complexes
     """Complex amplitudes of x at the orders; phase re the drive voltage's cosine [m]."""
     noise_density: float
-    """Of the velocity channel [m/s per root hertz]."""
+    """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
     """What that is in displacement, root mean square within its band; or what was heard in silence [m]."""
     displacement: ConvertedSignal

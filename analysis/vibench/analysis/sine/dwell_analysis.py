@@ -51,7 +51,7 @@ class Section:
     orbit_velocity_m_per_s: Reals
     """The phase portrait: shape (samples,), over the same stretch."""
     time_s: Reals
-    """Of the points, from the first sample of the record; shape (periods,)."""
+    """Time of the points, from the first sample of the record; shape (periods,)."""
     sd_timing_s: float
     """How far the phase clock may be off at the ends of the record."""
 

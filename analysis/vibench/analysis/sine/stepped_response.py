@@ -274,7 +274,7 @@ class TrackedResonance:
     """What was found of a mode at one level of the base."""
 
     number: int
-    """Of the level, in the order played, from 0."""
+    """Number of the level, in the order played, from 0."""
     base_m_per_s2: float
     """Fundamental of the base's acceleration, peak."""
     frequency_hz: float
@@ -282,9 +282,9 @@ class TrackedResonance:
     u_frequency_hz: float
     """Standard uncertainty, with that of the sensors' phase, which all levels share."""
     amplitude_m: float
-    """Of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
+    """Amplitude of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
     harmonic: int
-    """Of the drive, at which m0 resonates."""
+    """Harmonic of the drive, at which m0 resonates."""
     subharmonic: int
     """Drives in a period of m0."""
     mode_hz: float | None

@@ -41,9 +41,9 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 
     collisions: Collisions
     jumps: tuple[Jump, ...]
-    """Of Response II, between a smooth motion and another."""
+    """Jumps of Response II, between a smooth motion and another."""
     spectrogram: Spectrogram
-    """Of the recorded velocity."""
+    """Spectrogram of the recorded velocity."""
 
     @property
     def rate_text(self) -> str:
@@ -177,7 +177,7 @@ def _corrected(found: M, channels: Channels, first_s: float) -> M:
 
 
 _SAME = 1e-3
-"""Of a frequency; two clocks differ by a tenth of it."""
+"""Part of a frequency; two clocks differ by a tenth of it."""
 
 
 def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:

@@ -180,7 +180,7 @@ class DriveLevel:
     sd_frequency_hz: float
     """By the converter's clock, measured on the drive channel."""
     phase_rad: float
-    """Of the drive voltage, as a cosine, at the first sample."""
+    """Phase of the drive voltage, as a cosine, at the first sample."""
     amplitude_m: float
     """A0: displacement amplitude of the base at the drive frequency [m]."""
     sd_amplitude_m: float
@@ -200,7 +200,7 @@ class NoiseDriveLevel:
     """[m/s2]."""
     rms_displacement_m: float
     relative_sd: float
-    """Of both, from the number of independent averages and lines."""
+    """Relative standard deviation of both, from the number of independent averages and lines."""
 
 
 def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: float) -> DriveLevel:

@@ -51,9 +51,9 @@ class SimulatedDwell:
     """Windows of the rig under a sine, from several starts."""
 
     sd_largest: float
-    """Of Response I, relative; 0 where nothing collides."""
+    """Standard deviation of Response I, relative; 0 where nothing collides."""
     sd_second: float
-    """Of Response II, relative; 0 where nothing collides."""
+    """Standard deviation of Response II, relative; 0 where nothing collides."""
     has_several_motions: bool
     """Whether some runs collide and others do not, or they differ by more than chance."""
 

@@ -31,7 +31,7 @@ _ENDS = 2
 _PEAKED = 1.05
 """Response I over Response II above which a step is no sine."""
 _FEWEST_PERIODS = 20.0
-"""Of the drive in a part: its maximum is then one of many turns."""
+"""Fewest periods of the drive in a part: its maximum is then one of many turns."""
 
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:

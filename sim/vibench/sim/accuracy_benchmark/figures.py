@@ -78,7 +78,7 @@ class LotteryFigures:
     starts: int
     """The many."""
     cost: float
-    """Of the answer over that of one without a budget."""
+    """Cost of the answer over that of one without a budget."""
 
 
 def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
@@ -176,7 +176,7 @@ class LevelFigures:
     cost: float
     """Processor time over simulated time."""
     state_error: float | None
-    """Of the state at the end of the span, as `state_error` measures it; None in chaos."""
+    """State error of the state at the end of the span, as `state_error` measures it; None in chaos."""
     response_i_error: float | None
     """Relative, against the reference level; None in chaos."""
     response_ii_error: float | None

@@ -57,7 +57,7 @@ class Law(NamedTuple):
     terms: tuple[tuple[int, float], ...] = ()
     """Each power, and its force at the reference [N]."""
     beside: float = 0.0
-    """Of a linear spring that is pressed together with the stop [N/m]."""
+    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
 
 
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:

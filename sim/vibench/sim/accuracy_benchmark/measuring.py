@@ -73,9 +73,9 @@ class Thoroughness:
     """How long the compared motions are: longer ones cost more and prove more."""
 
     span_s: float = 0.5
-    """Of the comparison with the independent solution."""
+    """Span of the comparison with the independent solution."""
     solver_span_s: float = 0.05
-    """Of general solvers, which are slow."""
+    """Solver span of general solvers, which are slow."""
     starts: int = 200
     """Followed of a scene whose start is forgotten."""
 

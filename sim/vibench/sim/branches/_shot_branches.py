@@ -88,7 +88,7 @@ class BranchStart(Generic[M]):
     origin: BranchOrigin
     drive: Harmonic
     states: Floats
-    """Of it and, where they are known, of its mirror image, once a drive period, shape (n, 6)."""
+    """States of it and, where they are known, of its mirror image, once a drive period, shape (n, 6)."""
 
 
 def branches_from(

@@ -20,7 +20,7 @@ from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces
 STATES_PER_CELL = 6
 """x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Of a run; `check_work` refuses it long before."""
+"""Most windows of a run; `check_work` refuses it long before."""
 
 
 class ChainRun:

@@ -47,7 +47,7 @@ class ChainExponent:
     local_exponents_per_s: Floats
     """In each interval after settling, shape (n,)."""
     impacts: int
-    """Of all cells, while the exponent was read."""
+    """Impacts of all cells, while the exponent was read."""
     final_state: Floats
     """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
     outcome: Outcome

@@ -234,7 +234,7 @@ class MeanEnergies(NamedTuple):
 
     mean_j: Floats
     standard_error_j: Floats
-    """Of the mean, by blocks long enough to be independent."""
+    """Standard error of the mean, by blocks long enough to be independent."""
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:

@@ -111,7 +111,7 @@ def _answers(chain: Chain, moves: Table) -> Table:
 
 
 def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
-    """Of all masses without contact and drive, shape (masses of a cell, cells, columns)."""
+    """Accelerations of all masses without contact and drive, shape (masses of a cell, cells, columns)."""
     masses = chain.masses.reshape(chain.size, MASSES_PER_CELL)
     springs, dampers = (
         np.array(values).T[..., None]
@@ -210,7 +210,7 @@ class Pieces(NamedTuple):
     start_s: float
     """When the first of them begins."""
     length_s: float
-    """Of each."""
+    """Length of each."""
 
 
 def pieces_between(

@@ -45,9 +45,9 @@ from .shapes import (
 # collisions that are solved at sixteen points.
 
 MIDDLE = 1.47
-"""Of a collision, in u."""
+"""Middle of a collision, in u."""
 DERIVATIVES = 5
-"""Of the acceleration, itself among them."""
+"""Number of derivatives of the acceleration, itself among them."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
@@ -206,7 +206,7 @@ MODES = 3
 MOST_DAMPED = 0.05
 """Damping ratio up to which a mode is taken: beyond, its series would need more terms."""
 LEAST_PART = 1e-9
-"""Of a mode in p, over the largest: p alone is followed, and everything else found from it."""
+"""Least part of a mode in p, over the largest: p alone is followed, and everything else found from it."""
 
 
 @dataclass(frozen=True, eq=False)

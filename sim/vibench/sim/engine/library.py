@@ -71,7 +71,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Builds them; there in a checkout, not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-"""Of libraries of this system; wheels of others may have been built in the same checkout."""
+"""File name ending of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
@@ -79,7 +79,7 @@ FUNCTIONS = (
     *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
     *("describe_collisions", "follow_batch"),
 )
-"""Of the library, each with one structure."""
+"""Functions of the library, each with one structure."""
 Tables = NDArray[np.float64]
 """What a run of one scene needs ready, as the engine lays it out."""
 _Pointer = ctypes.c_void_p

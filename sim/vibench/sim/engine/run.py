@@ -29,7 +29,7 @@ MOST_IMPACTS = 1 << 26
 SPARE_IMPACTS = 100
 """Allowed on top of the rate, for short runs."""
 DIRECTIONS = 6
-"""Of a state: the most small changes that can be carried along."""
+"""Number of directions of a state: the most small changes that can be carried along."""
 INSIDE = 1e-9
 """A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
 KNOWN_DURATION_S = 0.03
@@ -43,7 +43,7 @@ KNOWN_MOTION = (
 )
 """Where the paper's specimen is then, with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
 KNOWN_TO = 1e-6
-"""Of 100 um and 0.1 m/s."""
+"""Part of 100 um and 0.1 m/s."""
 
 
 class Watch(IntEnum):

@@ -20,7 +20,7 @@ Table = NDArray[np.float64]
 POINTS = 16
 """In phi. They find the duration to 1e-8, and the speed after to rounding."""
 TERMS = 8
-"""Of the series for all that is slow beside a collision."""
+"""Number of terms of the series for all that is slow beside a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
 """Shapes stand at this many presses, from the first to the last. A press is the acceleration by all other
 springs, over speed^2 / depth."""

@@ -100,7 +100,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Of a mean: from blocks; of multipliers: how far two cycles differ; of modes: zero."""
+    """Standard error of a mean: from blocks; of multipliers: how far two cycles differ; of modes: zero."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion

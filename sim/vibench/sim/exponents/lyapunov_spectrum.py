@@ -47,7 +47,7 @@ class LyapunovSpectrum:
     blocks: NDArray[np.int64]
     """Independent stretches of the run behind each standard error, shape (6,)."""
     verdict: ExponentVerdict
-    """Of the largest."""
+    """Verdict of the largest."""
     source: Source
     motion: FinalMotion
     since_s: float

@@ -44,7 +44,7 @@ class BlockedMean:
 
     mean: float
     standard_error: float
-    """Of the mean; zero where all values are equal, NaN for a single one."""
+    """Standard error of the mean; zero where all values are equal, NaN for a single one."""
     block_length: int
     """Values in a block: a power of two, as few as make neighbouring blocks independent."""
     blocks: int

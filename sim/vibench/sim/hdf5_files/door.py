@@ -12,12 +12,12 @@ import h5py
 MOST_OBJECTS = 20_000
 """Links to groups and datasets of one file; a recording has about forty."""
 MOST_ATTRIBUTES = 1_000
-"""Of one object; a channel of a recording has about twenty-five."""
+"""Most attributes of one object; a channel of a recording has about twenty-five."""
 DEEPEST = 32
 """Groups in groups."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
-"""Of a foreign program's chunks; ours have 200 kB."""
+"""Largest chunk bytes of a foreign program's chunks; ours have 200 kB."""
 LARGEST_RATIO = 1100
 """Deflate makes at most 1030 bytes of one (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000

@@ -26,7 +26,7 @@ FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
 """Cells that must be uncertain at a distance for it to count."""
 MOST_UNCERTAIN = 0.5
-"""Of all cells: beyond, neighbours are distinguished by their shares alone."""
+"""Largest share of all cells: beyond, neighbours are distinguished by their shares alone."""
 SPREAD = 4.0
 """The largest distance over the smallest, at least: a slope over less says little."""
 

@@ -210,13 +210,13 @@ class MapEstimate:
 
     points: int
     coarse_points: int
-    """Of the first lattice: a map has at least this many."""
+    """Number of points of the first lattice: a map has at least this many."""
     work_s: float
-    """Of all points on one core, as such points took here lately."""
+    """Work of all points on one core, as such points took here lately."""
     longest_work_s: float
     """The same if no motion repeats, so that each is followed for all drive periods of the map."""
     coarse_work_s: float
-    """Of the first lattice."""
+    """Work of the first lattice."""
     workers: int
     file_bytes: int
     followed: str

@@ -40,7 +40,7 @@ KEPT = (
     "session",
     "state",
 )
-"""Of a study."""
+"""Columns of a study."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
@@ -49,7 +49,7 @@ SECTION_COLUMNS = tuple(
     Column(f"section_{name}", "<f8", "m", f"{what} once a drive period", (), SECTION_STATES, "drive_period")
     for name, what in (("x", "displacement of m0"), ("p", "displacement of m1 against m2"))
 )
-"""Of a map along one quantity."""
+"""Section columns of a map along one quantity."""
 _OF_STUDIES = {column.name: column for column in COLUMNS}
 _MAP_COLUMNS = (
     *(_OF_STUDIES[name] for name in KEPT[:-1]),
@@ -114,9 +114,9 @@ class Quantity:
     """One number of a scene that may be fixed or vary."""
 
     field: str
-    """Of `Map`."""
+    """Field of `Map`."""
     axis: str
-    """Of the results."""
+    """Axis of the results."""
     units: str
     long_name: str
 
@@ -227,9 +227,9 @@ class Map(GridPlan):
     model: ContactWord | None = None
     """Contact law; the specimen's own when absent."""
     frequency_hz: Positive = 260.0
-    """Of the drive."""
+    """Frequency of the drive."""
     amplitude_m: Positive = 5e-6
-    """Of the base displacement."""
+    """Amplitude of the base displacement."""
     gap_m: Positive | None = None
     """Clearance at both stops; the specimen's own when absent, as the next five."""
     damping_time_s: NonNegativeFloat | Range | None = None
@@ -254,11 +254,11 @@ class Map(GridPlan):
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
     """Random states beside it at every point: what tells how many motions there are, and their shares."""
     seed: Annotated[int, Field(ge=0)] = 1
-    """Of the random states."""
+    """Seed of the random states."""
     observe: tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...] = (Observable.RESPONSE,)
     """With "lyapunov" the largest exponent too, over up to 25 s at every point: tens of times the work."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Of every point."""
+    """Accuracy of every point."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
     """Drive periods after which a motion that does not repeat is followed no longer."""
     window_periods: Annotated[int, Field(ge=10)] = 200

@@ -27,13 +27,13 @@ class MapMotion:
 
     motion: MotionKind
     period: int | None
-    """Of a periodic motion, in drive periods."""
+    """Period of a periodic motion, in drive periods."""
     has_impacts: bool
     response_i: float
     """Largest abs(x) over the drive amplitude; the median over its points."""
     response_ii: float
     share: Share
-    """Of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
+    """Share of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
     motions hold together in 19 cases of 20. Random starts are the same draws in every cell: with them each
     start counts as one trial, however many cells there are."""
 

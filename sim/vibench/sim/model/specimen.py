@@ -36,7 +36,7 @@ class Specimen:
         "stiffness_matrix": "N m-1",
         "damping_matrix": "N s m-1",
     }
-    """Of values whose name says none."""
+    """Units of values whose name says none."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 

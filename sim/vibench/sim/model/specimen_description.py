@@ -88,7 +88,7 @@ class SphereOnPlane(_Described):
     """Two bodies that touch: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
 
     radius_m: PositiveFloat
-    """Of the sphere at the point that touches."""
+    """Radius of the sphere at the point that touches."""
     sphere: Material
     plane: Material
 

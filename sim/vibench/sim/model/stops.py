@@ -11,7 +11,7 @@ from pydantic import ConfigDict
 Law_co = TypeVar("Law_co", covariant=True)
 STRICT = ConfigDict(extra="forbid")
 HERTZ_EXPONENT = 1.5
-"""Of the indentation, for a sphere on a plane."""
+"""Exponent of the indentation, for a sphere on a plane."""
 PAPER_INDENTATION_M = 1e-6
 """The paper fits its continuous models where the contact is pressed in by 1 um (its section 2)."""
 
@@ -26,7 +26,7 @@ class Stops(NamedTuple):
     loss: float = 0.0
     """[s/m]."""
     restitution: float | None = None
-    """Of stops that do not yield; None where they do, or where there are none."""
+    """Restitution of stops that do not yield; None where they do, or where there are none."""
 
     @property
     def term(self) -> tuple[float, float]:

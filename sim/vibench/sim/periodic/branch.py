@@ -139,7 +139,7 @@ class OrbitSigns:
     """What decides about events at one point of a branch."""
 
     multipliers: Complex
-    """Of the half map if mirrored, else of the period; shape (2 n,)."""
+    """Multipliers of the half map if mirrored, else of the period; shape (2 n,)."""
     contacts: int
     """Crossings of the stops in a period."""
     symmetry: Symmetry

@@ -39,7 +39,7 @@ class SceneRun:
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
-    """Of the motion that was watched, those of the window last."""
+    """Blocks of the motion that was watched, those of the window last."""
     was_settled: bool
     """The motion repeated before the window began."""
     motion: MotionKind

@@ -32,7 +32,7 @@ class LinearMotion:
 
     drive: Harmonic
     rates: Complex
-    """Of the modes, shape (n,) [1/s]."""
+    """Rates of the modes, shape (n,) [1/s]."""
     modes: Complex
     """What each mode adds to x, y, z, vx, vy, vz at time zero, shape (n, 6)."""
     steady: Complex

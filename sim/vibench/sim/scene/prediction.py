@@ -51,7 +51,7 @@ class FoundMotion:
 
     motion: MotionKind
     period: int | None
-    """Of a periodic motion, in drive periods."""
+    """Period of a periodic motion, in drive periods."""
     response_i: float | None
     """Largest abs(x) over the drive amplitude; of the first start that repeats, or the mean over its starts
     if none does; as the next three."""
@@ -63,7 +63,7 @@ class FoundMotion:
     starts: int
     """How many reached it."""
     share: Share
-    """Of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
+    """Share of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
     starts that were chaotic so far, undecided, or on one of several chaotic motions may come to any other."""
 
 
@@ -170,7 +170,7 @@ class ScenePrediction:
     """The same, per second."""
     motion: MotionKind
     period: int | None
-    """Of a periodic motion, in drive periods."""
+    """Period of a periodic motion, in drive periods."""
     duration_s: float
     """How long the specimen was followed."""
     window_s: float

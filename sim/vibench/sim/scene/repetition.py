@@ -57,7 +57,7 @@ class Growth:
     logarithms: Floats
     """Natural logarithm of the growth over each stretch, shape (stretches,)."""
     duration_s: float
-    """Of all stretches together."""
+    """Duration of all stretches together."""
 
     @property
     def total(self) -> float:

@@ -34,9 +34,9 @@ PARTED = 0.01
 """Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
 began: that is ten thousand times as far as they were."""
 TOUCHING = 0.999
-"""Of a gap: m1 that is so far out may be in contact."""
+"""Part of a gap: m1 that is so far out may be in contact."""
 LEAST_SIZE = 1e-3
-"""Of a gap: what a motion counts for at least, when starts are said to have parted."""
+"""Part of a gap: what a motion counts for at least, when starts are said to have parted."""
 LEAST_S = 1e-3
 """Following and observing a start costs this at least."""
 TOO_FEW = 4
@@ -56,11 +56,11 @@ class ReachedMotion:
     responses_m: Floats
     """Largest x, line of x, largest p, line of p, shape (4,)."""
     scatter: WindowScatter | None
-    """Of the largest x, where nothing repeats."""
+    """Scatter of the largest x, where nothing repeats."""
     wandered_until_s: float
     """When it was last seen to change from period to period."""
     growth: Growth
-    """Of a small change, as long as one was carried along: over no time, where it repeats."""
+    """Growth of a small change, as long as one was carried along: over no time, where it repeats."""
 
 
 def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:

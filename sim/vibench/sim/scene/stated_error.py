@@ -66,7 +66,7 @@ class StatedErrors:
 
 
 UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
-"""Of a run that was lost."""
+"""Errors of a run that was lost."""
 
 
 def stated_errors(

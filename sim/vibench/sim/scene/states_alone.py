@@ -29,7 +29,7 @@ from .scene import AutomaticDuration, FixedDuration
 SLICE_S = 0.5
 """Time between two looks, at least."""
 PARTS = 4
-"""Of a stretch over which growth is seen: whether it goes on growing."""
+"""Parts of a stretch over which growth is seen: whether it goes on growing."""
 REMEMBERED = 16.0
 """Forgetting times whose states are kept: from wandering to settled a motion needs ten, at standard."""
 

@@ -20,9 +20,9 @@ from ..model.specimen import Specimen
 FloatArray = NDArray[np.float64]
 
 STOP_STIFFNESS_N_PER_M = 2e5
-"""Of the rubber stops that end the stroke; assumed: 45 N press 0.2 mm into them."""
+"""Stiffness of the rubber stops that end the stroke; assumed: 45 N press 0.2 mm into them."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Of the same; assumed: the table comes back with about half its energy."""
+"""Damping of the same; assumed: the table comes back with about half its energy."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Shaker:
 
 
 MOTION_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
-"""Of shaker and specimen at the end of a step, SI units; x, y and z are absolute."""
+"""Columns of shaker and specimen at the end of a step, SI units; x, y and z are absolute."""
 _SHAKER_SIZE = 3
 _CONTACT_TOLERANCE = Accuracy.STANDARD.tolerance
 

@@ -23,7 +23,7 @@ Gain = Callable[[FloatArray], ComplexArray]
 FINEST_STEP_HZ = 5e4
 """The steps are at least this many a second: 600 Hz then errs by 5e-4 of the specimen's push on the table."""
 _PASS_PART = 0.45
-"""Of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
+"""Part of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
 _MARGIN = 2048
 """Samples on either side of a piece: the filters' memory beyond is below 1e-8."""
 _PIECE = 1 << 17
@@ -46,9 +46,9 @@ class DrivenTable:
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
-    """Of the channel that shows the base's acceleration."""
+    """Sensor of the channel that shows the base's acceleration."""
     m0_sensor: Gain = identity
-    """Of the channel that shows m0's velocity; a delay is a phase that falls."""
+    """Sensor of the channel that shows m0's velocity; a delay is a phase that falls."""
     base_low_cut_hz: float = 0.0
     """-3 dB of the coupling of the base's channel, first order; 0 where direct voltage passes."""
 

@@ -92,7 +92,7 @@ class Column:
     """UDUNITS text; 1 for ratios and counts."""
     long_name: str
     meanings: tuple[str, ...] = ()
-    """Of the values 0, 1, 2, ... of a flag."""
+    """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
     """More than one: with another axis at the end."""
     along: str = COORDINATE

@@ -225,7 +225,7 @@ class Study(GridPlan):
     observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
     """What is looked at; sections and spectra, whose lengths differ, are asked of one scene at a time."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Of every point."""
+    """Accuracy of every point."""
     duration_s: PositiveFloat | Literal["auto"] = 30.0
     """Length of each run; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
@@ -322,7 +322,7 @@ class Study(GridPlan):
 
     @property
     def duration(self) -> FixedDuration | AutomaticDuration:
-        """Of every point."""
+        """Duration of every point."""
         match "auto" if self.target is not None else self.duration_s:
             case "auto":
                 return AutomaticDuration(window_s=self.window_s)
