@@ -46,7 +46,7 @@ class CatalogueEntry:
     path: str
     """Below the folder, with ``/``."""
     name: str
-    """Of the measurement."""
+    """Name of the measurement."""
     state: str
     """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
@@ -55,7 +55,7 @@ class CatalogueEntry:
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
-    """Of the excitation."""
+    """Kind of the excitation."""
     amplitude_vpp: float | None = None
     frequency_low_hz: float | None = None
     frequency_high_hz: float | None = None

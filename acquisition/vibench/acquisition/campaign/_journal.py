@@ -135,11 +135,11 @@ class CampaignProgress:
 
     name: str
     number: int
-    """Of this recording, from 1."""
+    """Number of this recording, from 1."""
     count: int
     """Recordings in all."""
     path: Path
-    """Of the recording that is being made."""
+    """Path of the recording that is being made."""
     run: Progress
 
 
@@ -304,15 +304,15 @@ class JournalPoint:
     reason_code: ReasonCode
     reason: str
     file: str
-    """Of the last attempt; a name in the journal's folder, empty before the first."""
+    """File of the last attempt; a name in the journal's folder, empty before the first."""
     attempts: int
     is_followed_up: bool
     """Whether what its result asks for is in the journal."""
     begun_utc: str
     ended_utc: str
-    """Of the last attempt."""
+    """End of the last attempt."""
     seal: str
-    """Of its recording; empty before there is one, and of recordings that had none."""
+    """Seal of its recording; empty before there is one, and of recordings that had none."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:

@@ -407,9 +407,9 @@ class CampaignEstimate:
     lead_in_s: float
     """Of that, on the way to points along their chains."""
     largest_bytes: int
-    """Of one recording, while it is made."""
+    """Largest size [bytes] of one recording, while it is made."""
     total_bytes: int
-    """Of all recordings, finished."""
+    """Total size [bytes] of all recordings, finished."""
     free_bytes: int
     """On the disk of the folder, now."""
     searching: int = 0

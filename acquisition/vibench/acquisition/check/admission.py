@@ -102,9 +102,9 @@ def _write(result: CheckResult, *, passed: bool) -> Path:
 
 
 DRIFT_DB = Bounds(0.5, 3.0)
-"""Of a gain, from one check to the next on an unchanged configuration."""
+"""Drift of a gain, from one check to the next on an unchanged configuration."""
 CLOCK_PPM = Bounds(20.0, inf)
-"""Of the ratio of two clocks: oscillators age by some ppm a year."""
+"""Drift [ppm] of the ratio of two clocks: oscillators age by some ppm a year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying "

@@ -37,7 +37,7 @@ _IN_MOMENTS = 0.2
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Mean of a silent channel, of its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Of one verified setting: it bounds how fast the generator can be stopped."""
+"""Latency of one verified setting: it bounds how fast the generator can be stopped."""
 ROOM_H = Bounds(-10.0, -1.0)
 """Recording time that the disk should hold, negative since more is better [h]."""
 

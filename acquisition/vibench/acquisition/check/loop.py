@@ -25,7 +25,7 @@ class SineFit:
     uncertainty: float
     """Standard uncertainty of the amplitude, from what the sine leaves."""
     phase_rad: float
-    """Of a cosine, at the first sample."""
+    """Phase of a cosine, at the first sample."""
 
 
 @dataclass(frozen=True)
@@ -79,18 +79,18 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 
 
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
-"""Of the measured drive from the setting."""
+"""Drive deviation of the measured drive from the setting."""
 GAIN_DB = Bounds(1.0, 3.0)
-"""Of the amplifier's gain from its knob's."""
+"""Deviation of the amplifier's gain from its knob's."""
 BASE_DB = Bounds(1.5, 3.0)
-"""Of the base's acceleration from the rig's model."""
+"""Deviation of the base's acceleration from the rig's model."""
 CLOCK_PPM = Bounds(100.0, 500.0)
 """Two oscillators of 50 ppm each."""
 DETECTED = 10.0
 """The sine counts as detected when it is this many times its uncertainty."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
-"""Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
+"""Deviation of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
 """The same of m0: a specimen is known less well than a shaker, so that nothing FAILs."""
 LEFT_OVER = Bounds(0.02, 0.05)

@@ -14,7 +14,7 @@ from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
 
 LEVEL = 0.02
-"""Of the bench's amplitude limit: what is played."""
+"""Part of the bench's amplitude limit: what is played."""
 SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 

@@ -13,7 +13,7 @@ KIND = PlugInKind.GENERATOR
 TONE_HZ = 160.0
 SAME = 0.03
 QUIET = 0.05
-"""Of the level that was played: what may be heard when nothing plays."""
+"""Part of the level that was played: what may be heard when nothing plays."""
 
 
 def level_vpp(bench: Bench) -> float:

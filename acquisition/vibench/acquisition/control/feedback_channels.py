@@ -29,7 +29,7 @@ class FeedbackChannels:
     response_units_per_volt: float
     """[m/s per V]"""
     response_delay_s: float
-    """Of the vibrometer; taken out of every phase [s]."""
+    """Delay of the vibrometer; taken out of every phase [s]."""
     base_cut_hz: float
     """-3 dB of the channel's coupling, taken out of every phase too; 0 where direct voltage passes [Hz]."""
     response_cut_hz: float

@@ -20,7 +20,7 @@ from .sine_loop import SineLoop
 _NEWEST = 0.5
 """Weight of the newest gains among those before: impacts make them scatter."""
 _MOST_CHANGE = 4.0
-"""Of the squared gain of a line from one realisation to the next."""
+"""Largest change of the squared gain of a line from one realisation to the next."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Heard:
     response: Samples
     """[(m/s)2/Hz]"""
     kurtosis: float
-    """Of the base's acceleration: 3 of Gaussian noise."""
+    """Kurtosis of the base's acceleration: 3 of Gaussian noise."""
 
 
 class Equaliser:

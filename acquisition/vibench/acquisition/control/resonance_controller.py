@@ -255,7 +255,7 @@ class Tracked:
     lock: LockResult
     tries: int
     periods: int
-    """Of the drive, until then."""
+    """Periods of the drive, until then."""
 
 
 def _flanks(

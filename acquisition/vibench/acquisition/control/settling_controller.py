@@ -34,7 +34,7 @@ class SettledPoint:
     frequency_hz: float
     response: float
     period: int = 1
-    """Of the motion, in drive periods; 0 when it has none."""
+    """Period of the motion, in drive periods; 0 when it has none."""
 
 
 @dataclass(frozen=True)

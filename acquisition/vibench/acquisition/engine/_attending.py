@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """States of a Linux process that does nothing until somebody else makes it, or never again."""
 LEAST_OWN = 0.25
-"""Of the time without a sign of life, so much counts even where the system gave it all to others."""
+"""Part of the time without a sign of life, so much counts even where the system gave it all to others."""
 
 
 class _Program:

@@ -115,7 +115,7 @@ LATE_FACTOR = 4.0
 TAKEN_OVER_S = 2.0
 """An engine without parent is somebody's who has asked so lately: a window asks 25 times a second [s]."""
 FORGETTING = 0.995
-"""Of the worst lateness, from one look to the next: half of it is forgotten in seven seconds."""
+"""Part of the worst lateness, from one look to the next: half of it is forgotten in seven seconds."""
 
 
 class RequestHandler:

@@ -120,7 +120,7 @@ class RunStatus(FrozenModel):
 
     name: str
     number: int
-    """Of the campaign's recordings, from 1."""
+    """Number of the campaign's recordings, from 1."""
     count: int
     file: str
     run_state: RunState
@@ -182,7 +182,7 @@ class TwinStatus(FrozenModel):
     """What the live twin told last: where m1 is between its stops, its numbers, and how late it is."""
 
     pid: int = 0
-    """Of its process, once it has told anything."""
+    """Number of its process, once it has told anything."""
     state: str = "starting"
     """``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
     sentence: str = ""
@@ -208,7 +208,7 @@ class TwinStatus(FrozenModel):
     busy_share: float = 0.0
     """Processor time of the twin's process over the time since the run began."""
     missed_s: float = 0.0
-    """Of motion that it was too slow for [s]; the recording has it."""
+    """Duration of motion that it was too slow for [s]; the recording has it."""
     behind_s: float = 0.0
     """By how much its newest sample was behind the newest of the run, when it told [s]."""
 

@@ -140,7 +140,7 @@ class RelativeSetting:
     """A sine at a setting: the base does what the shaker makes of it."""
 
     share: float
-    """Of the plan's ``amplitude_vpp``."""
+    """Share of the plan's ``amplitude_vpp``."""
     basis: ClassVar[str] = "the rig's linear model"
 
 

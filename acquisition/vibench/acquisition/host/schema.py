@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from ..errors import ConfigurationError
 
 VERSION = 1
-"""Of all schemas; the next one comes with a change that an old file does not survive."""
+"""Version of all schemas; the next one comes with a change that an old file does not survive."""
 FORMAT = "format_version"
 """Key by which a file may say which version it was written for; the present one if absent."""
 DRAFT = "http://json-schema.org/draft-04/schema#"

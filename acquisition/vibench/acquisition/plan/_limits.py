@@ -91,7 +91,7 @@ class Consequence(StrEnum):
 
 
 _DIGITS = 6
-"""Of a value beside its limit: 8200 points and 8192 must not look alike."""
+"""Digits of a value beside its limit: 8200 points and 8192 must not look alike."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ._loop_time import loop_time_s
 from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
-"""Of the signal that is shown: a long sweep is sampled less often than it will be played."""
+"""Most samples of the signal that is shown: a long sweep is sampled less often than it will be played."""
 SPECTRUM_POINTS = 4000
 _LOWEST_RATE = 2.1
 """Samples per period of the highest frequency, at least."""
@@ -41,7 +41,7 @@ class MeasurementPreview:
     duration_s: float
     """From the first ramp to the last [s]."""
     size_bytes: int
-    """Of the recording while it is made."""
+    """Size [bytes] of the recording while it is made."""
     least_growth_time_s: float | None
     """What grows by e in this time or longer, feedback on this rig can hold; None without feedback [s]."""
 

@@ -37,11 +37,11 @@ Name = Annotated[str, Field(pattern=_NAME), BeforeValidator(_is_of_a_file)]
 """Becomes part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
 
 LONGEST_S = 30 * 86400.0
-"""Of one recording: a month [s]."""
+"""Longest duration of one recording: a month [s]."""
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 FEWEST_STAIRS = 4
-"""Of a ramp: fewer would be steps."""
+"""Fewest steps of a ramp: fewer would be steps."""
 
 
 class OnOverload(StrEnum):
@@ -66,20 +66,20 @@ class InRunLimits(FrozenModel):
     """When the running measurement must end itself: fractions of the rig's own limits."""
 
     base_acceleration: Fraction = 1.0
-    """Of the shaker's acceleration limit, measured at the base."""
+    """Fraction of the shaker's acceleration limit, measured at the base."""
     base_velocity: Fraction = 1.0
-    """Of the shaker's velocity limit, integrated from the acceleration at the base."""
+    """Fraction of the shaker's velocity limit, integrated from the acceleration at the base."""
     stroke: Fraction = 1.0
-    """Of the shaker's stroke limit, integrated twice."""
+    """Fraction of the shaker's stroke limit, integrated twice."""
     force: Fraction = 1.0
     """Of the shaker's force limit: the coil's, from its current, and the one that moves the table."""
     amplifier_voltage: Fraction = 1.0
-    """Of the amplifier's clipping voltage, measured at its output."""
+    """Fraction of the amplifier's clipping voltage, measured at its output."""
     current: Fraction = 1.0
     """Of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier voltage,
     less what the moving coil induces, over the coil's resistance."""
     specimen_amplitude: Fraction = 1.0
-    """Of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
+    """Fraction of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
     on_overload: OnOverload = OnOverload.FLAG
     on_changed_specimen: OnChange = OnChange.NOTE
 
@@ -137,7 +137,7 @@ class Point:
     """One recording of a campaign."""
 
     name: str
-    """Of its recording, without ``.h5``; different from every other point's."""
+    """Name of its recording, without ``.h5``; different from every other point's."""
     measurement: Measurement
     chain: str = ""
     """Points of one chain follow each other on one branch; empty for a point that stands alone."""

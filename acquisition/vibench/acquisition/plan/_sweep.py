@@ -83,7 +83,7 @@ def values_of(given: Values) -> tuple[float, ...]:
 
 
 MOST_POINTS = 10_000
-"""Of one sweep; more is a mistake rather than a plan."""
+"""Most points of one sweep; more is a mistake rather than a plan."""
 LONGEST_NAME = 64
 
 

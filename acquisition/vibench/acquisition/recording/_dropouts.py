@@ -37,7 +37,7 @@ _FLANK_S = 1e-3
 _LEAST_OF_FLANK = 0.25
 """Part of it that another drop-out close by must leave."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
-"""Of motion behind a sample that tells whether it was measured."""
+"""Length of motion behind a sample that tells whether it was measured."""
 _OUTSTANDING = 8.0
 """Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
 _JUMP = 4.0

@@ -188,7 +188,7 @@ class ResonanceNote(AbstractNote):
     """Its number, in the order played, from 0."""
     asked_m_per_s2: float
     frequency_hz: SixFigures | None
-    """Of the phase resonance; None where it was not found."""
+    """Frequency of the phase resonance; None where it was not found."""
     frequency_u_hz: SixFigures | None
     at_hz: SixFigures
     """Frequency of the recorded segment."""
@@ -207,7 +207,7 @@ class ResonanceNote(AbstractNote):
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
-    """Of m0, whose phase counts: above 1 the resonance is a superharmonic one."""
+    """Harmonic of m0, whose phase counts: above 1 the resonance is a superharmonic one."""
     subharmonic: int = 1
     """Drives in a period of m0: above 1 the resonance is a subharmonic one."""
     harmonic_m: SixFigures | None = None
@@ -231,7 +231,7 @@ class NoiseNote(AbstractNote):
     notched: SixFigures
     """Share of the lines that are lowered for the response's sake."""
     kurtosis: SixFigures
-    """Of the base's acceleration; 3 of Gaussian noise."""
+    """Kurtosis of the base's acceleration; 3 of Gaussian noise."""
 
 
 class HeldResponseNote(AbstractNote):
@@ -269,7 +269,7 @@ class BranchPointNote(AbstractNote):
     m0_m: SixFigures
     m0_u_m: SixFigures = 0.0
     phase_deg: SixFigures
-    """Of m0 over the base, as displacements."""
+    """Phase of m0 over the base, as displacements."""
     residue: SixFigures
     """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
     residue_acceleration: SixFigures
@@ -293,7 +293,7 @@ class BranchStabilityNote(AbstractNote):
 
     kind: Literal["branch_stability"] = "branch_stability"
     point: int
-    """Of the note that has the motion."""
+    """Point of the note that has the motion."""
     stability: Stability
     multiplier: SixFigures | None
     """Largest over a period under a base that moves as prescribed, magnitude; None where nothing is known."""

@@ -98,7 +98,7 @@ def _git(*arguments: str) -> str:
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
 COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
-"""Of NI 9234, 4431 and their kind; first order."""
+"""-3 dB frequency of NI 9234, 4431 and their kind; first order."""
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
@@ -125,7 +125,7 @@ class ChannelHeader:
         "volts_at_zero_count": "V",
         "sensitivity": "{0.sensitivity_unit}",
     }
-    """Of values whose name says none; ``{0.unit}`` is the channel's own."""
+    """Units of values whose name says none; ``{0.unit}`` is the channel's own."""
 
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""

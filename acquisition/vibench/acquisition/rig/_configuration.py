@@ -101,7 +101,7 @@ WATCHED_HZ = 500.0
 _MEASURED = 0.55
 """Of `level_error`: against 409.6 thousand steps a second, at 60 Hz to 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
-"""Of a plan that is played on a coarser grid than the usual one."""
+"""Largest level error of a plan that is played on a coarser grid than the usual one."""
 STEPS_PER_SAMPLE = 2
 """The least on a coarser grid than the usual one: room for the transition band of the converter's filter."""
 
@@ -364,7 +364,7 @@ class VibrometerConfig(FrozenModel):
     """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
     calibrated: date
     uncertainty: StatedUncertainty | None = None
-    """Of the calibration; absent: not stated, and every result says so."""
+    """Uncertainty of the calibration; absent: not stated, and every result says so."""
     alignment_deg: Sourced | None = None
     """Largest angle between beam and motion [degree]."""
     noise_per_rthz: Sourced | None = None
@@ -390,7 +390,7 @@ class AccelerometerConfig(FrozenModel):
     iepe: Literal["yes", "no"]
     calibrated: date
     uncertainty: StatedUncertainty | None = None
-    """Of the sensitivity; absent: not stated."""
+    """Uncertainty of the sensitivity; absent: not stated."""
     alignment_deg: Sourced | None = None
     """Largest angle between the sensitive axis and the motion [degree]."""
     noise_per_rthz: Sourced | None = None
@@ -425,7 +425,7 @@ class ChannelConfig(FrozenModel):
     calibrated: date
     """Date of the converter's last calibration."""
     uncertainty: StatedUncertainty | None = None
-    """Of volts, the divider in front included; absent: not stated."""
+    """Uncertainty of volts, the divider in front included; absent: not stated."""
 
 
 class DaqConfig(FrozenModel):

@@ -28,7 +28,7 @@ class Progress:
     amplitude_vpp: float
     """Setting of the generator, peak to peak [V]; 0 while its output is off."""
     frequency_hz: float | None = None
-    """Of the sine that is played; None for anything else."""
+    """Frequency of the sine that is played; None for anything else."""
     until: UntilNote | None = None
     """How well results are known, of a recording that lasts until they are."""
 

@@ -26,7 +26,7 @@ LITTLE = 0.98
 """A level is not lowered before the frequency changes where it is lowered by less than this."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
-"""Of a ramp on which no sample is counted."""
+"""Time of a ramp on which no sample is counted."""
 _ROUNDING_S = 1e-9
 
 

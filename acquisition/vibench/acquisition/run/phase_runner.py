@@ -141,7 +141,7 @@ LEARNT = 0.05
 """Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
 ones it is more, so that the mean is learnt."""
 LONGEST_LEAD = 0.25
-"""Of a step."""
+"""Longest lead of a step."""
 TOLD_CYCLES = 0.1
 """Behind its plan by more than this at its end, a glide is noted."""
 MOST_MADE_UP = 3.0
