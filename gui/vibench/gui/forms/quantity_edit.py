@@ -97,7 +97,7 @@ _LONGEST_SHOWN = 40
 _SMALL = 1e-2
 """Larger ones are written without a prefix."""
 _DIGITS = 6
-"""Of a value that is no short number in the unit that was chosen; the value itself keeps all."""
+"""Digits of a value that is no short number in the unit that was chosen; the value itself keeps all."""
 MOST_WHOLE = 1 << 53
 """Larger whole numbers cannot be told from their neighbours."""
 MOST_TIMES = 1000.0

@@ -254,7 +254,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _ABOVE = 100
 """Over the curves: an area that they fill is read by it."""
 _OPACITY = 0.25
-"""Of the lines that are labelled; each level after them has a part of it."""
+"""Opacity of the lines that are labelled; each level after them has a part of it."""
 _APART = 20.0
 """Pixels from line to line; lines that are closer are fainter."""
 

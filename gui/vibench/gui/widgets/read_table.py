@@ -48,7 +48,7 @@ def _offered(table: QTableView, text: str, said: Callable[[], str]) -> QAction:
 
 
 _WIDEST_LETTERS = 36
-"""Of a column that takes the room it needs; longer text is wrapped."""
+"""Widest letters of a column that takes the room it needs; longer text is wrapped."""
 _LEAST_LETTERS = 14
 """Of the column that takes what is left; in a narrower table it is scrolled to."""
 _ROW_ROOM = 8

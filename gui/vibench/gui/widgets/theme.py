@@ -52,7 +52,7 @@ class Theme:
     traces: tuple[Colour, ...]
     """Okabe and Ito's colours that show on this ground, in the order of use."""
     predicted: Colour
-    """Of everything simulated, which is dashed as well."""
+    """Colour of everything simulated, which is dashed as well."""
 
 
 LIGHT = Theme(

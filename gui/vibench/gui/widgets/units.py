@@ -164,7 +164,7 @@ def _with_breaks(word: re.Match[str]) -> str:
 
 
 UNITS = DisplayUnits()
-"""Of the whole program, as its font and its palette are: a person reads one unit on all pages."""
+"""Units of the whole program, as its font and its palette are: a person reads one unit on all pages."""
 
 
 class SentenceLabel(QLabel):

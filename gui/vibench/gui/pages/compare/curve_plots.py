@@ -222,7 +222,7 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Of the transmission or Response I, and of Response II."""
+"""Dashes of the transmission or Response I, and of Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
 _SWATCH = (28, 12)

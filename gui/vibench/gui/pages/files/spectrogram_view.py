@@ -158,7 +158,7 @@ _WAIT_MS = 250
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Of the spectrogram's lines; None lets the stretch in sight choose."""
+"""Widths of the spectrogram's lines; None lets the stretch in sight choose."""
 _BAR_EM = 4
 """Room for the numbers and the label of the scale of colours."""
 _SHOWN_DB = 80.0

@@ -144,7 +144,7 @@ DISPLACEMENT = PlotAxis("m0 displacement", "m", short="x")
 LINE = PlotAxis("|x|", "m", scale=Scale.LOGARITHMIC)
 SHOWN_PERIODS = 12
 HIGHEST_MULTIPLE = 6.0
-"""Of the drive frequency: the end of the spectrum."""
+"""Highest multiple of the drive frequency: the end of the spectrum."""
 
 
 class MotionView(QWidget):
@@ -184,9 +184,9 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Of 1000, of the height; the rest is for the motion at a point."""
+"""Share of 1000, of the height; the rest is for the motion at a point."""
 DIGITS = 5
-"""Of numbers that a zoom puts into the form."""
+"""Digits of numbers that a zoom puts into the form."""
 
 
 class MapsPage(Page):

@@ -354,7 +354,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Of a forecast; the last one is nearly gone where its error is a quarter of the gap, and it ends."""
+"""Shades of a forecast; the last one is nearly gone where its error is a quarter of the gap, and it ends."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "p of m1 between its stops, while a test runs and the live twin is on."

@@ -157,7 +157,7 @@ _SMALLEST = 1e-8
 _MOST_TRACES = 32
 """Cells whose motion is drawn, evenly chosen in longer chains."""
 _HEIGHT = 0.45
-"""Of the largest motion, in cells."""
+"""Height of the largest motion, in cells."""
 
 
 class ChainPicture:

@@ -27,7 +27,7 @@ from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
 from .pictures import AnswerPlots, BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
-"""Of the table of motions, headings among them."""
+"""Lines of the table of motions, headings among them."""
 
 
 class SimulatePage(Page):

@@ -196,7 +196,7 @@ _FLOOR = 1e-5
 _LEAST_HZ = 1.0
 """Nothing below is of interest: no shaker moves there."""
 _LEAST_LINES = 9
-"""Of text: less says nothing."""
+"""Fewest lines of text: less says nothing."""
 
 
 class PreviewPlots(QWidget):
