@@ -180,7 +180,7 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 
 
 _LEAST_RISE_DB = 3.0
-"""A peak stands above the valley beside it by at least so much ..."""
+"""Least height of a peak above the valley beside it ..."""
 _LEAST_RISE_SD = 8.0
 """... and by this many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))

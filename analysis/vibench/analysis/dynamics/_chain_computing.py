@@ -139,7 +139,7 @@ class ChainAnswer(Labelled):
 
     @cached_property
     def attenuation_db(self) -> Reals:
-        """By how much a wave of the endless damped chain decays from unit to unit, at `linear_hz` [dB]."""
+        """Decay of a wave of the endless damped chain from unit to unit, at `linear_hz` [dB]."""
         return np.asarray(-DECIBELS * np.log(np.abs(bloch_factor(self.request.unit, self.linear_hz))))
 
     @property

@@ -13,7 +13,7 @@ BLOCK_SAMPLES = 51_200
 """One chunk of the file: 0.4 MB a channel in memory."""
 
 TransferObserver = Callable[[int], None]
-"""Told how many values were written since it was last called."""
+"""Callback with the number of values written since its last call."""
 
 
 def ignore_progress(_values: int) -> None:

@@ -8,7 +8,7 @@ from .style import MEASURED, DrawnFigure, new_figure, prefixed, styled
 _ROW_IN = 0.85
 _FRAME_IN = 0.6
 _UNITS = {"m s-1": "m/s", "m s-2": "m/s²"}
-"""As a reader writes what a file says in UDUNITS text."""
+"""Readable forms of units that files give as UDUNITS text."""
 
 
 def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:

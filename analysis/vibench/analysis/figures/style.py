@@ -41,7 +41,7 @@ WIDTH_IN = 7.2
 """Fits the text width of A4 and a report's column."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""The axis reaches so far past its ends: measured lines lie a few ppm off round numbers."""
+"""Margin of the axis beyond its ends: measured lines lie a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
 """Ratios of the ends of a frequency axis, between which marks at 3 and 7 help and fit."""

@@ -31,13 +31,13 @@ from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m,
 _WANDER = 0.02
 """Of the prior standard deviation, in every block: a parameter that is sure of itself too early moves on."""
 REBUILT_S = 0.05
-"""After so much motion the tables are those of the parameters found so far."""
+"""After this length of motion the tables are those of the parameters found so far."""
 _LOST = (
     f"each track was lost within {REBUILT_S:g} s while the numbers were looked for, so that what is taken as "
     "described (m0, m2, k1, the kind of contact) may be otherwise"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
-"""Until so much motion was tracked the variance of the velocity is taken as this many times larger."""
+"""Length of tracked motion, and the factor of the velocity's variance until then."""
 _LEAST_OF_START = 0.05
 """No parameter falls below this part of what it began with: none of them can be negative, but the loss,
 whose error goes both ways around none."""

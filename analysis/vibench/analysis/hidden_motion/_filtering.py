@@ -121,7 +121,7 @@ class Filtered:
 
     @property
     def arrays(self) -> dict[str, Reals]:
-        """By name, in the order of the fields; `TrackRecord` of native/structures.hpp has the same names."""
+        """Arrays by name, in the order of the fields; `TrackRecord` in native/structures.hpp has the same."""
         return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
 
     def samples(self, begin: int, end: int | None = None) -> "Filtered":

@@ -65,7 +65,7 @@ class Level(FrozenModel):
 
     mean: float
     sd: float
-    """From block to block."""
+    """Standard deviation from block to block."""
 
     @property
     def limit(self) -> float:
@@ -89,7 +89,7 @@ class Baseline(FrozenModel):
     numbers: Mapping[Hidden, KnownNumber]
     """Those that its collisions told."""
     levels: Mapping[str, Level]
-    """By what was played."""
+    """Levels by excitation."""
 
 
 def baseline_path(rig: Rig, specimen: Specimen) -> Path:
@@ -167,7 +167,7 @@ class LiveMotion(Labelled):
     level: float
     """Level of the last block; 1 when nothing but noise is left."""
     limit: float
-    """Beyond which a block lies out; NaN while the usual level is being learnt."""
+    """Limit beyond which a block is out; NaN while the usual level is being learnt."""
 
 
 HELD_S = 3.0

@@ -27,7 +27,7 @@ class Sensed(Protocol):
 
     @property
     def delay_s(self) -> float:
-        """By which it lags [s]."""
+        """Lag of the sensor [s]."""
 
     @property
     def coupling(self) -> str:

@@ -18,7 +18,7 @@ Behind them the filter has deviations of the parameters that are estimated. Equa
 """
 X, Y, Z, VX, VY, VZ, W, B = range(STATES)
 _SMALL_STEPS_A_CONTACT = 36
-"""Kick and flow alternate so often during the shortest collision; a force at 1 um then errs by under 1e-3."""
+"""Steps during the shortest collision; a force at 1 um then errs by under 1e-3."""
 _FASTEST_APPROACH_M_PER_S = 0.5
 _FEWEST_SMALL_STEPS = 4
 HERTZ_EXPONENT = 1.5

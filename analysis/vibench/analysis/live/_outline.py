@@ -254,7 +254,7 @@ class RecordingOverview:
 
     recording: Recording
     levels: dict[str, tuple[OverviewLevel, ...]]
-    """By role; fine to coarse."""
+    """Levels by role, fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
         """Draw samples ``start`` to ``stop`` (exclusive) of some channels, about this many columns wide.

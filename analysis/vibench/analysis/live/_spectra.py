@@ -198,7 +198,7 @@ _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
 """Hann width of a line under a Hann window, at half power, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
-"""A segment is so much shorter than what is in sight, within the limits above."""
+"""Length of the visible range over that of a segment, within the limits above."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0

@@ -33,7 +33,7 @@ class MeasurementPrediction(Labelled):
     approach: Approach
     """Where each simulated point begins."""
     specimen_name: str
-    """As the rig calls it."""
+    """Name of the specimen in the rig's configuration."""
 
     @property
     def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:

@@ -26,7 +26,7 @@ PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
 """Without contact; same place."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
-"""With m1 stuck to m2; same place."""
+"""Resonances with m1 stuck to m2; from the same section of the paper."""
 PREDICTION_S = 8.0
 WINDOW_S = 5.0
 """The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that

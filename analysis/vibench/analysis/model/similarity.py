@@ -10,7 +10,7 @@ from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
 
 SIMILARITY_THRESHOLD = 0.1
-"""Points that differ by at most so much are similar (Gong et al. 2025, section 4)."""
+"""Largest difference of similar points (Gong et al. 2025, section 4)."""
 DRAWS = 2000
 """Resamples of a bootstrap: its limits then scatter by about a fortieth of the interval's width."""
 CONFIDENCE = 0.95

@@ -102,11 +102,11 @@ class SimulatedChannels:
     impacts_at_s: tuple[Reals, Reals]
     """Times since the first sample [s], and contacts started up to them."""
     response_delay_s: float
-    """By how much the response channel lags the base channel."""
+    """Lag of the response channel behind the base channel."""
     base_acceleration: Reals
     """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
     drive_v: Reals
-    """As it was recorded, shape (samples,) [V]."""
+    """Recorded drive voltage, shape (samples,) [V]."""
     sensors: Callable[[Reals], Complexes]
     """Gain of the response's sensor over that of the base's, without their delays."""
 

@@ -35,7 +35,7 @@ class SpecimenFit(Labelled):
     """A fitted specimen, or why the model fits none."""
 
     specimen: Specimen
-    """As described where the model does not fit."""
+    """Fitted specimen; the described one where the model does not fit."""
     values: tuple[FittedValue, ...]
     """Empty where it does not."""
     covariance: Reals

@@ -105,7 +105,7 @@ class UpdatedSpecimen(Labelled):
     not_told: tuple[str, ...]
     """A sentence for everything that stays as the bench says, and why."""
     nominal: SpecimenTable
-    """As the bench describes it."""
+    """Specimen as the bench describes it."""
 
     @property
     def fitted(self) -> bool:

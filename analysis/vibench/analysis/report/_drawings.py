@@ -305,7 +305,7 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     },
     PlugInKind.DRAWING,
 )
-"""By the word in a plan."""
+"""Drawings by the kind of a plan."""
 
 
 def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:

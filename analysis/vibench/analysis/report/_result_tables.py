@@ -20,7 +20,7 @@ _NEAR = 0.08
 """Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
 ABSENT = "–"
 _SMALLEST_BIAS = 1e-3
-"""Below this a bias says only that noise plays no part."""
+"""Smallest bias that is shown; less means that noise plays no part."""
 _PAPER_COLLISION = "about 240 to 290 Hz"
 """Gong et al. 2025, section 5: the grey area of the sweep."""
 

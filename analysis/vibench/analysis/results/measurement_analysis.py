@@ -1,4 +1,4 @@
-"""From one recording to its result, by what was played."""
+"""Analysis of one recording by its kind of excitation."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""From displacement to velocity to acceleration and back, in the frequency domain."""
+"""Conversion between displacement, velocity and acceleration, in the frequency domain."""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -34,7 +34,7 @@ MEASURED = {
     Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
-"""Response I in chaos scatters by so much from start to start, at every level."""
+"""Scatter of Response I in chaos from start to start, at every level."""
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:

@@ -237,7 +237,7 @@ class DwellResponse(Labelled):
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
     noise_bias_i: float
-    """By how much noise is expected to have lifted it; NaN where the noise is not determined."""
+    """Expected bias by noise; NaN where the noise is not determined."""
     noise_error_i: float
     """Root mean square error that noise makes of it, the lift included; NaN likewise."""
     noise_source: str

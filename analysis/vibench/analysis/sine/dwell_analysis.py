@@ -1,4 +1,4 @@
-"""From a recorded dwell to its responses over the last seconds."""
+"""Analysis of a recorded dwell: its responses over the last seconds."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -153,7 +153,7 @@ class IrregularMotion:
 
     start_s: float
     stop_s: float
-    """From the dwell's first sample."""
+    """End, from the dwell's first sample."""
     ended: bool
     """Whether a motion that repeats followed it."""
 
@@ -199,7 +199,7 @@ def _points(section: Section, response: DwellResponse, sample_rate_hz: float) ->
 _SEGMENT_S = 0.5
 """Segments of the density: 3 Hz wide, some twenty averages in 5 s."""
 _REACH = 0.1
-"""The band reaches so far to either side, as a fraction of its middle."""
+"""Half width of the band, as a fraction of its middle."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class SteppedResponse(Labelled):
     )
 
     frequency_hz: Reals
-    """As measured on the drive."""
+    """Frequency as measured on the drive."""
     direction: tuple[str, ...]
     """``"up"`` or ``"down"``."""
     amplitude_vpp: Reals

@@ -205,7 +205,7 @@ class SweepResponse(SweptMotion):
     """Drive frequency in the middle of each of these, shape (longer intervals,)."""
     noise_bias_i: Reals
     noise_error_i: Reals
-    """By how much noise is expected to have lifted Response I."""
+    """Expected bias of Response I by noise."""
 
 
 Transmission = Callable[[Reals], Complexes]

@@ -1,4 +1,4 @@
-"""From a recorded sweep to its responses and a picture of its velocity."""
+"""Analysis of a recorded sweep: its responses, and a spectrogram of its velocity."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

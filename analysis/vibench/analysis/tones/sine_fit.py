@@ -31,7 +31,7 @@ class Peak:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """From the noise around it; zero neighbourhood gives zero."""
+    """Standard deviation from the noise around the line; zero without noise."""
     amplitude: float
     """Peak amplitude, corrected for lying between lines [unit of the spectrum]."""
     floor: float
@@ -178,7 +178,7 @@ class DriveLevel:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """By the converter's clock, measured on the drive channel."""
+    """Standard deviation by the converter's clock, measured on the drive channel."""
     phase_rad: float
     """Phase of the drive voltage, as a cosine, at the first sample."""
     amplitude_m: float

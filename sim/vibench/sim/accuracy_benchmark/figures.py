@@ -129,7 +129,7 @@ class Motion:
 
     regime: Regime
     model: str
-    """As `vibench.sim.model` spells it."""
+    """Name of the contact law in `vibench.sim.model`."""
     frequency_hz: float
     amplitude_m: float
 

@@ -74,7 +74,7 @@ class RunRecord:
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
-        """As the engine takes it."""
+        """Structure that the engine takes."""
         record["start"], record["sample_rate"] = start_s, sample_rate_hz
         record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
         record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
@@ -255,7 +255,7 @@ class GrowthReadings:
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
         self.structure = readings = native_engine().new("Readings")
-        """As the engine takes it."""
+        """Structure that the engine takes."""
         readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
         readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
         readings["motions"], readings["room"] = self._motions.ctypes.data, room

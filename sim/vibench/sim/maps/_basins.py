@@ -108,7 +108,7 @@ class KickStability:
     """What becomes of a motion that is kicked: displacements and velocities of all masses at once."""
 
     motion: int
-    """By `MapResults.motion_numbers`."""
+    """Number of the motion in `MapResults.motion_numbers`."""
     size: float
     """Standard deviation of each displacement over the gap, and of each velocity over gap times 2 pi f."""
     returned: Share

@@ -64,7 +64,7 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Than the longest period that is looked for."""
+"""Multiple of the longest period that is searched."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)

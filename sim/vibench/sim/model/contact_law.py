@@ -28,7 +28,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
         "power": POWER,
     }
 )
-"""By the kind of each law, which is the word of a command line or a file too."""
+"""Contact laws by kind, as named on the command line and in files."""
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:

@@ -155,7 +155,7 @@ STEEL = Elasticity(206e9, 0.27)
 ALUMINIUM = Elasticity(67e9, 0.3)
 """The stops; same place."""
 PAPER_RADIUS_M = 4.4e-3
-"""As the paper says (2.1 g of steel would be 4.0 mm)."""
+"""Radius in the paper (2.1 g of steel would be 4.0 mm)."""
 
 
 def gong2025(

@@ -27,7 +27,7 @@ HERMITE = 384.0
 SHARE = 1e-3
 """Part of the accuracy's tolerance that the interpolation of a sweep may use."""
 SHORTEST_TURN = 0.005
-"""Below this many radians an interval gains nothing: its error is 2e-12 of the amplitude."""
+"""Shortest interval [rad]: shorter ones gain nothing; its error is 2e-12 of the amplitude."""
 
 
 class BaseMotion(NamedTuple):

@@ -10,7 +10,7 @@ from pathlib import Path
 assert sys.platform == "win32"  # told to a type checker
 
 LOCK_BYTE = 2**62
-"""Beyond everything that a file holds."""
+"""Locked byte, beyond the end of every file."""
 _QUERY_LIMITED_INFORMATION = 0x1000
 _BELOW_NORMAL = 0x4000
 _STILL_ACTIVE = 259

@@ -94,7 +94,7 @@ class Stretch:
 
     @property
     def length_s(self) -> float:
-        """From its start to its end."""
+        """Length from start to end."""
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
@@ -312,7 +312,7 @@ class ObservedWindow:
 
     @property
     def length_s(self) -> float:
-        """From its start to its end."""
+        """Length from start to end."""
         return self.stretches[-1].end_s - self.stretches[0].start_s
 
     @property

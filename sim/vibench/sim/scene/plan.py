@@ -152,7 +152,7 @@ class ScenePlan:
     kind: str
     """What runs have taken is learnt for each kind, and for what it begins with."""
     largest_p_m: float
-    """As long as no stop is touched, abs(p) stays below this."""
+    """Bound on abs(p) while no stop is touched."""
 
     @property
     def alike(self) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ class FixedDuration:
 
     @property
     def longest_s(self) -> float:
-        """As long as the motion is followed."""
+        """Longest time for which the motion is followed."""
         return self.duration_s
 
     def __post_init__(self) -> None:

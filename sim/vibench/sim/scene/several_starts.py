@@ -34,7 +34,7 @@ PARTED = 0.01
 """Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
 began: that is ten thousand times as far as they were."""
 TOUCHING = 0.999
-"""Part of a gap: m1 that is so far out may be in contact."""
+"""Part of a gap beyond which m1 may be in contact."""
 LEAST_SIZE = 1e-3
 """Part of a gap: what a motion counts for at least, when starts are said to have parted."""
 LEAST_S = 1e-3

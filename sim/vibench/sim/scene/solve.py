@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from ..exponents.lyapunov import LyapunovEstimate
 
 EXPONENT_S = 25.0
-"""An exponent is averaged for so long, if it is not known well enough before [s]."""
+"""Longest averaging time of an exponent [s]."""
 EXPONENT_PRECISION = 0.2, 0.01
 """Absolute [1/s] and relative."""
 

@@ -187,7 +187,7 @@ class LoadedShaker:
         """
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
-        """As the engine moves it."""
+        """Structure that the engine moves."""
         self._step_s = step_s
         self._place(specimen, start)
         x, _, _, vx, _, _ = self.structure["specimen"]["motion"]

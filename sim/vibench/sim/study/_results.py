@@ -1,4 +1,4 @@
-"""What a study has found so far: arrays over its axes, NaN where nothing is known, and states."""
+"""Results of a study so far: arrays over its axes, NaN where nothing is known, and states."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
