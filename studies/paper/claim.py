@@ -151,7 +151,7 @@ class Finding:
 
     @property
     def is_met(self) -> bool:
-        """By every start."""
+        """Whether every start meets the claim."""
         return self.met == len(self.draws)
 
     @property

@@ -7,7 +7,7 @@ from types import ModuleType
 FILES = {
     int(path.stem.split("_")[1]): path.stem for path in sorted(Path(__file__).parent.glob("figure_*.py"))
 }
-"""By the paper's number."""
+"""Files by the paper's number of the figure."""
 
 
 def paper_figure(number: int) -> ModuleType:

@@ -33,7 +33,7 @@ class Reproduction:
     """Everything that the page is made of."""
 
     sections: Mapping[str, tuple[Judgement, ...]]
-    """By heading, in order."""
+    """Judgements by heading, in order."""
     scores: tuple[DampingScore, ...]
     tables: tuple[ReportTable, ...]
     """At the end of the report."""

@@ -24,7 +24,7 @@ APART_M = 1e-11
 READING_S = 1e-3
 """Time between two readings of that distance."""
 LOST_M = 1.0
-"""A motion that is so far out has diverged."""
+"""Displacement beyond which a motion has diverged."""
 SLOWEST_PER_S = 1e-9
 """A state that does not move at first."""
 

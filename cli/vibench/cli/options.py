@@ -60,7 +60,7 @@ class RequestOptions(Generic[Request]):
 
     model: type[Request]
     typed: Mapping[str, Any]
-    """By field."""
+    """Types by field."""
 
     def request(self, **others: object) -> Request:
         """Make the request, with other fields as the command has read them.

@@ -53,7 +53,7 @@ class BranchContinuation(AbstractFeedback):
     """How far the base may be from a sine of its level, over that: fundamental and each harmonic of its
     displacement."""
     settle_s: PositiveFloat = 0.3
-    """From a change of what is played to the first look at it [s]."""
+    """Time from a change of the drive to the first look [s]."""
     look_periods: int = Field(default=20, ge=10, le=1000)
     """Periods of a look."""
     record_s: PositiveFloat = 0.5

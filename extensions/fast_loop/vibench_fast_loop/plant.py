@@ -25,7 +25,7 @@ class LoopTiming:
     rate_hz: float
     """Samples a second; each is the mean since the one before."""
     latency_s: float
-    """From a sample to the voltage that answers it [s]."""
+    """Latency from a sample to the voltage that depends on it [s]."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):

@@ -82,7 +82,7 @@ class LoopBlock(FrozenModel):
     """Fourier coefficients over one block of periods, from the mean on, as pairs in volts."""
 
     end_s: float
-    """By the controller's clock [s]."""
+    """End by the controller's clock [s]."""
     steady: bool
     """Whether nothing was changed while it lasted."""
     output: tuple[Pair, ...]
@@ -113,7 +113,7 @@ class LoopFacts(FrozenModel):
     limit_v: PositiveFloat
     """Largest output, peak [V]."""
     watchdog_s: PositiveFloat
-    """Nothing asked for so long, and it ramps down [s]."""
+    """Time without a request after which it ramps down [s]."""
     pd_of: LoopInput | None = None
     """Of which input alone it takes a law, proportional and derivative; None: any linear law."""
 

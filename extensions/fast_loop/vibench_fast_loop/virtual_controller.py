@@ -38,7 +38,7 @@ FloatArray = NDArray[np.float64]
 RAMP_S = 0.05
 """How fast it ramps down by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
-"""An output that stays at its limit for so long is a law that does not hold: it ramps down [s]."""
+"""Time at the output's limit after which the law counts as failed and the output ramps down [s]."""
 MOST_BLOCKS = 2000
 """Blocks kept for a host that does not ask for them."""
 

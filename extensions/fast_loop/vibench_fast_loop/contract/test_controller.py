@@ -38,7 +38,7 @@ def series(bench: Bench, feedback: LoopFeedback | None = None) -> LoopProgram:
 
 
 def listened(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
-    """Read so long, and talk to the controller meanwhile."""
+    """Read for a time, and send requests to the controller meanwhile."""
     stretch = int(TALK_S * bench.digitizer.sample_rate_hz)
     parts, blocks = [], list[LoopBlock]()
     for _ in range(round(duration_s / TALK_S)):

@@ -192,7 +192,7 @@ class AFG1022(ScpiInstrument):
     # Faults on demand
 
     def weld_output_relay(self) -> None:
-        """From now on ``OUTP OFF`` is obeyed and reported, and the output stays on all the same."""
+        """Make ``OUTP OFF`` have no effect, although it is accepted and reported as off."""
         self._set_relay_stuck(stuck=True)
 
     def repair_output_relay(self) -> None:

@@ -46,7 +46,7 @@ class Command:
     """One row; without ``write`` it can only be asked for, without ``ask`` only be sent."""
 
     header: str
-    """As manuals print it, see `HeaderPattern`."""
+    """Header as manuals print it, see `HeaderPattern`."""
     source: str
     """Where its behaviour is described."""
     write: Setter | None

@@ -1,4 +1,4 @@
-"""From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base."""
+"""Sensors: the laser vibrometer that measures m0, and the accelerometer on the base."""
 
 from dataclasses import dataclass
 from typing import Protocol

@@ -36,7 +36,7 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """How long a step really takes when the converter's clock is fast by so much [s]."""
+        """Return the true length of a step when the converter's clock is fast by this part [s]."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:

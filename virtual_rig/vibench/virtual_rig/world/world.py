@@ -289,7 +289,7 @@ class World:
         self.set_amplifier_gain_db(self._gain_db)
 
     def widen_gaps(self, by_m: float) -> None:
-        """Move both stops away from m1 by so much against what the rig began with [m]."""
+        """Widen both gaps by this distance, from those that the rig began with [m]."""
         began = self._specimen
         lower, upper = began.gaps_m
         with self._turn:
