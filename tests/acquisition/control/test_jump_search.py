@@ -7,7 +7,7 @@ from vibench.acquisition.control.settling_controller import (
     LocatedJump,
     SettledPoint,
     is_on_branch,
-    located,
+    locate_jump,
     side,
 )
 from vibench.acquisition.recording import JumpSide
@@ -21,7 +21,7 @@ def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
         return (1.0 if is_before else height) * (1 + 0.01 * abs(frequency_hz - before_hz))
 
     asked = []
-    search = located(
+    search = locate_jump(
         SettledPoint(before_hz, response(before_hz)),
         SettledPoint(after_hz, response(after_hz)),
         resolution_hz,

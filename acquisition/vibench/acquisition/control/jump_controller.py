@@ -18,12 +18,12 @@ from .settling_controller import (
     SettledState,
     SettlingController,
     is_on_branch,
-    located,
+    locate_jump,
     ratio,
-    recorded,
+    record_settled,
     side,
 )
-from .sine_loop import SineLoop, glided, started
+from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
@@ -136,7 +136,7 @@ class JumpLocator:
 
     def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
         """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
-        seek = located(search.branch[-1], search.after, self._rule.resolution_hz)
+        seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
             while True:
@@ -208,7 +208,7 @@ class JumpLocator:
 
     def _moved_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
-        yield from glided(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
+        yield from glide(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
         return (yield from self._settling_controller.settled())
 
     def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
@@ -222,7 +222,7 @@ class JumpLocator:
                 **found.note.numbers,
             },
         )
-        yield from recorded(self._settling_controller, found, segment, self._plan.record_s)
+        yield from record_settled(self._settling_controller, found, segment, self._plan.record_s)
         return found.point
 
     def _is_late(self) -> bool:
@@ -250,7 +250,7 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     """Carry out every pass, from the first ramp up to the last ramp down."""
     settling_controller = SettlingController(loop, plan.settling, plan.base_level)
     passes = tuple(plan.passes())
-    yield from started(loop, passes[0][1][0], plan.base_level)
+    yield from start(loop, passes[0][1][0], plan.base_level)
     came_from = "rest"
     for number, (direction, frequencies_hz) in enumerate(passes, start=1):
         stepping = Pass(settling_controller, plan, number, direction)
@@ -293,7 +293,7 @@ class Pass:
 
     def _stepped(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
         settling_controller = self._settling_controller
-        yield from glided(
+        yield from glide(
             settling_controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz
         )
         found = yield from settling_controller.settled()
@@ -308,5 +308,5 @@ class Pass:
                 **found.note.numbers,
             },
         )
-        yield from recorded(settling_controller, found, segment, self._plan.record_s)
+        yield from record_settled(settling_controller, found, segment, self._plan.record_s)
         return found.point

@@ -123,7 +123,7 @@ class Equaliser:
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
-        return _averaged(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, self._width)
+        return _average(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, self._width)
 
     @property
     def _width(self) -> int:
@@ -175,7 +175,7 @@ def _note(plan: HeldNoise, equaliser: Equaliser, heard: Heard, off_db: Samples, 
     )
 
 
-def _averaged(values: Samples, width: int) -> Samples:
+def _average(values: Samples, width: int) -> Samples:
     """Average over neighbours; at the ends over those that there are."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)

@@ -15,8 +15,8 @@ from ..rig import OnTable
 from .control_action import Controller
 from .feedback_channels import require_answer
 from .phase_law import LearntMode, PhaseError, PhaseLaw, PhaseResonance, PhaseSearch, TrackedPlace
-from .settling_controller import SettledState, SettlingController, recorded, recorded_and_judged
-from .sine_loop import SineLoop, moved, started
+from .settling_controller import SettledState, SettlingController, record_settled, recorded_and_judged
+from .sine_loop import SineLoop, move, start
 from .steadiness import ORDERS, Periods
 
 _UNKNOWNS = 8
@@ -57,7 +57,7 @@ def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.
     weight = np.ones(len(s))
     solution, covariance = np.zeros(_UNKNOWNS), np.zeros((_UNKNOWNS, _UNKNOWNS))
     for _ in range(3):
-        solution, covariance = _solved(s, transmissibility, weight)
+        solution, covariance = _solve(s, transmissibility, weight)
         weight = 1 / np.abs(s**2 + solution[0] * s + solution[1])
     if solution[1] <= 0 or solution[0] <= _SURE * sqrt(max(0.0, float(covariance[0, 0]))):
         return None
@@ -71,7 +71,7 @@ def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.
     )
 
 
-def _solved(
+def _solve(
     s: NDArray[np.complex128], answer: NDArray[np.complex128], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     # a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T, real and imaginary parts apart.
@@ -110,16 +110,16 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     if not plan.is_fundamental:
         # It may be a hundredth of the whole motion, which then seems settled long before.
         loop.judged_order = plan.harmonic
-    yield from started(loop, plan.start_hz, plan.held_levels[0])
+    yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
     for number in range(len(plan.accelerations_m_per_s2)):
-        followed = (yield from _followed(loop, plan, number, last, last.mode)) if last.mode else None
-        last = followed or (yield from _searched(loop, plan, number, last))
+        followed = (yield from _follow(loop, plan, number, last, last.mode)) if last.mode else None
+        last = followed or (yield from _search(loop, plan, number, last))
     yield from loop.ramp_down()
     yield from loop.say()
 
 
-def _followed(
+def _follow(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
 ) -> Controller[TrackedPlace | None]:
     """Go to the next level under the phase-locked loop and record there; None far off the resonance."""
@@ -128,7 +128,7 @@ def _followed(
     begin_hz = law.next_hz(last.frequency_hz, last.base_m_per_s2 * change)
     loop.change(begin_hz, loop.bounded_vpp(loop.setting.setting_vpp * change))
     controller = SettlingController(loop, plan.settling, level)
-    looks, lock = yield from _locked(controller, plan, law)
+    looks, lock = yield from _lock(controller, plan, law)
     if lock is None:
         return None
     periods = looks * LOOK_PERIODS * loop.drives
@@ -150,7 +150,7 @@ def _followed(
     return TrackedPlace(found.frequency_hz, found.base.amplitude, mode)
 
 
-def _locked(
+def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
     """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance."""
@@ -186,7 +186,7 @@ def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float
     return float(min(max(change, 1 / level.most_change), level.most_change))
 
 
-def _searched(
+def _search(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
 ) -> Controller[TrackedPlace]:
     """Search the resonance at one level in settled motion, and record there."""
@@ -200,7 +200,7 @@ def _searched(
     states: list[SettledState] = []
     frequency_hz, lock = last.frequency_hz, LockResult.LOST
     for _ in range(plan.most_tries):
-        moved(loop, frequency_hz, level)
+        move(loop, frequency_hz, level)
         states.append((yield from settling_controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
@@ -231,9 +231,9 @@ def _searched(
         flanks = yield from _flanks(settling_controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
         # Back from the flanks before the recording: the next level begins where this one ends.
-        moved(loop, found.frequency_hz, level)
+        move(loop, found.frequency_hz, level)
         found = yield from settling_controller.settled()
-    yield from recorded(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    yield from record_settled(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
     periods = round(sum(each.waited_s * each.drive_hz for each in states))
     _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
     if lock is not LockResult.LOCKED:
@@ -267,7 +267,7 @@ def _flanks(
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
         frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
         if plan.low_hz <= frequency_hz <= plan.high_hz:
-            moved(settling_controller.loop, frequency_hz, settling_controller.level)
+            move(settling_controller.loop, frequency_hz, settling_controller.level)
             found.append((yield from settling_controller.settled()))
     return found
 

@@ -23,7 +23,7 @@ from ..recording import (
 )
 from .control_action import Controller, LevelControl, MeasuredLevel, measured_level
 from .feedback_channels import require_answer
-from .sine_loop import GainEstimator, SineLoop, followed, started, tracked
+from .sine_loop import GainEstimator, SineLoop, start, track, update_track
 from .steadiness import ORDERS, Judgement, Phasors, in_drives, judged
 
 
@@ -58,7 +58,7 @@ Seek = Generator[float, SettledPoint, LocatedJump]
 """Yields a frequency to be reached on the branch before the jump, and receives what was found there."""
 
 
-def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
+def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
     """Halve the bracket until it is no wider than ``resolution_hz``.
 
     The caller approaches each frequency from the side of ``before``; `side` then assigns it to an end.
@@ -274,7 +274,7 @@ class SettlingController:
 def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     """Ramp up to the level, settle, record, ramp down."""
     settling_controller = SettlingController(loop, plan.settling, plan.base_level)
-    yield from started(loop, plan.frequency_hz, plan.base_level)
+    yield from start(loop, plan.frequency_hz, plan.base_level)
     yield from settling_controller.settled()
     control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
@@ -307,11 +307,11 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     yield from loop.say()
 
 
-def recorded(
+def record_settled(
     settling_controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
     """Record a settled motion as a segment, and note the level that was achieved in it."""
-    yield from _listened(settling_controller, segment, duration_s)
+    yield from _record_held(settling_controller, segment, duration_s)
     _note(settling_controller, found, segment)
 
 
@@ -321,13 +321,13 @@ def recorded_and_judged(
     """Record a motion as a segment, long enough to judge it by that."""
     shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
-    yield from _listened(settling_controller, segment, duration_s)
+    yield from _record_held(settling_controller, segment, duration_s)
     found = settling_controller.found(waited_s)
     _note(settling_controller, found, segment)
     return found
 
 
-def _listened(
+def _record_held(
     settling_controller: SettlingController, segment: Segment, duration_s: float
 ) -> Controller[None]:
     settling_controller.loop.forget()
@@ -355,16 +355,16 @@ def _note(settling_controller: SettlingController, found: SettledState, segment:
 def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
     """Ramp up to the level, settle, sweep, ramp down."""
     level = plan.base_level
-    yield from started(loop, plan.start_hz, level)
+    yield from start(loop, plan.start_hz, level)
     yield from SettlingController(loop, plan.settling, level).settled()
     estimator = GainEstimator(plan.average_s)
     excursion: ExcursionNote | None = None
     steps = outside = 0
     for mean_hz, duration_s in plan.mean_steps():
-        tracked(loop, mean_hz, level, estimator, duration_s)
+        track(loop, mean_hz, level, estimator, duration_s)
         yield from loop.listen(RunState.RECORDING, duration_s, plan.segment)
-        followed(loop, level, estimator)
-        excursion = _judged(loop, excursion, mean_hz, estimator.level - 1, level.tolerance)
+        update_track(loop, level, estimator)
+        excursion = _excursion(loop, excursion, mean_hz, estimator.level - 1, level.tolerance)
         steps += 1
         outside += excursion is not None
     if excursion is not None:
@@ -376,7 +376,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
     yield from loop.say()
 
 
-def _judged(
+def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
     """Begin, continue or end a stretch outside the tolerance."""

@@ -209,7 +209,7 @@ _GLIDE_MEMORY_S = 0.5
 """Over which a glide averages the base's answer [s]."""
 
 
-def started(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
+def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
     """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
     setting_vpp = loop.most_vpp
     if level is not None:
@@ -220,19 +220,19 @@ def started(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Con
     yield from loop.ramp_up()
 
 
-def glided(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
+def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
     """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
     begin_hz = loop.setting.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
     estimator = GainEstimator(_GLIDE_MEMORY_S)
     for tone in range(1, tones):
-        tracked(loop, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, estimator, GLIDE_TONE_S)
+        track(loop, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, estimator, GLIDE_TONE_S)
         yield from loop.listen(RunState.SETTLING, GLIDE_TONE_S)
-        followed(loop, level, estimator)
-    tracked(loop, frequency_hz, level, estimator, GLIDE_TONE_S)
+        update_track(loop, level, estimator)
+    track(loop, frequency_hz, level, estimator, GLIDE_TONE_S)
 
 
-def moved(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
+def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     """Play another frequency: the setting follows the rig's model from where it is."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
@@ -241,19 +241,19 @@ def moved(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     _change(loop, frequency_hz, setting_vpp, level)
 
 
-def tracked(
+def track(
     loop: SineLoop, frequency_hz: float, level: BaseLevel | None, estimator: GainEstimator, duration_s: float
 ) -> None:
     """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
     if level is None or not estimator.is_known:
-        moved(loop, frequency_hz, level)
+        move(loop, frequency_hz, level)
         return
     modelled_vpp = _bare_vpp(loop, level, frequency_hz)
     gain = estimator.gain_at(loop.elapsed_s + 0.5 * duration_s)
     _change(loop, frequency_hz, modelled_vpp / gain, level)
 
 
-def followed(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
+def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
     """Take what was just heard into the track."""
     if level is None:
         return
@@ -298,9 +298,9 @@ def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
     for direction, frequencies_hz in passes:
         for frequency_hz in frequencies_hz:
             if frequency_hz != loop.setting.frequency_hz:
-                yield from glided(loop, frequency_hz, None, plan.glide_step_hz)
+                yield from glide(loop, frequency_hz, None, plan.glide_step_hz)
             yield from _brought(loop, plan)
-            yield from _recorded(loop, plan, frequency_hz, direction)
+            yield from _record(loop, plan, frequency_hz, direction)
     yield from loop.ramp_down()
     yield from loop.say()
 
@@ -336,7 +336,7 @@ def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float
     return response_m, abs(ratio), acceleration
 
 
-def _recorded(loop: SineLoop, plan: HeldResponse, frequency_hz: float, direction: str) -> Controller[None]:
+def _record(loop: SineLoop, plan: HeldResponse, frequency_hz: float, direction: str) -> Controller[None]:
     loop.forget()
     yield from loop.listen(RunState.RECORDING, plan.record_s, plan.segment(frequency_hz, direction))
     response_m, ratio, _ = response_of(loop, plan)

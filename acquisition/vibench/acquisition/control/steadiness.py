@@ -258,14 +258,16 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
         window = -(-max(rule.periods, shortest) // (_THIRDS * period)) * _THIRDS * period
         if len(points) < window:
             break
-        figures = _clustered(points[-window:], period, noise)
-        if period > 1 and not _differ(points[-window:], period, _allowed(figures, rule.tolerance)):
+        figures = _clusters(points[-window:], period, noise)
+        if period > 1 and not _differ(points[-window:], period, _largest_scatter(figures, rule.tolerance)):
             continue
         if period == 1:
             unsettled = replace(figures, steadiness=Steadiness.UNSETTLED, period=0)
         if _repeats(figures, rule.tolerance):
             return figures
-    if len(points) >= rule.aperiodic_periods and unsettled.scatter > _allowed(unsettled, rule.tolerance):
+    if len(points) >= rule.aperiodic_periods and unsettled.scatter > _largest_scatter(
+        unsettled, rule.tolerance
+    ):
         return _stationary(points[-rule.aperiodic_periods :], unsettled)
     return unsettled
 
@@ -284,7 +286,7 @@ def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> J
     return replace(found, period=1 if repeats_at_once else found.period * drives)
 
 
-def _clustered(points: Phasors, period: int, noise: float) -> Judgement:
+def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
     """Measure the clusters that points make which lie a whole number of ``period`` apart."""
     turns = len(points) // period
     clusters = points.reshape(turns, period, -1)
@@ -324,12 +326,12 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
-    allowed = _allowed(figures, tolerance)
+    allowed = _largest_scatter(figures, tolerance)
     # The means of thirds differ by chance as well; noise is allowed to them as far as it explains that.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
-def _allowed(figures: Judgement, tolerance: float) -> float:
+def _largest_scatter(figures: Judgement, tolerance: float) -> float:
     """Return the scatter up to which a motion repeats as far as can be seen."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
