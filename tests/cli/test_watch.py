@@ -22,7 +22,7 @@ from vibench.acquisition.engine import (
     start_engine,
     stop_engine,
 )
-from vibench.acquisition.engine._client import EngineAddress, announced
+from vibench.acquisition.engine._client import EngineAddress, announce
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.program import Program, announced_programs
@@ -133,14 +133,14 @@ def test_where_the_state_folder_cannot_be_made_it_is_said(vibench_here, tmp_path
 
 def test_what_a_killed_engine_has_left_is_swept_away(tmp_path):
     gone = EngineAddress(host="127.0.0.1", port=1, token="t")
-    with announced(gone, "killed", unheard):
+    with announce(gone, "killed", unheard):
         assert announced_engines() == ()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
 def test_nobody_else_can_read_the_token(tmp_path):
     state = Path(os.environ["VIBENCH_STATE_DIR"])
-    with announced(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", unheard):
+    with announce(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", unheard):
         (file,) = (state / "engines").iterdir()
         assert file.stat().st_mode & 0o077 == 0
 

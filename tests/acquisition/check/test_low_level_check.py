@@ -5,7 +5,7 @@ import pytest
 
 from vibench.acquisition import CheckFailed
 from vibench.acquisition.rig import BaseQuantity, RigModel, Role, channels_of
-from vibench.acquisition.run.silence_watch import judged
+from vibench.acquisition.run.silence_watch import check_figures
 
 RATE_HZ = 51_200.0
 AMPLITUDE_VPP = 0.02
@@ -28,7 +28,7 @@ def check(rig):
     def check(drive_v):
         quiet = np.zeros((len(channels), 5120))
         quiet[0] = drive_v / channels[0].units_per_volt
-        return judged(rig, channels, quiet, heard, RATE_HZ, AMPLITUDE_VPP)
+        return check_figures(rig, channels, quiet, heard, RATE_HZ, AMPLITUDE_VPP)
 
     return check
 

@@ -1,6 +1,6 @@
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.recording._layout import decoded, encoded
+from vibench.acquisition.recording._layout import decode, encode
 
 UTF8 = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
 
@@ -8,12 +8,12 @@ UTF8 = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
 @given(UTF8)
 def test_text_that_fits_comes_back(text):
     width = len(text.encode()) + 3
-    assert decoded(encoded(text, width).ljust(width, b"\0")) == text
+    assert decode(encode(text, width).ljust(width, b"\0")) == text
 
 
 @given(UTF8, st.integers(3, 40))
 def test_text_that_does_not_fit_is_cut_between_letters(text, width):
-    raw = encoded(text, width)
+    raw = encode(text, width)
     assert len(raw) <= width
     if len(text.encode()) > width:
         assert text.startswith(raw.decode().removesuffix("…"))

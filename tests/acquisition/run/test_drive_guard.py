@@ -26,9 +26,9 @@ from vibench.acquisition.run.run import Run
 from vibench.acquisition.run.silence_watch import DriveGuard
 from vibench.acquisition.stopping.program import (
     Program,
+    announce_program,
     engines_folder,
     facts_of_this_process,
-    reached,
 )
 from vibench.acquisition.stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopRequest
 from vibench.sim.operating_system.this import process_start
@@ -133,7 +133,7 @@ def own_process():
 
 @pytest.fixture
 def announced(own_state):
-    with reached(lambda level, reason: None, Program.model_validate(facts_of_this_process("dwell"))):
+    with announce_program(lambda level, reason: None, Program.model_validate(facts_of_this_process("dwell"))):
         yield
 
 

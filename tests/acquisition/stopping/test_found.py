@@ -13,7 +13,7 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
 from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
-from vibench.acquisition.engine._client import EngineAddress, announced
+from vibench.acquisition.engine._client import EngineAddress, announce
 from vibench.acquisition.stopping.program import Program, announced_programs, engines_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")
@@ -120,7 +120,7 @@ def test_a_computer_that_gets_another_name_finds_its_own(monkeypatch):
 
 def test_who_lives_and_refuses_a_connection_is_stopped_all_the_same():
     pressed = []
-    with announced(
+    with announce(
         EngineAddress(host="127.0.0.1", port=1, token="t"), "night", lambda *told: pressed.append(told)
     ):
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN

@@ -316,13 +316,13 @@ def open_bench(
         check_calibrations(rig, datetime.now(UTC).astimezone().date())
     closing = ExitStack()
     try:
-        return _opened(rig, confirm, power, closing)
+        return _open_instruments(rig, confirm, power, closing)
     except BaseException as error:
         _leave(closing, error)
         raise
 
 
-def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
+def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.connected
     digitizer = digitizer_driver(connected).open(connected)

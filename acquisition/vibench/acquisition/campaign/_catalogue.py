@@ -193,11 +193,11 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     if not folder.is_dir():
         raise RecordingError(f"{folder} is no folder; give the folder that the recordings are in.")
     try:
-        with closing(_opened(folder, chosen(Refresh, refresh))) as connection:
+        with closing(_open_catalogue(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
             return _entries(connection)
     except (sqlite3.OperationalError, OSError):  # a disk that is full or read-only
-        with closing(_prepared(sqlite3.connect(":memory:", isolation_level=None))) as connection:
+        with closing(_prepare(sqlite3.connect(":memory:", isolation_level=None))) as connection:
             _update(folder, connection)
             return _entries(connection)
     except sqlite3.DatabaseError as error:
@@ -207,20 +207,20 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
         ) from error
 
 
-def _opened(folder: Path, refresh: Refresh) -> sqlite3.Connection:
+def _open_catalogue(folder: Path, refresh: Refresh) -> sqlite3.Connection:
     path = folder / CATALOGUE_NAME
     if refresh is Refresh.ALL:
         for each in (path, *(path.with_name(path.name + end) for end in ("-wal", "-shm", "-journal"))):
             each.unlink(missing_ok=True)
     connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
     try:
-        return _prepared(connection)
+        return _prepare(connection)
     except sqlite3.Error:
         connection.close()
         raise
 
 
-def _prepared(connection: sqlite3.Connection) -> sqlite3.Connection:
+def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
     connection.execute("BEGIN IMMEDIATE")
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version != VERSION:
@@ -339,13 +339,13 @@ def verify_recordings(
         known |= {
             journal.parent / point.file: point for point in points if point.state is JournalPointState.DONE
         }
-    found = [_verified(path, root, SealDepth(depth), key) for path in paths]
+    found = [_verify(path, root, SealDepth(depth), key) for path in paths]
     if is_folder:
         found += [_missing(path, root, point) for path, point in known.items() if not path.exists()]
     return (*found, *broken)
 
 
-def _verified(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> VerifiedRecording:
+def _verify(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> VerifiedRecording:
     where = place_below(root, path)
     try:
         with open_recording(path) as recording:

@@ -240,7 +240,7 @@ def is_begun(path: Path) -> bool:
         )
 
 
-def connected(path: Path) -> sqlite3.Connection:
+def connect(path: Path) -> sqlite3.Connection:
     """Open a database to write, so that what it has committed survives a kill and a power cut."""
     with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
@@ -375,7 +375,7 @@ class Journal(ClosedOnLeaving):
     def begin(cls, path: Path, campaign: Campaign, bench: BenchIdentity) -> Self:
         """Write down the whole plan, in one transaction, before anything is done."""
         points = campaign.points()
-        journal = cls(path, connected(path))
+        journal = cls(path, connect(path))
         with closed_on_error(journal._connection), journal._transaction() as connection:
             for statement in filter(str.strip, SCHEMA.split(";")):
                 connection.execute(statement)
@@ -396,7 +396,7 @@ class Journal(ClosedOnLeaving):
 
         Raises RecordingError when the file is no journal, or of a newer version.
         """
-        with closed_on_error(connected(path)) as connection:
+        with closed_on_error(connect(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
                 # A journal of version 1 gets what it lacks, in one transaction.

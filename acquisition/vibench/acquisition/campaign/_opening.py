@@ -55,7 +55,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
             case state if point.file:
-                ended = _ended(path, point.measurement, errors)
+                ended = _end_of_attempt(path, point.measurement, errors)
                 # The journal may say failed although the file on the disk is complete: the file decides.
                 if has_part or state is JournalPointState.RUNNING or ended[0] is JournalPointState.DONE:
                     journal.end(point.name, *ended)
@@ -100,16 +100,16 @@ def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, st
     return errors
 
 
-def _ended(
+def _end_of_attempt(
     path: Path, measurement: Measurement, errors: Mapping[str, str]
 ) -> tuple[JournalPointState, ReasonCode, str, str]:
     if path.exists():
-        return _judged(path, measurement)
+        return _state_of_file(path, measurement)
     why = errors.get(path.name, "nothing was recorded")
     return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {why}", ""
 
 
-def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
+def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
     found = looked_at(path, measurement, SealDepth.WHOLE)
     if found.damage:
         return JournalPointState.INTERRUPTED, ReasonCode.DAMAGED, found.damage, found.seal
@@ -270,14 +270,14 @@ def _gone_on_with(
 
 
 def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
-    if _wanted(journal.campaign) != _wanted(campaign):
+    if _points_to_make(journal.campaign) != _points_to_make(campaign):
         raise RecordingError(
             f"{journal.path} was begun with another plan than {campaign.name!r} has now. Nothing was "
             "recorded; give the changed campaign another name, or another folder"
         )
 
 
-def _wanted(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:
+def _points_to_make(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:
     """List what a plan makes, without notes: they may be added to."""
     return tuple((name, each.model_copy(update={"notes": ""})) for name, each in campaign.recordings())
 

@@ -121,27 +121,27 @@ def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, .
     before = {finding.name: finding for finding in last.findings}
     since = f"since {ago(at - last.checked)}"
     found = [
-        _changed(finding, before[finding.name], since) for finding in now.findings if finding.name in before
+        _change(finding, before[finding.name], since) for finding in now.findings if finding.name in before
     ]
     return tuple(finding for finding in found if finding is not None)
 
 
-def _changed(now: Finding, before: Finding, since: str) -> Finding | None:
+def _change(now: Finding, before: Finding, since: str) -> Finding | None:
     if now.number is None or before.number is None:
         return None
     match LASTING.get(now.name):
         case Lasting.GAIN:
-            return _judged(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
+            return _change_finding(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
         case Lasting.LEVEL if now.number > 0 and before.number > 0:
             change_db = 20 * log10(now.number / before.number)
-            return _judged(now.name, change_db, _DECIBELS, DRIFT_DB, since)
+            return _change_finding(now.name, change_db, _DECIBELS, DRIFT_DB, since)
         case Lasting.CLOCK:
-            return _judged(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
+            return _change_finding(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
         case _:
             return None
 
 
-def _judged(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
+def _change_finding(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
     finding = judged(
         f"{name} since last time",
         change,
@@ -225,7 +225,7 @@ def require_fresh(
             bench.last_check = last_check(bench.rig.name)
             return bench.last_check
         case CheckRule.NOW:
-            return _passed(check_bench(bench, folder, clock, switch))
+            return _require_passed(check_bench(bench, folder, clock, switch))
         case CheckRule.FRESH:
             return _fresh(bench, folder, clock, switch)
         case _:
@@ -240,7 +240,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
         return last
     match bench.kind:
         case BenchKind.SIMULATED:
-            return _passed(check_bench(bench, folder, clock, switch))
+            return _require_passed(check_bench(bench, folder, clock, switch))
         case BenchKind.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; check it with 'vibench bench check --bench FILE', or "
@@ -277,7 +277,7 @@ def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
     return None
 
 
-def _passed(result: CheckResult) -> CheckResult:
+def _require_passed(result: CheckResult) -> CheckResult:
     if result.verdict is Verdict.FAIL:
         raise CheckFailed(
             f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "

@@ -69,7 +69,7 @@ def bench_report(
             f"on the bench {bench.rig.name!r} a recording is played back: there is nothing to check. Measure "
             "with the plan that it was made with"
         )
-    findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
+    findings = [*_identities(bench), *_calibrations(bench), _room(bench, folder)]
     if amplitude_vpp is None:
         amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
     drive = drive_for(bench, _small_sine(amplitude_vpp))
@@ -167,14 +167,14 @@ def _small_sine(amplitude_vpp: float) -> Measurement:
     return Measurement(name="check", excitation=sine)
 
 
-def _identified(bench: Bench) -> list[Finding]:
+def _identities(bench: Bench) -> list[Finding]:
     return [
         Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
         for part, identity in bench.identities.items()
     ]
 
 
-def _calibrated(bench: Bench) -> list[Finding]:
+def _calibrations(bench: Bench) -> list[Finding]:
     today = datetime.now(UTC).astimezone().date()
     return [
         Finding(

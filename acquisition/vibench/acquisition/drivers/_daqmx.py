@@ -157,7 +157,7 @@ def _excite(made: AIChannel, channel: Channel) -> None:
         made.ai_excit_val = channel.iepe_current_a
         held_a = made.ai_excit_val
         if abs(held_a - channel.iepe_current_a) > _SAME * channel.iepe_current_a:
-            raise _refused(channel, "sensor current", f"{channel.iepe_current_a:g} A", f"{held_a:g} A")
+            raise _refusal(channel, "sensor current", f"{channel.iepe_current_a:g} A", f"{held_a:g} A")
         return
     try:
         # A current that an earlier program left on would push the vibrometer's output.
@@ -178,7 +178,7 @@ def _couple(made: AIChannel, channel: Channel) -> None:
             return
         raise
     if held is not wanted:
-        raise _refused(channel, "coupling", wanted.name, held.name)
+        raise _refusal(channel, "coupling", wanted.name, held.name)
 
 
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
@@ -194,7 +194,7 @@ def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None
     return step if max(rest_v) <= _LINEAR * range_v else None
 
 
-def _refused(channel: Channel, what: str, sent: str, got: str) -> SettingRefused:
+def _refusal(channel: Channel, what: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
         f"{channel.physical}: {what} was set to {sent} and reads back {got}. The device was released; "
         f"correct the input of {channel.role.value} in the hardware configuration"

@@ -249,7 +249,7 @@ class Number:
         owner.command(f"{header} {text}")
         got = owner.query_number(f"{header}?")
         if not abs(got - value) <= self.absolute + self.relative * abs(value):  # so that a NaN is refused
-            raise _refused(owner, header, text, f"{got:.10g}")
+            raise _refusal(owner, header, text, f"{got:.10g}")
         owner.held[self.header] = got
 
 
@@ -276,11 +276,11 @@ class Word:
         header = self.header.format(c=owner.channel)
         reply = owner.query(f"{header}?")
         if reply.strip('"').upper() not in self.answers[word]:
-            raise _refused(owner, header, word, reply)
+            raise _refusal(owner, header, word, reply)
         owner.held[self.header] = word
 
 
-def _refused(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
+def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
         f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument took another value "
         "without an error. Stop, check the setting on its panel, and check that its limits allow it"

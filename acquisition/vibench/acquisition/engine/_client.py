@@ -26,10 +26,10 @@ from ..plan import Campaign
 from ..stopping.program import (
     AnyProgram,
     Program,
+    announce_program,
     announced_programs,
     facts_of_this_process,
     programs_of_other_places,
-    reached,
     withdraw,
 )
 from ..stopping.stop import StopLevel
@@ -57,7 +57,7 @@ class Announcement(Program):
 
 
 @contextmanager
-def announced(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
+def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
     """Be found by `announced_engines` while inside; ``press`` carries out the stops that are put down.
 
     Raises
@@ -66,7 +66,7 @@ def announced(address: EngineAddress, what: str, press: Callable[[StopLevel, str
         When the state folder cannot be written: nobody could stop what cannot be found.
     """
     told = Announcement.model_validate({**facts_of_this_process(what), "address": address})
-    with reached(press, told):
+    with announce_program(press, told):
         yield
 
 
@@ -110,7 +110,7 @@ def the_engine(pid: int | None) -> Announcement:
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
         raise EngineError(
-            f"{wanted}; {_named(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
+            f"{wanted}; {_names_of(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
         )
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
@@ -165,11 +165,11 @@ def require_ended(engine: Announcement) -> None:
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:
     if len(chosen) > 1:
-        raise EngineError(f"several programs drive a bench: {_named(chosen)}; name one with --pid")
+        raise EngineError(f"several programs drive a bench: {_names_of(chosen)}; name one with --pid")
     return chosen[0]
 
 
-def _named(programs: Sequence[Program]) -> str:
+def _names_of(programs: Sequence[Program]) -> str:
     return ", ".join(f"{each.pid} ({each.what})" for each in programs)
 
 
@@ -196,7 +196,7 @@ class Hello(FrozenModel):
     role: ConnectionRole = ConnectionRole.VISITING
 
 
-def connected(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
+def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
     """Connect to a running engine and be let in; no answer on the connection may take ``patience_s``."""
     hello = Hello(token=address.token, role=role)
     try:
@@ -210,14 +210,14 @@ def connected(address: EngineAddress, role: ConnectionRole, patience_s: float = 
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     try:
-        exchanged(connection, Message(hello.model_dump_json().encode()))
+        exchange(connection, Message(hello.model_dump_json().encode()))
     except AcquisitionError:
         connection.close()
         raise
     return connection
 
 
-def exchanged(
+def exchange(
     connection: socket.socket, request: Message, work_s: float = 0.0
 ) -> tuple[dict[str, Any], bytes]:
     """Send a request and wait for its answer: the parsed text, and the bytes behind it.
@@ -303,7 +303,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         EngineGone
             When nobody listens there.
         """
-        return cls(connected(address, chosen(ConnectionRole, role), patience_s))
+        return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 
     def status(self) -> EngineStatus:
         """Where the engine stands."""
@@ -330,7 +330,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         """Send a request and wait for its answer."""
         request = verb.message(**arguments)
         with self._asking:
-            return verb.answer.read(*exchanged(self._connection, request, verb.work_s))
+            return verb.answer.read(*exchange(self._connection, request, verb.work_s))
 
 
 TOLD_EVERY_S = 0.02

@@ -184,7 +184,7 @@ class Engine:
             self.published.failed(str(error))
             self._fails(error, EngineState.READY)
             raise
-        self.published.messages.info(_told(point_results))
+        self.published.messages.info(_campaign_in_words(point_results))
         self.published.enter(EngineState.READY)
         return point_results
 
@@ -239,7 +239,7 @@ def _may_end_by_change(campaign: Campaign) -> bool:
     return any(each.limits.on_changed_specimen is OnChange.STOP for _, each in campaign.recordings())
 
 
-def _told(point_results: tuple[PointResult, ...]) -> str:
+def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
     """Say in a line how a campaign came out."""
     counts = {
         result: sum(point_result.outcome is result for point_result in point_results)

@@ -219,7 +219,7 @@ class PublishedState:
     def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
         """Show what is going to happen."""
         self._armed_until_s = monotonic() + plan.expires_in_s
-        self._put_rows(_queued(campaign))
+        self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.ARMED, armed=plan)
 
     def begin(self, campaign: Campaign, folder: Path) -> None:
@@ -231,7 +231,7 @@ class PublishedState:
             name: f"{each.excitation.kind}, {each.excitation.highest_amplitude_vpp:g} Vpp"
             for name, each in campaign.recordings()
         }
-        self._put_rows(_queued(campaign))
+        self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.RUNNING, armed=None, run=None)
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
@@ -329,7 +329,7 @@ def _free_bytes(folder: Path) -> int:
         return 0
 
 
-def _queued(campaign: Campaign) -> tuple[RowStatus, ...]:
+def _queue_rows(campaign: Campaign) -> tuple[RowStatus, ...]:
     names = campaign.recording_names()
     return tuple(RowStatus(name=name, state="queued", reason="", file="") for name in names)
 

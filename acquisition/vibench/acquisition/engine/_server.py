@@ -22,11 +22,11 @@ from pydantic import ValidationError
 
 from ..errors import AcquisitionError
 from ..stopping.program import Watchdog
-from ._client import EngineAddress, Hello, announced
+from ._client import EngineAddress, Hello, announce
 from ._request_handler import RequestHandler
 from ._status import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
-from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireError, receive, refused, send
+from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireError, receive, refusal, send
 
 # Admission: connections without the token are limited in number, time and size.
 # One thread reads them all and buffers at most `WAITING_MOST` x 1 kB. If there are more connections, or the
@@ -152,7 +152,7 @@ class Admission:
             hello = Hello(token="")
         if not hmac.compare_digest(hello.token.encode(), self._token):
             with suppress(OSError):
-                send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))
+                send(connection, refusal("the token is not this engine's; nobody was let in", EngineError()))
             self._turn_away(connection)
             return
         self._forget(connection)
@@ -189,11 +189,11 @@ def answered(handler: RequestHandler, message: Message) -> Message:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        return refused(
+        return refusal(
             f"what was asked is not understood ({where}: {detail['msg']}); nothing was done", error
         )
     except AcquisitionError as error:
-        return refused(str(error), error)
+        return refusal(str(error), error)
 
 
 LOOPBACK = "127.0.0.1"
@@ -300,5 +300,5 @@ def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterato
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))
         inside.enter_context(closing(Watchdog(handler.enforce_deadlines, "engine watchdog")))
-        inside.enter_context(announced(server.address, what, handler.stop))
+        inside.enter_context(announce(server.address, what, handler.stop))
         yield server

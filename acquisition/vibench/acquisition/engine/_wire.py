@@ -83,7 +83,7 @@ class IncomingMessage:
         self._end = self._text_end + payload_bytes
 
 
-def refused(sentence: str, error: Exception) -> Message:
+def refusal(sentence: str, error: Exception) -> Message:
     """Say no, in one sentence."""
     return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
 

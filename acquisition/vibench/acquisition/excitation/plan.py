@@ -66,7 +66,7 @@ def signal_preview(
             f"a preview at {sample_rate_hz:g} samples/s cannot show {highest_frequency_hz:g} Hz; "
             f"ask for more than {2 * highest_frequency_hz:g} samples/s"
         )
-    volts = 0.5 * amplitude_vpp * _sampled(steps, sample_rate_hz)
+    volts = 0.5 * amplitude_vpp * _sample(steps, sample_rate_hz)
     one_sided = np.abs(np.fft.rfft(volts)) * 2 / len(volts)
     one_sided[0] /= 2
     if len(volts) % 2 == 0:
@@ -82,7 +82,7 @@ def signal_preview(
     )
 
 
-def _sampled(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
+def _sample(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
     pieces: list[Samples] = []
     elapsed_s = 0.0
     first = 0

@@ -119,7 +119,7 @@ def with_answer(text: str, key: str, answer: str, note: str) -> str:
     if end == 0:
         raise ConfigurationError(f"the template has no place for {key}; leave it out of the answers")
     header = text.index("\n", begin) + 1
-    return f"{text[:header]}{name} = {_guessed(answer)}  # {note}\n{text[header:]}"
+    return f"{text[:header]}{name} = {_guess_type(answer)}  # {note}\n{text[header:]}"
 
 
 def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
@@ -131,7 +131,7 @@ def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
     return ("daq", "channels", roles.index(role), name)
 
 
-def _guessed(answer: str) -> str:
+def _guess_type(answer: str) -> str:
     """Write an answer to what the template says nothing of: a number where it reads as one."""
     try:
         return _as_toml(answer)
@@ -182,7 +182,7 @@ def _literal(held: str, answer: str, key: str, note: str) -> str:
     value: Any = tomllib.loads(f"value = {held}")["value"]
     match value:
         case str() if "/" in value:  # a sensitivity with its unit
-            return _guessed(answer)
+            return _guess_type(answer)
         case str():
             return json.dumps(answer, ensure_ascii=False)
         case dict():
@@ -230,7 +230,7 @@ def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
             return ()
 
 
-def configured(
+def configure(
     template: Path,
     target: Path,
     seen: InstrumentList,
@@ -257,7 +257,7 @@ def configured(
             text = with_answer(text, question.key, choices[0], "the only one seen")
     while True:
         for question in questions:
-            text = _answered(text, question, found_choices(question, seen), ask, note, refuse)
+            text = _valid_answer(text, question, found_choices(question, seen), ask, note, refuse)
         text = _with_driver(_with_product(text, seen, note), note)
         try:
             from_toml(tomllib.loads(text), Rig, target)
@@ -268,11 +268,11 @@ def configured(
     return load_rig(target)
 
 
-def _answered(
+def _valid_answer(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
     """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
-    while answer := ask(question, choices, _held(text, question.key)):
+    while answer := ask(question, choices, _default_answer(text, question.key)):
         try:
             _require_text(answer, question.key)
             changed = with_answer(text, question.key, answer, note)
@@ -289,7 +289,7 @@ def _require_text(answer: str, key: str) -> None:
         raise ConfigurationError(f"{key}: {answer!a} has a letter that cannot be shown; leave it out")
 
 
-def _held(text: str, key: str) -> str:
+def _default_answer(text: str, key: str) -> str:
     """Show what the template holds; of a number with its source, the number."""
     written = value_in(text, key)
     match tomllib.loads(f"held = {written}")["held"] if written else None:

@@ -45,7 +45,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
 def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
     """Read what stands, or will stand, in a TOML file as ``model``; see `load_toml`."""
-    content = migrated(content, model.__name__, str(path))
+    content = migrate(content, model.__name__, str(path))
     return validated(content, model, str(path), path.absolute().parent)
 
 
@@ -53,7 +53,7 @@ MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = 
 """Name of a model, version of a file: how its content becomes that of the next version."""
 
 
-def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
+def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     """Bring the content of a file that says its version up to the present one.
 
     Raises ConfigurationError when a later vibench wrote it, or what stands there is no version.

@@ -138,11 +138,11 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
 
 
 def _rows(kind: PlugInKind) -> tuple[EntryPoint, ...]:
-    return (*(row for row in OURS if row.group == kind), *_installed(tuple(sys.path))[kind])
+    return (*(row for row in OURS if row.group == kind), *_installed_plug_ins(tuple(sys.path))[kind])
 
 
 @lru_cache(maxsize=1)
-def _installed(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
+def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
     """Read what installed packages offer, once for a path: each channel asks, and a look takes 6 ms."""
     offered = entry_points()
     return {kind: tuple(offered.select(group=kind.value)) for kind in PlugInKind}
@@ -201,7 +201,7 @@ class Guarded:
 
     def _let_through(self, member: str) -> Any:
         found = self._tried(member, lambda: getattr(self._held, member))
-        hint = _promised(self._promise).get(member, Any)
+        hint = _return_types(self._promise).get(member, Any)
         if not callable(getattr(self._promise, member, None)):
             return self._as_promised(member, hint, found)
         return lambda *given, **named: self._as_promised(
@@ -255,7 +255,7 @@ def _taken_part(name: str, hint: Any, value: object) -> Any:
 
 
 @cache
-def _promised(promise: type) -> dict[str, Any]:
+def _return_types(promise: type) -> dict[str, Any]:
     """Return what each member of a protocol returns."""
     members = {name: getattr(promise, name) for name in dir(promise) if name == "__call__" or name[0] != "_"}
     functions = {name: each.fget if isinstance(each, property) else each for name, each in members.items()}

@@ -76,7 +76,7 @@ class Campaign(FrozenModel):
                         "[defaults] lists one kind of excitation under its present and its former name; "
                         "put the values into one table"
                     )
-                measurements = [_filled(each, defaults) for each in _listed(rest, "measurements")]
+                measurements = [_with_defaults(each, defaults) for each in _listed(rest, "measurements")]
                 sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]
                 return {**rest, "measurements": measurements, "sweeps": sweeps}
             case _:
@@ -162,7 +162,7 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
                 {**_of_kind(defaults, each.get("kind")), **each} if isinstance(each, dict) else each
                 for each in _listed(rest, "excitations")
             ]
-            return {**rest, "measurement": _filled(template, defaults), "excitations": others}
+            return {**rest, "measurement": _with_defaults(template, defaults), "excitations": others}
         case _:
             return sweep
 
@@ -176,7 +176,7 @@ def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
             raise ValueError(f"defaults.{kind} is no table; write [defaults.{kind}] and its values below it")
 
 
-def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:
+def _with_defaults(measurement: object, defaults: Mapping[str, Any]) -> object:
     """Put the defaults underneath a measurement's own values."""
     match measurement:
         case dict():

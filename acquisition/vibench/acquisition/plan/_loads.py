@@ -66,7 +66,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
     # All different tones, waveforms and sources of streams of a plan, at their loudest.
-    tones, waveforms, sources = _sorted(step.play for step in excitation.loudest_steps())
+    tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(model, terminal_v, partial(_of_waveform, each, number), _lines_hz(each))
         for number, each in enumerate(waveforms)
@@ -85,7 +85,7 @@ def terminal_volts(excitation: Excitation, rig: Rig) -> float:
     return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
 
 
-def _sorted(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
+def _split_by_kind(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
     """Split plays by kind."""
     tones: set[Tone] = set()
     waveforms: list[Waveform] = []

@@ -239,7 +239,7 @@ class Sweep(FrozenModel):
             name = place.name(self.name)
             measurement = _measurement(self._content(name, place.values), name)
             if SweepAxis.DIRECTION in place.values:
-                turned = _turned(measurement.excitation, place.values[SweepAxis.DIRECTION], name)
+                turned = _set_direction(measurement.excitation, place.values[SweepAxis.DIRECTION], name)
                 measurement = measurement.model_copy(update={"excitation": turned})
             yield Point(name, measurement)
 
@@ -250,12 +250,12 @@ class Sweep(FrozenModel):
         rising = sorted(axes.pop(along))
         for chain in self._places(axes):
             way: list[LeadIn] = []
-            for word, value in _passed(chain.values.get(SweepAxis.DIRECTION), rising):
+            for word, value in _chain_values(chain.values.get(SweepAxis.DIRECTION), rising):
                 there = chain.with_words(DIRECTION=word) if word else chain
                 name = f"{there.name(self.name)}-{self._word(along, value)}"
                 measurement = _measurement(self._content(name, {**chain.values, along: value}), name)
                 passed = way if self.lead_points is None else way[-self.lead_points :]
-                led, tone = _led(measurement.excitation, tuple(passed), self.lead_s, name)
+                led, tone = _with_lead_in(measurement.excitation, tuple(passed), self.lead_s, name)
                 led_there = measurement.model_copy(update={"excitation": led})
                 yield Point(name, led_there, chain.name(self.name))
                 way.append(tone)
@@ -288,7 +288,7 @@ class Sweep(FrozenModel):
         return str(self.measurement.get("excitation", {}).get("kind", "excitation"))
 
 
-def _passed(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
+def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
     """Go through a chain's values, once or up and down; each with the word for its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
@@ -303,7 +303,7 @@ def _passed(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, f
             yield from (*down, *up)
 
 
-def _turned(excitation: Excitation, way: Direction, name: str) -> Excitation:
+def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitation:
     """Let an excitation that moves by itself go the given way."""
     try:
         turned = excitation.turned(way)
@@ -317,7 +317,7 @@ def _turned(excitation: Excitation, way: Direction, name: str) -> Excitation:
     return turned
 
 
-def _led(
+def _with_lead_in(
     excitation: Excitation, way: tuple[LeadIn, ...], lead_s: float, name: str
 ) -> tuple[Excitation, LeadIn]:
     """Lead to a point of a chain through those before it."""

@@ -19,7 +19,7 @@ from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
 from ._disk import Disk
-from ._layout import Column, encoded, json_text
+from ._layout import Column, encode, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
@@ -223,7 +223,7 @@ class TableWriter:
 
 def _raw(column: Column, cell: Cell) -> bytes:
     dtype = np.dtype(column.dtype)
-    value = encoded(cell, dtype.itemsize) if isinstance(cell, str) else cell
+    value = encode(cell, dtype.itemsize) if isinstance(cell, str) else cell
     return np.array(value, dtype=dtype).tobytes()
 
 

@@ -146,14 +146,14 @@ def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
 def configuration_facts(file: h5py.File) -> ConfigurationFacts:
     """Read the texts of the configuration; raises RecordingError."""
     group = file[CONFIGURATION]
-    texts = {name: _parsed(name, read_text_dataset(group, name)) for name in group}
+    texts = {name: _parse(name, read_text_dataset(group, name)) for name in group}
     return _read("the configuration", ConfigurationFacts, texts)
 
 
 def json_object(text: str) -> dict[str, Any]:
     """Read a JSON object of finite numbers that is not deeper than any of ours; raises ValueError."""
     try:
-        value = json.loads(text, parse_constant=_refused, parse_float=_finite)
+        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except RecursionError as error:
         raise ValueError("its lists and objects lie too deep in one another") from error
     if not isinstance(value, dict):
@@ -163,14 +163,14 @@ def json_object(text: str) -> dict[str, Any]:
     return value
 
 
-def _parsed(name: str, text: str) -> dict[str, Any]:
+def _parse(name: str, text: str) -> dict[str, Any]:
     try:
         return json_object(text)
     except ValueError as error:
         raise RecordingError(f"{name} cannot be read: {error}") from error
 
 
-def _refused(constant: str) -> float:
+def _refuse_constant(constant: str) -> float:
     raise ValueError(f"{constant} is no number of JSON")
 
 

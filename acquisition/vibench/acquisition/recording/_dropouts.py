@@ -89,7 +89,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
             )
             for run in _apart(edges, _QUIET_S * sample_rate_hz)
         ]
-        return _explained(velocity, runs, flank, longest) if len(runs) <= _MOST_RUNS else ()
+        return _explain(velocity, runs, flank, longest) if len(runs) <= _MOST_RUNS else ()
 
     found: list[Dropout] = []
     for edges in _apart(far, longest):
@@ -97,10 +97,10 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         for each in [] if together else _apart(edges, flank):
             together += explained(each)
         found += together
-    return _joined(found, flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+    return _join(found, flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
-def _joined(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
+def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
     """Join drop-outs that leave less than a flank between them: what lies there may be dark as well."""
     joined: list[Dropout] = []
     for each in found:
@@ -147,7 +147,7 @@ def _apart(places: Places, distance: float) -> list[Places]:
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
-def _explained(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
+def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
     """Explain all of these runs of sharp corners by drop-outs, or none of them.
 
     By the fewest, and of those by the ones about which the motion is smoothest: between the edges of two a

@@ -30,7 +30,7 @@ from ._layout import (
     DEFLATE_LEVEL,
     RecordingState,
     Table,
-    encoded,
+    encode,
     read_attributes,
     write_attributes,
     write_text_dataset,
@@ -117,24 +117,24 @@ def write_chunks(dataset: h5py.Dataset, pieces: Iterable[Counts]) -> None:
     if dataset.chunks is None:
         return
     length = dataset.chunks[0]
-    for index, raw in enumerate(_compressed(pieces, length)):
+    for index, raw in enumerate(_compress(pieces, length)):
         dataset.id.write_direct_chunk((index * length,), raw)
 
 
-def _compressed(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
+def _compress(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
     """Compressed pieces, in order."""
     workers = os.cpu_count() or 1
     waiting: deque[Future[bytes]] = deque()
     with ThreadPoolExecutor(workers) as pool:
         for piece in pieces:
-            waiting.append(_submitted(pool, piece, length))
+            waiting.append(_submit(pool, piece, length))
             if len(waiting) > workers * IN_FLIGHT_PER_WORKER:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
 
 
-def _submitted(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[bytes]:
+def _submit(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[bytes]:
     """Compress a piece in the pool, or here where the system starts no more threads."""
     try:
         return pool.submit(_chunk, piece, length)
@@ -277,7 +277,7 @@ def _copy_channel(
 ) -> tuple[str, CountOverview]:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
     digest, sums = hashlib.sha256(), OverviewSums()
-    write_chunks(dataset, sums.summed(_hashed(_pieces(source, samples), digest)))
+    write_chunks(dataset, sums.summed(_hash_pieces(_pieces(source, samples), digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)
@@ -291,14 +291,14 @@ def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:
         yield dataset[begin : min(begin + layout.CHUNK_SAMPLES, samples)]
 
 
-def _hashed(pieces: Iterator[Counts], digest: "hashlib._Hash") -> Iterator[Counts]:
+def _hash_pieces(pieces: Iterator[Counts], digest: "hashlib._Hash") -> Iterator[Counts]:
     for piece in pieces:
         digest.update(piece.data)
         yield piece
 
 
 def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
-    columns = tables.clipped(tables.read_columns(source, table), table, samples)
+    columns = tables.clip(tables.read_columns(source, table), table, samples)
     if table is layout.EVENTS and tables.ending(source)[0] is RecordingState.RECORDING:
         last: tuple[str | float, ...] = (samples, time.time(), INTERRUPTED_KIND, INTERRUPTED_REASON)
         return {
@@ -310,7 +310,7 @@ def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
 
 def _cell(dtype: str, value: str | float) -> np.ndarray[tuple[int], np.dtype[np.generic]]:
     kind = np.dtype(dtype)
-    return np.array([encoded(value, kind.itemsize) if isinstance(value, str) else value], dtype=kind)
+    return np.array([encode(value, kind.itemsize) if isinstance(value, str) else value], dtype=kind)
 
 
 def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:

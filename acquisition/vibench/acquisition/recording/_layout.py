@@ -157,7 +157,7 @@ def tmp_of(path: Path) -> Path:
 ELLIPSIS = "…"
 
 
-def encoded(text: str, width: int) -> bytes:
+def encode(text: str, width: int) -> bytes:
     """UTF-8 bytes of ``text``, at most ``width`` of them; what does not fit gives way to an ellipsis."""
     raw = text.replace("\0", "").encode("utf-8", "replace")
     if len(raw) <= width:
@@ -166,7 +166,7 @@ def encoded(text: str, width: int) -> bytes:
     return (raw[:room].decode("utf-8", "ignore") + ELLIPSIS).encode()
 
 
-def decoded(raw: bytes) -> str:
+def decode(raw: bytes) -> str:
     """Text of a fixed-length field, without its padding."""
     return bytes(raw).rstrip(b"\0").decode("utf-8", "replace")
 
@@ -198,13 +198,13 @@ def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:
         if found.shape != () or found.dtype.kind not in READ_KINDS:
             continue
         value = target.attrs[name]
-        values[name] = decoded(value) if isinstance(value, bytes) else np.asarray(value).item()
+        values[name] = decode(value) if isinstance(value, bytes) else np.asarray(value).item()
     return values
 
 
 def write_text_dataset(group: h5py.Group, name: str, text: str) -> None:
     """Store text of any length as a scalar dataset (an attribute ends at 64 KiB)."""
-    raw = encoded(text, len(text.encode()))
+    raw = encode(text, len(text.encode()))
     dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
     group.create_dataset(name, data=np.array(raw, dtype=dtype), dtype=dtype)
 
@@ -214,11 +214,11 @@ def read_text_dataset(group: h5py.Group, name: str) -> str:
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
         raise ValueError(f"{group.name}/{name} is no text")
-    return decoded(dataset[()])
+    return decode(dataset[()])
 
 
 def _write_text(target: h5py.HLObject, name: str, text: str) -> None:
-    raw = encoded(text, len(text.encode()))
+    raw = encode(text, len(text.encode()))
     if len(raw) > ATTRIBUTE_BYTES:
         raise RecordingError(
             f"The text of {name!r} has {len(raw)} bytes; an HDF5 attribute holds at most {ATTRIBUTE_BYTES}."

@@ -73,9 +73,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
     group = file.require_group(layout.OVERVIEW)
     bins = overview.low.size
     if layout.BIN not in group:
-        axis = group.create_dataset(
-            layout.BIN, data=np.arange(bins, dtype=layout.COUNT_DTYPE), **_packed(bins)
-        )
+        axis = group.create_dataset(layout.BIN, data=np.arange(bins, dtype=layout.COUNT_DTYPE), **_pack(bins))
         bin_s = BIN_SAMPLES / sample_rate_hz
         write_attributes(
             axis,
@@ -84,7 +82,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
         axis.make_scale(layout.BIN)
         write_attributes(group, {"samples_per_bin": BIN_SAMPLES})
     for suffix, counts in ((LOW_SUFFIX, overview.low), (HIGH_SUFFIX, overview.high)):
-        dataset = group.create_dataset(role + suffix, data=counts.astype(layout.COUNT_DTYPE), **_packed(bins))
+        dataset = group.create_dataset(role + suffix, data=counts.astype(layout.COUNT_DTYPE), **_pack(bins))
         for name in ("scale_factor", "add_offset", "units"):
             dataset.attrs[name] = file[role].attrs[name]
         dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
@@ -112,7 +110,7 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
     return CountOverview(low, high)
 
 
-def _packed(bins: int) -> dict[str, object]:
+def _pack(bins: int) -> dict[str, object]:
     if bins == 0:
         return {}
     chunk = min(layout.CHUNK_SAMPLES, bins)

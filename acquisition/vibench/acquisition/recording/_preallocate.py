@@ -137,11 +137,11 @@ def _write_layout(file: h5py.File, header: RecordingHeader, capacity: int, reser
     configuration = file.create_group(layout.CONFIGURATION)
     for name, text in header.configuration().items():
         write_text_dataset(configuration, name, text)
-    n_valid = _filled(file, layout.N_VALID, layout.COUNTER_DTYPE, b"\0" * 8)
-    state = _filled(
+    n_valid = _fill(file, layout.N_VALID, layout.COUNTER_DTYPE, b"\0" * 8)
+    state = _fill(
         file, layout.STATE, f"S{layout.STATE_WIDTH}", layout.RecordingState.RECORDING.value.encode()
     )
-    reason = _filled(file, layout.REASON, f"S{layout.TEXT_WIDTH}", b"")
+    reason = _fill(file, layout.REASON, f"S{layout.TEXT_WIDTH}", b"")
     tables = {table.name: _table(file, table) for table in layout.TABLES}
     channels = []
     for channel in header.channels:
@@ -154,12 +154,12 @@ def _write_layout(file: h5py.File, header: RecordingHeader, capacity: int, reser
 
 def _table(file: h5py.File, table: Table) -> TablePlaces:
     group = file.create_group(table.name)
-    n_rows = _filled(group, layout.N_ROWS, layout.COUNTER_DTYPE, b"\0" * 8)
+    n_rows = _fill(group, layout.N_ROWS, layout.COUNTER_DTYPE, b"\0" * 8)
     columns = [_contiguous(group, each.name, each.dtype, table.capacity) for each in table.columns]
     return TablePlaces(table, tuple(column.id.get_offset() for column in columns), n_rows)
 
 
-def _filled(group: h5py.Group, name: str, dtype: str, raw: bytes) -> int:
+def _fill(group: h5py.Group, name: str, dtype: str, raw: bytes) -> int:
     """Create a dataset of one element with a known value; its offset comes back."""
     dataset = _contiguous(group, name, dtype, 1)
     dataset[0] = np.frombuffer(raw.ljust(np.dtype(dtype).itemsize, b"\0"), dtype=dtype)[0]

@@ -473,7 +473,7 @@ def _read(handle: OpenRecording) -> Recording:
     for role in roles:
         _require_channel(file, role, facts.samples, Growth.GROWING if is_part else Growth.FINISHED)
     columns = {
-        table.name: tables.clipped(tables.read_columns(file, table), table, facts.samples)
+        table.name: tables.clip(tables.read_columns(file, table), table, facts.samples)
         for table in layout.TABLES
     }
     for table in layout.TABLES:

@@ -133,7 +133,7 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
     """Seal a finished recording; ``known`` has the checksums of data that was hashed while it was written."""
     manifest = {
         path: {
-            "attributes": _described(item),
+            "attributes": _checksum_of_header(item),
             "data": known[path] if path in known else _data_sha256(item),
         }
         for path, item in _sealed_objects(file)
@@ -236,7 +236,7 @@ def _differing(
         item = found.get(path)
         if item is None:
             yield f"{path} is missing"
-        elif said["attributes"] != _described(item):
+        elif said["attributes"] != _checksum_of_header(item):
             yield f"attributes, type or length of {path}"
         elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and item.nbytes > QUICK_BYTES):
             continue
@@ -244,7 +244,7 @@ def _differing(
             yield f"data of {path}"
 
 
-def _described(item: h5py.HLObject) -> str:
+def _checksum_of_header(item: h5py.HLObject) -> str:
     """Checksum of an object's attributes, type and shape."""
     described: dict[str, Any] = {}
     attributes = item.attrs
@@ -286,7 +286,8 @@ def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
 
 def _result_text(group: h5py.Group) -> str:
     objects = {
-        path: {"attributes": _described(item), "data": _data_sha256(item)} for path, item in walk(group)
+        path: {"attributes": _checksum_of_header(item), "data": _data_sha256(item)}
+        for path, item in walk(group)
     }
     return json.dumps({"recording": seal_of(group.file), "objects": objects}, sort_keys=True)
 

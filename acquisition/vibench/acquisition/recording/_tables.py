@@ -14,7 +14,7 @@ from ..instruments import Overload
 from . import _layout as layout
 from ._committer import Number
 from ._contents import json_object
-from ._layout import Column, RecordingState, Table, decoded
+from ._layout import Column, RecordingState, Table, decode
 
 Columns = dict[str, NDArray[Any]]
 
@@ -139,7 +139,7 @@ def _text(file: h5py.File, name: str) -> str:
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "S":
         raise RecordingError(f"/{name} is no text")
-    return decoded(dataset[0])
+    return decode(dataset[0])
 
 
 def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence[str]) -> None:
@@ -160,7 +160,7 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
         )
 
 
-def clipped(columns: Columns, table: Table, n_valid: int) -> Columns:
+def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     """Keep the same rows without samples past the last valid one.
 
     Rows are written ahead of the counters, so after a crash they may speak of samples that are not
@@ -193,7 +193,7 @@ def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
 def events(columns: Columns) -> tuple[Event, ...]:
     """Rows of ``/events``."""
     return tuple(
-        Event(int(row[0]), float(row[1]), decoded(row[2]), decoded(row[3]))
+        Event(int(row[0]), float(row[1]), decode(row[2]), decode(row[3]))
         for row in zip(*(columns[column.name] for column in layout.EVENTS.columns), strict=True)
     )
 
@@ -202,11 +202,11 @@ def segments(columns: Columns) -> tuple[Segment, ...]:
     """Rows of ``/segments``."""
     return tuple(
         Segment(
-            label=decoded(label),
+            label=decode(label),
             first_sample=int(first),
             last_sample=int(last),
             is_complete=bool(is_complete),
-            numbers=_numbers(decoded(numbers)),
+            numbers=_numbers(decode(numbers)),
         )
         for first, last, is_complete, label, numbers in zip(
             *(columns[column.name] for column in layout.SEGMENTS.columns), strict=True
@@ -225,7 +225,7 @@ def _numbers(text: str) -> dict[str, Number]:
 def overloads(columns: Columns) -> tuple[Overload, ...]:
     """Rows of ``/overloads``."""
     return tuple(
-        Overload(decoded(channel), int(first), int(last))
+        Overload(decode(channel), int(first), int(last))
         for channel, first, last in zip(
             *(columns[column.name] for column in layout.OVERLOADS.columns), strict=True
         )

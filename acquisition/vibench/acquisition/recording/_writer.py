@@ -28,7 +28,7 @@ from ._committer import COMMIT_INTERVAL_S, Batch, Committer, Journal, Number
 from ._disk import Disk, open_disk
 from ._finalise import discard, finalise, whereabouts
 from ._header import ChannelHeader, RecordingHeader
-from ._layout import COUNT_DTYPE, LARGEST_COUNT, RecordingState, encoded
+from ._layout import COUNT_DTYPE, LARGEST_COUNT, RecordingState, encode
 from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
 from ._seal import SealKey, seal_key
 
@@ -346,7 +346,7 @@ class RecordingWriter:
 
     def _write_ending(self, state: RecordingState, reason: str) -> None:
         """State last: a file that says how it ended also says why."""
-        why = encoded(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
+        why = encode(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
         try:
             self._disk.write(self._places.reason, why)
             self._disk.sync()

@@ -249,11 +249,11 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
     if path.exists():
         load_knob_sheet(path)
     knobs = "".join(
-        f"\n[[knobs]]\ninstrument = {_quoted(knob.instrument)}\nsetting = {_quoted(knob.setting)}\n"
-        f"value = {_quoted(knob.value)}\n"
+        f"\n[[knobs]]\ninstrument = {_quote(knob.instrument)}\nsetting = {_quote(knob.setting)}\n"
+        f"value = {_quote(knob.value)}\n"
         for knob in sheet.knobs
     )
-    text = f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
+    text = f"operator = {_quote(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
     try:
         with replace_file(path) as coming:
             coming.write_text(text, encoding="utf-8")
@@ -272,7 +272,7 @@ def _shown(knob: Knob) -> str:
     return f"{knob.instrument} {knob.setting} at {knob.value}"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     printable = "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped)
     return f'"{printable}"'

@@ -40,7 +40,7 @@ from .drive import Drive, drive_for
 from .ending import Ending, Outcome, Progress
 from .limit_monitor import LimitMonitor
 from .phase_runner import GlideWatch, PhaseRunner, Stopped
-from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, judged, require_checkable
+from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figures, require_checkable
 from .until import UntilWatch
 
 ROOM = 1.25
@@ -370,7 +370,7 @@ class Run(ClosedOnLeaving):
         self._silence.learn_hum(phase_samples(before).volts)
         yield from runner.run_phase(settling)
         yield from runner.run_phase(measuring, during)
-        figures = judged(
+        figures = check_figures(
             self._bench.rig,
             self._bench.channels,
             phase_samples(before).volts,

@@ -60,7 +60,7 @@ class CheckFigures:
         )
 
 
-def judged(
+def check_figures(
     rig: Rig,
     channels: tuple[Channel, ...],
     quiet: Samples,

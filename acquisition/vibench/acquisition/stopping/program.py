@@ -254,12 +254,12 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
         if path.suffix != ".json" or not path.is_file():  # a pipe would be waited for
             continue
         try:
-            yield path, model.model_validate_json(_told(path))
+            yield path, model.model_validate_json(_read_stop(path))
         except (ValueError, OSError):  # another version's, of another kind, or ended in between
             continue
 
 
-def _told(path: Path) -> bytes:
+def _read_stop(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except PermissionError:  # started as root, say: who may write in this folder may stop it all the same
@@ -334,11 +334,11 @@ class _Reached:
             elif self._mark is None:
                 with self._changing:
                     if self._inside:
-                        self._mark = _marked(_path(self._inside[0][1]))
+                        self._mark = _lock(_path(self._inside[0][1]))
 
     def _announce(self, program: Program) -> None:
         self._unmark()  # Windows replaces no file that is open
-        self._mark = _marked(_write(program))
+        self._mark = _lock(_write(program))
 
     def _unmark(self) -> None:
         mark, self._mark = self._mark, None
@@ -354,7 +354,7 @@ _REACHED = _Reached()
 
 
 @contextmanager
-def reached(press: Press, program: Program) -> Iterator[None]:
+def announce_program(press: Press, program: Program) -> Iterator[None]:
     """While inside, be found by `announced_programs`, and let ``press`` carry out the stops put down for it.
 
     Raises
@@ -380,7 +380,7 @@ def _path(program: Program) -> Path:
     return engines_folder() / f"{program.pid}.{program.process_start}.json"
 
 
-def _marked(path: Path) -> OpenFile | None:
+def _lock(path: Path) -> OpenFile | None:
     """Lock a file for as long as this process lives; None where it is not to be had, now or at all."""
     try:
         file = OpenFile(path)
@@ -453,7 +453,7 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
         switch.ask(StopRequest(Cause.OPERATOR, level, reason))
 
     program = Program.model_validate(facts_of_this_process(what))
-    with _signals(switch), reached(press, program):
+    with _signals(switch), announce_program(press, program):
         yield
 
 
