@@ -110,7 +110,7 @@ def the_engine(pid: int | None) -> Announcement:
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
         raise EngineError(
-            f"{wanted}; {_names_of(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
+            f"{wanted}; {_named(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
         )
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
@@ -165,11 +165,11 @@ def require_ended(engine: Announcement) -> None:
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:
     if len(chosen) > 1:
-        raise EngineError(f"several programs drive a bench: {_names_of(chosen)}; name one with --pid")
+        raise EngineError(f"several programs drive a bench: {_named(chosen)}; name one with --pid")
     return chosen[0]
 
 
-def _names_of(programs: Sequence[Program]) -> str:
+def _named(programs: Sequence[Program]) -> str:
     return ", ".join(f"{each.pid} ({each.what})" for each in programs)
 
 
