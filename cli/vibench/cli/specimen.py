@@ -53,7 +53,7 @@ def show_specimen(
     else:
         console.print(": ".join(filter(None, (table.name, table.about))))
         for name, value in facts.items():
-            console.print(f"  {_heading(name)}: {_value_in_words(value)}")
+            console.print(f"  {_heading(name)}: {_text(value)}")
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
@@ -102,17 +102,12 @@ def _heading(name: str) -> str:
     return f"{words} [{_UNITS[ending]}]" if ending else words
 
 
-def _value_in_words(value: object) -> str:
+def _text(value: object) -> str:
     match value:
         case {"kind": kind, **numbers}:
-            return ", ".join(
-                [str(kind), *(f"{name} {_value_in_words(each)}" for name, each in numbers.items())]
-            )
+            return ", ".join([str(kind), *(f"{name} {_text(each)}" for name, each in numbers.items())])
         case list() | tuple():
-            return ", ".join(
-                f"({_value_in_words(each)})" if isinstance(each, tuple) else _value_in_words(each)
-                for each in value
-            )
+            return ", ".join(f"({_text(each)})" if isinstance(each, tuple) else _text(each) for each in value)
         case float():
             return f"{value:.6g}"
         case _:

@@ -79,9 +79,7 @@ def stop(
         deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
         for program, delivery in zip(programs, deliveries, strict=True):
             try:
-                console.print(
-                    _stop_in_words(f"{program.what}, process {program.pid}", delivery.result(), level)
-                )
+                console.print(_words(f"{program.what}, process {program.pid}", delivery.result(), level))
             except AcquisitionError as error:
                 failures.append(error)
     if elsewhere := out_of_reach():
@@ -92,7 +90,7 @@ def stop(
         raise EngineSilent(". ".join(map(str, failures)))
 
 
-def _stop_in_words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
+def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
     match delivery:
         case StopDelivery.KEPT:
             raise EngineSilent(

@@ -113,13 +113,13 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
     for number in range(len(plan.accelerations_m_per_s2)):
-        followed = (yield from _follow(loop, plan, number, last, last.mode)) if last.mode else None
+        followed = (yield from _go_on(loop, plan, number, last, last.mode)) if last.mode else None
         last = followed or (yield from _search(loop, plan, number, last))
     yield from loop.ramp_down()
     yield from loop.say()
 
 
-def _follow(
+def _go_on(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
 ) -> Controller[TrackedPlace | None]:
     """Go to the next level under the phase-locked loop and record there; None far off the resonance."""

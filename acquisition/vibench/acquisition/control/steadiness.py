@@ -259,15 +259,13 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
         if len(points) < window:
             break
         figures = _clusters(points[-window:], period, noise)
-        if period > 1 and not _differ(points[-window:], period, _largest_scatter(figures, rule.tolerance)):
+        if period > 1 and not _differ(points[-window:], period, _limit(figures, rule.tolerance)):
             continue
         if period == 1:
             unsettled = replace(figures, steadiness=Steadiness.UNSETTLED, period=0)
         if _repeats(figures, rule.tolerance):
             return figures
-    if len(points) >= rule.aperiodic_periods and unsettled.scatter > _largest_scatter(
-        unsettled, rule.tolerance
-    ):
+    if len(points) >= rule.aperiodic_periods and unsettled.scatter > _limit(unsettled, rule.tolerance):
         return _stationary(points[-rule.aperiodic_periods :], unsettled)
     return unsettled
 
@@ -326,12 +324,12 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
-    allowed = _largest_scatter(figures, tolerance)
+    allowed = _limit(figures, tolerance)
     # The means of thirds differ by chance as well; noise is allowed to them as far as it explains that.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
-def _largest_scatter(figures: Judgement, tolerance: float) -> float:
+def _limit(figures: Judgement, tolerance: float) -> float:
     """Return the scatter up to which a motion repeats as far as can be seen."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 

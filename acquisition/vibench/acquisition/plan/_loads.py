@@ -86,7 +86,6 @@ def terminal_volts(excitation: Excitation, rig: Rig) -> float:
 
 
 def _split_by_kind(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
-    """Split plays by kind."""
     tones: set[Tone] = set()
     waveforms: list[Waveform] = []
     sources: list[SampleSource] = []

@@ -122,7 +122,6 @@ def write_chunks(dataset: h5py.Dataset, pieces: Iterable[Counts]) -> None:
 
 
 def _compress(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
-    """Compressed pieces, in order."""
     workers = os.cpu_count() or 1
     waiting: deque[Future[bytes]] = deque()
     with ThreadPoolExecutor(workers) as pool:

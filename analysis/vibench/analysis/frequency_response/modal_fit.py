@@ -391,7 +391,7 @@ def modal_fit(
         return None
     found, left = factors(poles)
     # How the lines follow poles and factors together, and with what covariance.
-    follows = np.hstack((_slopes(lambda moved: basis(moved) @ found, poles), basis(poles)))
+    follows = np.hstack((_rates(lambda moved: basis(moved) @ found, poles), basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
     if freedom < 1 or np.linalg.cond(_normalise(curvature)) > _WORST_CONDITION:
@@ -425,9 +425,7 @@ def modal_fit(
             fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
             top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
         value = curve(top_hz, poles) @ found
-        changes = np.hstack(
-            (_slopes(lambda moved: curve(top_hz, moved) @ found, poles), curve(top_hz, poles))
-        )
+        changes = np.hstack((_rates(lambda moved: curve(top_hz, moved) @ found, poles), curve(top_hz, poles)))
         along = np.real(np.conj(value / np.abs(value))[:, None] * changes)[0]
         return Resonance(
             frequency_hz=natural_hz,
@@ -452,7 +450,7 @@ def _normalise(curvature: Reals) -> Reals:
     return np.asarray(curvature / np.outer(size, size))
 
 
-def _slopes(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
+def _rates(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
     """Return how a shape follows each pole, by central differences."""
     steps = _STEP * np.eye(poles.size)
     return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)

@@ -205,7 +205,6 @@ def _sine_difference(
     measured: SweptMotion | DwellResponse | SteppedResponse,
     simulated: SweptMotion | DwellResponse | SteppedResponse,
 ) -> CurveDifference:
-    """Compare Responses II."""
     (quantity,) = (each for each in compared if each.name == RESPONSE_II)
     sd, sd_simulated = (
         np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, simulated)

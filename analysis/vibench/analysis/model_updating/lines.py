@@ -47,7 +47,7 @@ Model = Callable[[Specimen, Reals, Reals], Complexes]
 """m0 over base at frequencies, of a specimen and of further numbers."""
 
 
-def chained_response(
+def loaded_response(
     specimen: Specimen, frequency_hz: Reals, extra_n_per_m: tuple[Complexes | float, ...]
 ) -> Complexes:
     """m0 over base of a specimen with more hung on its masses, shape (lines,).
@@ -65,7 +65,7 @@ def chained_response(
 
 def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
     """Return the three masses alone."""
-    return chained_response(specimen, frequency_hz, (0.0, 0.0))
+    return loaded_response(specimen, frequency_hz, (0.0, 0.0))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from vibench.sim import Specimen
 
 from ..signals.arrays import Complexes, Reals
-from .lines import Descended, Freedom, Lines, chained_response, fit_lines_further, own_response
+from .lines import Descended, Freedom, Lines, fit_lines_further, loaded_response, own_response
 from .parameters import DAMPERS, MASSES, SHOWN, Parameter, parameter_value
 
 TOLD_APART = 2.0 * float(np.log(20.0))
@@ -189,13 +189,13 @@ def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
 
 
 def _on_m0(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return chained_response(
+    return loaded_response(
         specimen, frequency_hz, (_absorber(specimen.masses[0], frequency_hz, further), 0.0)
     )
 
 
 def _on_m2(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
-    return chained_response(
+    return loaded_response(
         specimen, frequency_hz, (0.0, _absorber(specimen.masses[2], frequency_hz, further))
     )
 

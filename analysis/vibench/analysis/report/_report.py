@@ -173,7 +173,7 @@ def _count(count: int, noun: str) -> str:
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
     """Draw each map, with the levels and Responses I of everything that was measured under many sines."""
     levels = [
-        RecordedLevel(each.analysis.facts.name, level, tuple(_measured_curves(each, CurveKind.RESPONSE_I)))
+        RecordedLevel(each.analysis.facts.name, level, tuple(_curves(each, CurveKind.RESPONSE_I)))
         for each in results.in_order
         if len(level := drive_level(each)) > 1
     ]
@@ -182,7 +182,7 @@ def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[
         yield replace(drawn, name=f"map_{number}")
 
 
-def _measured_curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
+def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
     measured = ANALYSES[result.kind].curves(
         result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
     )
@@ -194,18 +194,18 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
-            yield replace(_backbone(results, diagram), name=f"branches_{number}")
+            yield replace(_backbones(results, diagram), name=f"branches_{number}")
             continue
         if diagram.request.along is not Parameter.FREQUENCY or not levels:
             yield replace(branches_figure(diagram), name=f"branches_{number}")
             continue
-        curves = [curve for result, _ in levels for curve in _measured_curves(result)]
+        curves = [curve for result, _ in levels for curve in _curves(result)]
         drawn = branches_figure(diagram, curves)
         said = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
         yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {said}")
 
 
-def _backbone(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
+def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
     """Draw a phase resonance beneath those that were tracked around it."""
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]

@@ -87,14 +87,14 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     twin = begin.pushed(pushes(begin.specimen, begin.drive, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
-        pressed = _at_stop(begin.specimen, beside.states) & _at_stop(begin.specimen, stretch.states)
+        pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
         apart_m = np.abs(beside.states[~pressed, :3] - stretch.states[~pressed, :3]).max(initial=0.0)
         if not apart_m < PARTED * size_m:
             return True
     return False
 
 
-def _at_stop(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
+def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
     """Say of each state, shape (n, 6), whether m1 is at a stop: there lanes give the flight after it."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]

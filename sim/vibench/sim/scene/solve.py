@@ -399,7 +399,7 @@ class _Begun:
             duration_s=run.time_s,
             window_s=window.length_s,
             settled_s=seen.settled_s,
-            ended=_end_in_words(seen, ensemble),
+            ended=_ending(seen, ensemble),
             integration_error=finite_or_none(errors.integration),
             scatter=scatter,
             lyapunov_per_s=finite_or_none(exponent.exponent_per_s) if exponent is not None else None,
@@ -454,7 +454,7 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
             return lasting(seen.motion, escape)
 
 
-def _end_in_words(seen: SceneRun, ensemble: Ensemble | None) -> str:
+def _ending(seen: SceneRun, ensemble: Ensemble | None) -> str:
     if seen.motion is MotionKind.CHAOTIC and ensemble is not None and ensemble.escape is not None:
         return f"{seen.ended} (mean lifetime above {ensemble.escape.lifetime_above_s:.3g} s)"
     return seen.ended

@@ -37,7 +37,6 @@ class DaqmxSystem:
     """Everything one driver knows; used with the rig's lock held."""
 
     def __init__(self, rig: Rig) -> None:
-        """Begin without tasks."""
         self.rig = rig
         self.catalogue = rig.catalogue
         self.tasks: dict[str, Task] = {}

@@ -213,7 +213,6 @@ class Catalogue:
     _by_name: dict[str, Device] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Index the devices."""
         object.__setattr__(self, "_by_name", {device.name.lower(): device for device in self.devices})
 
     def find(self, name: str) -> Device | None:

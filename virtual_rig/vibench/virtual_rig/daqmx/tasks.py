@@ -89,7 +89,6 @@ class Task:
     """One task; every method is called with the rig's lock held."""
 
     def __init__(self, name: str, rig: Rig) -> None:
-        """Begin empty and unverified."""
         self.name = name
         self.rig = rig
         self.state = TaskState.UNVERIFIED

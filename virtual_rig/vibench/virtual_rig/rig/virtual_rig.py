@@ -160,7 +160,6 @@ class VirtualRig:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Switch everything off."""
         running, self._running = self._running, None
         if running is not None:
             running.closing.close()
