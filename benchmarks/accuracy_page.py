@@ -205,5 +205,6 @@ def main() -> None:
     picture = Path(os.path.relpath(pictures[0], given.markdown.parent)).as_posix()
     given.markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
 
+
 if __name__ == "__main__":
     main()

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
 from vibench.acquisition.bench.instrument_list import InstrumentList
 from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.first_day.configured import QUESTIONS, configured, value_in, with_answer
+from vibench.acquisition.first_day.configured import QUESTIONS, configure, value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app
@@ -88,7 +88,7 @@ def test_a_wire_that_is_not_plugged_in_ends_the_day(tmp_path, wired):
 
 def test_a_file_beside_the_target_is_left_alone(tmp_path):
     (tmp_path / "lab.toml.draft").write_text("mine")
-    configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+    configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
     assert (tmp_path / "lab.toml.draft").read_text() == "mine"
 
 
@@ -180,7 +180,7 @@ def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path):
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
     try:
         with pytest.raises(ConfigurationError, match="File too large"):
-            configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+            configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
@@ -211,7 +211,7 @@ def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_pa
 
 def test_what_is_seen_alone_is_proposed_and_its_driver_and_product_entered(tmp_path):
     only = seen("USB0::2391::11271::MY5::0::INSTR")
-    rig = configured(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
     assert rig.generator.driver == "keysight33500b"
     assert (rig.daq.device, rig.daq.product) == ("cDAQ9Mod2", "NI 9234")
@@ -224,7 +224,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_nothing_is_written(tmp_path)
         return "ten" if question.key == "amplifier.gain_db" else ""
 
     with pytest.raises(ConfigurationError, match=r"amplifier\.gain_db: 'ten' is no number"):
-        configured(LAB, tmp_path / "lab.toml", seen(), ask, "note")
+        configure(LAB, tmp_path / "lab.toml", seen(), ask, "note")
     assert not list(tmp_path.iterdir())
 
 
@@ -233,14 +233,14 @@ def test_a_value_that_a_bench_cannot_have_is_refused_and_nothing_is_written(tmp_
         return "-5" if question.key == "generator.settle_s" else ""
 
     with pytest.raises(ConfigurationError, match=r"generator\.settle_s"):
-        configured(LAB, tmp_path / "lab.toml", seen(), ask, "note")
+        configure(LAB, tmp_path / "lab.toml", seen(), ask, "note")
     assert not list(tmp_path.iterdir())
 
 
 def asked_of_a_person(tmp_path, given):
     """Answer each question by its list of answers, one after the other, then as it is; hear what is wrong."""
     wrong = []
-    rig = configured(
+    rig = configure(
         LAB,
         tmp_path / "lab.toml",
         seen(),
@@ -281,7 +281,7 @@ def test_a_broken_package_of_somebody_s_does_not_end_the_first_day(tmp_path, mon
     (metadata / "entry_points.txt").write_text("[vibench.generators]\nbroken = no_such_module:Driver\n")
     monkeypatch.syspath_prepend(tmp_path)
     only = seen("USB0::2391::11271::MY5::0::INSTR")
-    rig = configured(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.driver == "keysight33500b"
 
 

@@ -26,7 +26,7 @@ from vibench.acquisition.first_day.configured import (
     QUESTIONS,
     DayPage,
     Question,
-    configured,
+    configure,
     first_day,
     in_a_command,
 )
@@ -36,7 +36,7 @@ from vibench.sim import toml_table
 from vibench.sim.operating_system.this import replace_file
 
 from .output import console, paragraph
-from .paths import unused
+from .paths import free_path
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
@@ -128,7 +128,7 @@ def _operator_at_terminal() -> str:
 
 @_allow_interrupt()
 def _configure(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
-    return configured(template, target, seen, _ask, note, refuse=_report_refusal)
+    return configure(template, target, seen, _ask, note, refuse=_report_refusal)
 
 
 def _report_refusal(error: ConfigurationError) -> None:
@@ -164,12 +164,12 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     if given is None:
         rig = _configure(template, target, seen, note)
     else:
-        rig = configured(template, target, seen, given.ask, note, given.questions)
+        rig = configure(template, target, seen, given.ask, note, given.questions)
     console.print()
     console.print(f"written: {target}")
     console.print()
     page = _day(rig, target, operator, given)
-    kept = unused(target.with_suffix(".first_day.md"))
+    kept = free_path(target.with_suffix(".first_day.md"))
     with replace_file(kept) as coming:
         coming.write_text(page.text, encoding="utf-8")
     console.print(paragraph(page.text))

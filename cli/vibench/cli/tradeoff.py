@@ -27,7 +27,7 @@ from .options import Fields, RequestOptions, option, validated
 from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder
 from .progress_bars import show_bars
-from .specimen_option import AXES, SPECIMEN, described
+from .specimen_option import AXES, SPECIMEN, read_specimen
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
@@ -89,7 +89,7 @@ def _study(said: Mapping[str, Any]) -> Study:
     return validated(
         Study,
         {
-            "specimen": described(said.get("specimen")),
+            "specimen": read_specimen(said.get("specimen")),
             **{axis: (said[name],) for axis, name in AXES.items() if name in said},
             "amplitudes_m": (said["amplitude"],),
             "frequencies_hz": (said["frequency"],),

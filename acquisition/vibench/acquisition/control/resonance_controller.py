@@ -233,7 +233,9 @@ def _search(
         # Back from the flanks before the recording: the next level begins where this one ends.
         move(loop, found.frequency_hz, level)
         found = yield from settling_controller.settled()
-    yield from record_settled(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    yield from record_settled(
+        settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s
+    )
     periods = round(sum(each.waited_s * each.drive_hz for each in states))
     _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
     if lock is not LockResult.LOCKED:
