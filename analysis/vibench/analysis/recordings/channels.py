@@ -19,7 +19,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 ACCELEROMETER_DAMPING_RATIO = 0.02
-"""Accelerometer damping ratio of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
+"""Damping ratio of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
