@@ -31,6 +31,8 @@ from vibench.sim.study._results import results_of
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 
+from distributed import Client
+
 from vibench.sim.study._cluster import ClusterExecutor
 
 START_PATIENCE_S = 60.0
@@ -70,10 +72,12 @@ def worker(address, folder, environment=None):
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A scheduler and two workers; what is left of them is ended."""
+    """A scheduler and two workers that have joined it; what is left of them is ended."""
     with ExitStack() as stack:
         running, address = stack.enter_context(scheduler(tmp_path))
         workers = [stack.enter_context(worker(address, tmp_path)) for _ in range(2)]
+        with Client(address, timeout=START_PATIENCE_S, set_as_default=False) as client:
+            client.wait_for_workers(len(workers), timeout=START_PATIENCE_S)
         yield running, address, workers
 
 
