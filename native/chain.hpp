@@ -749,7 +749,7 @@ class ChainRun {
       while (length * kind.power.stiffest_rate(magnitude(p) + outward * length, 0.0, t.inverse_pair) > WALL_TURN)
         length *= SHORTER_STEP;
       step.length = length;
-      misfit = step.attempt(c, vibench::step_tolerance(m.tolerance, kind.tables.specimen));
+      misfit = step.attempt(c, fit_tolerance(m.tolerance, kind.tables.specimen));
     }
     if (!(misfit <= 1.0)) return 0.0;
     bool is_fine = misfit < TRY_LONGER;

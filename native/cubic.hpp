@@ -341,7 +341,7 @@ template <class T, class Stops> class CubicRun {
   // Under a power law: the piece as one step, or as halves of halves of it.
   Outcome push_on(const CubicForce<double> &force, double length, bool is_whole, T &tau) {
     const CubicPowerTables &of = *t.power;
-    PowerStep<T> step{t, of, step_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
+    PowerStep<T> step{t, of, fit_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
     step.begin_at(m);
     int level = int(m.powers.level);
     StepNumbers part;

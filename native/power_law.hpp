@@ -24,6 +24,11 @@ constexpr double WALL_TURN = 5.0;  // a step turns the stiffest spring on its wa
 constexpr double FADING = 0.98;    // how much of its past size a motion keeps from step to step
 constexpr double SMALLEST_PART = 1e-3;  // a displacement counts as at least this part of the largest one
 constexpr double NOTHING_MOVES = 1e-150;
+constexpr double FINEST_FIT = 1e-10;  // of undamped motions: behind a steep wall a finer fit is lost in rounding
+
+INLINE double fit_tolerance(double tolerance, const Specimen &s) {
+  return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
+}
 
 // ---- The law: F = sum force_i (p / reference)^exponent_i, by Horner's scheme in (p / reference)^2.
 
@@ -388,7 +393,7 @@ template <class T> class PowerRun {
   Observer observer;
 
   Outcome go_on(double until) {
-    PowerStep<T> step{t, of, step_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
+    PowerStep<T> step{t, of, fit_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
     int level = m.powers.level > 0.0 ? int(m.powers.level) - 1 : FIRST_LEVEL;
     begin(step);
     Outcome outcome = REACHED_END;

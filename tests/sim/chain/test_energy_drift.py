@@ -67,6 +67,18 @@ def test_no_law_drive_or_level_changes_the_energy_of_an_undamped_motion(contact,
             assert chain_energies(chain, run.final_state).sum() == pytest.approx(before, rel=1e-5)
 
 
+@pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
+def test_an_undamped_motion_deep_in_a_steep_wall_is_followed_at_every_level(accuracy):
+    """At reference its steps asked for more than the digits of a number hold, and the run stalled."""
+    specimen = gong2025(damping_time_s=0.0, contact="power:47")
+    chain = chain_of(specimen, 1)
+    start = np.array([0.0, 1.5 * specimen.gap_m, 0.0, 0.0, 0.0, 0.0])
+    run = integrate(specimen, STILL, 0.02, accuracy, start)
+    assert run.outcome is Outcome.REACHED_END
+    after, before = (chain_energies(chain, each[None]).sum() for each in (run.final_state, start))
+    assert after == pytest.approx(before, rel=1e-6)
+
+
 @pytest.mark.parametrize("contact", ["power:5", "power:29", "hertz", "linear_gap:2e5"])
 @pytest.mark.parametrize("gaps", [3.0, 1e3, 1e6])
 def test_a_motion_that_cannot_be_followed_ends_where_it_was_last_known(contact, gaps):
