@@ -267,6 +267,22 @@ def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_ot
     assert found.ensemble is None
 
 
+def test_small_changes_count_in_the_steps_of_a_run(monkeypatch):
+    """A step with small changes takes four times as long, and images of a period had no limit together."""
+    monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 100_000)
+    plain, tangent, mapped = (
+        FollowedRun(gong2025(), Harmonic(130.0, 1e-6), 1e-6, np.zeros(6)) for _ in range(3)
+    )
+    tangent.follow_tangent()
+    for run in (plain, tangent):
+        run.follow(100.0)
+        assert run.outcome is Outcome.TOO_LONG
+    assert 3.0 < plain.time_s / tangent.time_s < 5.0
+    images = [mapped.image(100)[0] for _ in range(9)]
+    assert np.all(np.isfinite(images[0]))
+    assert np.all(np.isnan(images[-1]))
+
+
 def test_rest_is_named_in_the_answer():
     assert solve_scene(scene_of("linear", 50.0, 1e-6, start=Rest())).start == "rest"
 

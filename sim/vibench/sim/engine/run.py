@@ -106,8 +106,8 @@ class RunRecord:
 
     @property
     def steps_left(self) -> int:
-        """Steps that may still be made."""
-        return int(self.structure["steps_left"])
+        """Steps that may still be made; the last one may have counted for more than were left."""
+        return max(0, int(self.structure["steps_left"]))
 
     @property
     def peak_x_m(self) -> float:

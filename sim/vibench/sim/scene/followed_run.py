@@ -43,6 +43,8 @@ STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 """Below this tolerance contacts cost this many times more."""
 STEP = 1e-9
 """Seconds for a step of flight, at least: what counts where a mode is far faster than those of the paper."""
+TANGENT_STEPS = 4
+"""Steps that one with small changes counts as where they are limited: it takes as long."""
 
 
 def nominal_cost_s(
@@ -202,18 +204,20 @@ class FollowedRun:
         """Advance to an instant; a run that has failed stays where it is."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
+        counts_as = TANGENT_STEPS if len(self._run.growth) else 1
+        steps = self._steps_left // counts_as
         record = RunRecord(
             most_impacts(MAX_IMPACT_RATE_HZ, until_s - start_s),
             start_s=kept.first_s,
             sample_rate_hz=kept.rate_hz,
             samples=kept.count,
-            steps=self._steps_left,
+            steps=steps,
         )
         record.watch(observe)
         if self.outcome is Outcome.REACHED_END:
             self.outcome = self._run.advance(until_s, record)
-        made = self._steps_left - record.steps_left
-        self._steps_left -= made
+        made = steps - record.steps_left
+        self._steps_left -= counts_as * made
         self.cost_s += nominal_cost_s(
             self.specimen.contact,
             self.tolerance,
@@ -242,8 +246,11 @@ class FollowedRun:
         run, frequency_hz = self._run.apart(), self.drive.frequency_hz
         until_s = (round(self.time_s * frequency_hz) + drive_periods) / frequency_hz
         run.carry(np.eye(DIRECTIONS))
-        record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s))
-        if run.advance(until_s, record) is not Outcome.REACHED_END:
+        steps = self._steps_left // TANGENT_STEPS
+        record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s), steps=steps)
+        outcome = run.advance(until_s, record)
+        self._steps_left -= TANGENT_STEPS * (steps - record.steps_left)
+        if outcome is not Outcome.REACHED_END:
             return np.full(DIRECTIONS, np.nan), np.full((DIRECTIONS, DIRECTIONS), np.nan)
         return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
 
