@@ -242,7 +242,7 @@ class FollowedRun:
         )
 
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
-        """Return the state after so many drive periods, and its derivative by the state now; NaN if lost."""
+        """Return the state `drive_periods` later, and its derivative by the state now; NaN if lost."""
         run, frequency_hz = self._run.apart(), self.drive.frequency_hz
         until_s = (round(self.time_s * frequency_hz) + drive_periods) / frequency_hz
         run.carry(np.eye(DIRECTIONS))
