@@ -7,6 +7,7 @@ from scipy.io import savemat, wavfile
 
 from vibench.acquisition import open_recording, validated
 from vibench.analysis import InvalidRequest, analyse
+from vibench.analysis.errors import UnusableData
 from vibench.analysis.exchange import ImportMapping, import_recording
 from vibench.analysis.recordings.checks import Verdict
 
@@ -298,3 +299,65 @@ def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, 
     else:
         assert check.verdict is Verdict.NOTE
         assert ("m0_velocity is not known" in check.text) == (not full_scale)
+
+
+def restarted_tdms(path, more, at):
+    """Write two channels in segments; the last one states other properties."""
+    values = motion(np.arange(SAMPLES) / RATE_HZ)
+    start = np.datetime64("2026-03-01T12:00:00", "us")
+    about = {"wf_increment": 1 / RATE_HZ, "wf_start_time": start, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(path) as writer:
+        for number, part in enumerate((slice(0, at), slice(at, SAMPLES))):
+            said = about | (more(start) if number else {})
+            writer.write_segment([nptdms.ChannelObject("g", name, values[part], said) for name in ("a", "b")])
+    return values
+
+
+@pytest.mark.parametrize("at", [500, 7001])
+@pytest.mark.parametrize("fact", ["wf_start_time", "wf_start_offset"])
+@pytest.mark.parametrize("paused", [0, 640, 5120])
+def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, at, paused):
+    path = tmp_path / "a.tdms"
+    later_s = (at + paused) / RATE_HZ
+
+    def more(start):
+        return {fact: start + np.timedelta64(round(later_s * 1e6), "us") if "time" in fact else later_s}
+
+    values = restarted_tdms(path, more, at)
+    with open_recording(import_recording(path, mapped("tdms", RATE_HZ), tmp_path / "made.h5")) as recording:
+        drive = recording.read("drive_voltage")
+    assert np.isnan(drive).sum() == paused
+    np.testing.assert_allclose(drive[at + paused :], values[at:], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        lambda _: {"wf_increment": 1.01 / RATE_HZ},
+        lambda start: {"wf_start_time": start + np.timedelta64(1_234_567, "us")},
+        lambda start: {"wf_start_time": start - np.timedelta64(10, "s")},
+        lambda start: {"wf_start_time": start + np.timedelta64(1, "D")},
+    ],
+    ids=["another rate", "between samples", "backward", "another day"],
+)
+def test_segments_of_a_tdms_file_that_fit_no_axis_are_refused(tmp_path, more):
+    restarted_tdms(tmp_path / "a.tdms", more, 7001)
+    with pytest.raises(InvalidRequest, match=r"samples/s|starts again|go back|intervals and"):
+        import_recording(tmp_path / "a.tdms", mapped("tdms", RATE_HZ), tmp_path / "made.h5")
+
+
+def test_further_samples_of_a_wav_or_mat_file_are_refused(tmp_path):
+    path = write("wav", tmp_path, "sound", np.random.default_rng(0))
+    content = path.read_bytes()
+    path.write_bytes(content + b"data" + (64).to_bytes(4, "little") + bytes(64))
+    with pytest.raises(UnusableData, match="samples in several chunks"):
+        import_recording(path, mapped("wav", RATE_HZ), tmp_path / "made.h5")
+    for form in ("4", "5"):
+        path = tmp_path / f"{form}.mat"
+        with path.open("wb") as file:
+            for times in (np.arange(SAMPLES), np.arange(SAMPLES) + SAMPLES):
+                savemat(file, {"t": times / RATE_HZ, "a": motion(times), "b": motion(times)}, format=form)
+        meaning = mapped("h5", RATE_HZ).model_dump()
+        meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
+        with pytest.raises(UnusableData, match="several variables called"):
+            import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")

@@ -1,7 +1,7 @@
 """Channels of a file on one time axis: aligned by the times in the file, or refused."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -330,6 +330,28 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
             kept.append(Piece(first + back, place + back, stop - first - back))
         end = max(end, place + stop - first)
     return tuple(kept)
+
+
+def restarts(
+    starts_s: Mapping[int, float], rate_hz: float | None, samples: int
+) -> tuple[tuple[tuple[int, int], ...], str]:
+    """Return the runs of a channel that states its start at some samples, and why they cannot be placed."""
+    runs = [(0, 0)]
+    first_s = stated_s = next(iter(starts_s.values()), 0.0)
+    for sample, start_s in starts_s.items():
+        if start_s == stated_s:
+            continue
+        stated_s = start_s
+        if rate_hz is None:
+            return (), f"states another start at sample {sample}, and no sample rate"
+        place = min((start_s - first_s) * rate_hz, float(FARTHEST))
+        if abs(place - round(place)) > _PLACED:
+            return (), f"starts again at sample {sample}, {place:.3f} sample intervals after its first start"
+        before, there = runs[-1]
+        if round(place) - sample != there - before:
+            runs.append((sample, round(place)))
+    before, there = runs[-1]
+    return tuple(runs), _impossible(runs, samples, there + samples - before)
 
 
 _APART = 0.1

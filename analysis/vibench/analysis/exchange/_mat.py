@@ -14,12 +14,12 @@ from typing import Any
 
 import h5py
 import numpy as np
-from scipy.io import loadmat, savemat
+from scipy.io import loadmat, savemat, whosmat
 from scipy.io.matlab import MatReadError
 
 from vibench.acquisition.recording import ChannelHeader
 
-from ..errors import InvalidRequest
+from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._alignment import stated_rate_hz, told_start_s
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
@@ -198,6 +198,11 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         return
     require_whole(path)
     try:
+        names = [name for name, *_ in whosmat(path)]
+        if twice := next((each for each in names if names.count(each) > 1), None):
+            raise UnusableData(
+                f"{path.name} holds several variables called {twice!r}; save each under a name of its own"
+            )
         content = loadmat(path, simplify_cells=True)
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
         raise ValueError(str(error)) from error

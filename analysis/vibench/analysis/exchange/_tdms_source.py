@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_rate_hz, told_start_s
+from ._alignment import restarts, stated_rate_hz, told_start_s
 from ._source_channel import SourceChannel
 
 SIGNATURE = b"TDSm"
@@ -46,6 +46,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
     try:
         import nptdms.log  # noqa: PLC0415 - an optional extra
         from nptdms import TdmsFile  # noqa: PLC0415 - as above
+        from nptdms.reader import TdmsReader  # noqa: PLC0415 - as above
     except ImportError as error:
         raise InvalidRequest(
             f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
@@ -58,30 +59,58 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         # It writes what it doubts to standard error, at any length; what matters, it raises.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
+        statements: dict[str, dict[int, list[tuple[str, Any]]]] = {}
+
+        class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
+            """Keep what each segment states, by the sample that follows; npTDMS keeps the last statement."""
+
+            def _update_object_metadata(self, segment: Any) -> None:
+                self._before = {path: each.num_values for path, each in self.object_metadata.items()}
+                super()._update_object_metadata(segment)
+
+            def _update_object_properties(self, properties: Any) -> None:
+                super()._update_object_properties(properties)
+                for name in properties or ():
+                    stated = _plain(self.object_metadata[name].properties)
+                    statements.setdefault(name, {})[self._before.get(name, 0)] = stated
+
+        raw.seek(0)
+        _StatementsReader(raw).read_metadata()
         found = [
             each
             for group in file.groups()
             for each in group.channels()
             if len(each) > 1 and each.dtype.kind in "iuf"
         ]
-        yield TdmsSource({_channel(file, each): each for each in found})
+        yield TdmsSource({_channel(file, each, statements): each for each in found})
 
 
-def _channel(file: Any, channel: Any) -> SourceChannel:
+def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]]) -> SourceChannel:
     own = channel.properties
-    facts = [
-        *own.items(),
-        *file[channel.group_name].properties.items(),
-        *file.properties.items(),
-    ]
+    # One without properties has no entry; properties after the last sample describe all of them.
+    stated = statements[channel.path] if own else {}
+    parts = {first: each for first, each in stated.items() if first < len(channel)}
+    paths = (channel.path, file[channel.group_name].path, "/")
+    facts = [fact for path in paths for each in statements.get(path, {}).values() for fact in each]
     rate_hz, trouble = stated_rate_hz(facts)
+    starts_s = {first: start for first, each in parts.items() if (start := told_start_s(each)) is not None}
+    runs, jumps = restarts(starts_s, rate_hz, len(channel))
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
         sample_rate_hz=rate_hz,
         unit=str(own.get(UNIT, "")),
-        start_s=told_start_s(own.items()),
+        start_s=next(iter(starts_s.values()), told_start_s(own.items())),
         start_error_s=START_ERROR_S,
-        time_trouble=trouble,
+        runs=runs,
+        time_trouble=trouble or jumps,
     )
+
+
+def _plain(properties: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the facts of a segment, its times as npTDMS gives those of a file."""
+    return [
+        (name, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
+        for name, value in properties.items()
+    ]
