@@ -361,3 +361,23 @@ def test_further_samples_of_a_wav_or_mat_file_are_refused(tmp_path):
         meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
         with pytest.raises(UnusableData, match="several variables called"):
             import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")
+
+
+@pytest.mark.parametrize(
+    ("at_s", "length_s", "share"),
+    [(8.0, 0.1, 0.47), (6.0, 0.1, 0.47), (3.0, 0.02, 0.2), (4.5, 0.1, 0.05), (4.5, 0.1, 0.0)],
+)
+def test_a_dwell_with_a_burst_is_not_called_periodic(tmp_path, at_s, length_s, share):
+    rng = np.random.default_rng(4343)
+    times = np.arange(64_000) / 5120.0
+    phase = 2 * np.pi * 260.0 * times
+    velocity = np.cos(phase + 1.0) * (1 + share * ((times > at_s) & (times < at_s + length_s)))
+    velocity += 1e-5 * rng.standard_normal(times.size)
+    base = 3.0 * np.cos(phase + 0.4) + 1e-4 * rng.standard_normal(times.size)
+    content = dwell_at(tmp_path / "a.csv", np.cos(phase), base, velocity).model_dump()
+    content["measurement"]["excitation"]["duration_s"] = 11.0
+    meaning = validated(content, ImportMapping, "test")
+    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
+        verdict = analyse(recording).motion.verdict
+    assert (verdict.kind == "periodic") == (share == 0), verdict.why
+    assert ("burst" in verdict.why) == (share > 0)

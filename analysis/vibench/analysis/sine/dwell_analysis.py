@@ -8,13 +8,13 @@ import numpy as np
 from vibench.acquisition.plan import Dwell, HeldDwell
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos.period import Points, shortest_period
+from ..chaos.period import LONGEST_PERIOD, Points, shortest_period
 from ..chaos.verdict import MotionKind, MotionVerdict, begin_of_last_motion, motion_verdict
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.channels import Channels, only_stretch, read_whole
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
-from ..signals.arrays import Reals
+from ..signals.arrays import Flags, Reals
 from ..signals.envelope import Envelope, envelope
 from ..signals.interpolation import REACH, interpolate
 from ..signals.quantity import Quantity, converted_signal
@@ -35,6 +35,13 @@ BAND_ABOVE = 0.25
 
 _CLEAR_MOTION = 0.8
 """Part of a dwell that must lie clear of drop-outs where its motion does not repeat."""
+
+_BURST = 15.0
+"""Median deviations by which the largest of many maxima of noise does not lie above their median."""
+_LEAST_RISE = 0.01
+"""Part of its usual maximum by which |x| rises in a burst."""
+_FEWEST_BLOCKS = 5
+"""Maxima that have a median deviation."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +143,16 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     bridged = channels.bridged(stretch.start, stretch.stop)
-    clear = np.mean(clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz))
+    is_clear = clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz)
+    clear = np.mean(is_clear)
+    # Few points of a short burst look like noise, and its maximum may lie outside of the window.
+    rise = _largest_rise(response, is_clear, verdict.evidence.periods)
+    if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
+        why = (
+            f"the motion repeats except for a burst, in which |x| rises {100 * rise:.2g} % above its usual "
+            "maximum; find the disturbance and dwell again"
+        )
+        verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
     # Bridges make no motion repeat, but one that repeats irregular.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
@@ -145,6 +161,22 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
         )
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why)
     return DwellMotion(section, verdict)
+
+
+def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> float:
+    """Return the rise of |x| over the median of its maxima, relative to it; 0 where scatter explains it."""
+    motion = response.displacement
+    size = np.where(is_clear, np.abs(motion.samples), 0.0)[motion.edge_samples : -motion.edge_samples]
+    block = round(LONGEST_PERIOD * motion.sample_rate_hz / response.drive.frequency_hz)
+    blocks = min(size.size // block, periods // LONGEST_PERIOD)
+    largest = np.max(size[size.size - blocks * block :].reshape(blocks, block), axis=1)
+    largest = largest[largest > 0.0]
+    if largest.size < _FEWEST_BLOCKS:
+        return 0.0
+    usual = float(np.median(largest))
+    rise = float(np.max(largest)) - usual
+    scatter = float(np.median(np.abs(largest - usual)))
+    return rise / usual if rise > _BURST * scatter else 0.0
 
 
 @dataclass(frozen=True)
