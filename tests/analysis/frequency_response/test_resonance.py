@@ -1,7 +1,9 @@
 """Resonances: exact on exact curves, as scattered as stated on noisy ones, silent where there is none."""
 
 import dataclasses
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,6 +178,19 @@ def test_close_modes_are_not_one(apart_hz, shares):
     assert len(found) > 1
     for each in found:
         assert min(np.max(np.abs(_z(each, *mode[:2]))) for mode in modes) < 3.5
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_boxcar_does_not_merge_close_modes(seed):
+    coverage = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks" / "resonance_coverage.py"))
+    (number, scene) = next(
+        (number, scene)
+        for number, (name, scene) in enumerate(coverage["scenes"]())
+        if name.startswith("boxcar") and "close 2 Hz (1.0, -0.7)" in name
+    )
+    found = coverage["scores"](*scene, np.random.default_rng((77, number, seed)))
+    assert len(found["errors"]) == 2
+    assert np.max(np.abs(found["errors"])) < 3.5
 
 
 def test_a_fit_that_does_not_describe_the_lines_gives_its_chi_square():

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import scipy
@@ -265,7 +266,9 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        starts = [np.vstack((rest, two.reshape(2, 2))) for two in _split_poles(poles[worst : worst + 1], 2)]
+        # One pole for two may end beside both: split also where it started.
+        split = (_split_poles(each[worst : worst + 1], 2) for each in (poles, starts[0]))
+        starts = [np.vstack((rest, two.reshape(2, 2))) for two in chain.from_iterable(split)]
     return best
 
 
