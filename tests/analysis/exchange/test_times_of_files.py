@@ -359,7 +359,7 @@ def test_further_samples_of_a_wav_or_mat_file_are_refused(tmp_path):
                 savemat(file, {"t": times / RATE_HZ, "a": motion(times), "b": motion(times)}, format=form)
         meaning = mapped("h5", RATE_HZ).model_dump()
         meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
-        with pytest.raises(UnusableData, match="several variables called"):
+        with pytest.raises(UnusableData, match="several variables of one name"):
             import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")
 
 

@@ -337,21 +337,15 @@ def restarts(
 ) -> tuple[tuple[tuple[int, int], ...], str]:
     """Return the runs of a channel that states its start at some samples, and why they cannot be placed."""
     runs = [(0, 0)]
-    first_s = stated_s = next(iter(starts_s.values()), 0.0)
-    for sample, start_s in starts_s.items():
-        if start_s == stated_s:
+    first_s = next(iter(starts_s.values()), 0.0)
+    for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):
+        place = min((start_s - first_s) * (rate_hz or nan), float(FARTHEST))
+        if start_s == before_s or abs(place - sample - runs[-1][1] + runs[-1][0]) < _PLACED:
             continue
-        stated_s = start_s
-        if rate_hz is None:
-            return (), f"states another start at sample {sample}, and no sample rate"
-        place = min((start_s - first_s) * rate_hz, float(FARTHEST))
-        if abs(place - round(place)) > _PLACED:
+        if not abs(place - np.rint(place)) <= _PLACED:
             return (), f"starts again at sample {sample}, {place:.3f} sample intervals after its first start"
-        before, there = runs[-1]
-        if round(place) - sample != there - before:
-            runs.append((sample, round(place)))
-    before, there = runs[-1]
-    return tuple(runs), _impossible(runs, samples, there + samples - before)
+        runs.append((sample, round(place)))
+    return tuple(runs), _impossible(runs, samples, runs[-1][1] + samples - runs[-1][0])
 
 
 _APART = 0.1

@@ -19,7 +19,7 @@ from scipy.io.matlab import MatReadError
 
 from vibench.acquisition.recording import ChannelHeader
 
-from ..errors import InvalidRequest, UnusableData
+from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._alignment import stated_rate_hz, told_start_s
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
@@ -199,10 +199,8 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     require_whole(path)
     try:
         names = [name for name, *_ in whosmat(path)]
-        if twice := next((each for each in names if names.count(each) > 1), None):
-            raise UnusableData(
-                f"{path.name} holds several variables called {twice!r}; save each under a name of its own"
-            )
+        if len(set(names)) < len(names):
+            raise ValueError("it has several variables of one name")
         content = loadmat(path, simplify_cells=True)
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
         raise ValueError(str(error)) from error

@@ -59,7 +59,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         # It writes what it doubts to standard error, at any length; what matters, it raises.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
-        statements: dict[str, dict[int, list[tuple[str, Any]]]] = {}
+        statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
             """Keep what each segment states, by the sample that follows; npTDMS keeps the last statement."""
@@ -71,8 +71,11 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
                 for name in properties or ():
-                    stated = _plain(self.object_metadata[name].properties)
-                    statements.setdefault(name, {})[self._before.get(name, 0)] = stated
+                    # The text of a time of npTDMS is a second off near the end of a second.
+                    statements.setdefault(name, {})[self._before.get(name, 0)] = tuple(
+                        (each, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
+                        for each, value in self.object_metadata[name].properties.items()
+                    )
 
         raw.seek(0)
         _StatementsReader(raw).read_metadata()
@@ -87,13 +90,14 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
 
 def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]]) -> SourceChannel:
     own = channel.properties
-    # One without properties has no entry; properties after the last sample describe all of them.
-    stated = statements[channel.path] if own else {}
-    parts = {first: each for first, each in stated.items() if first < len(channel)}
     paths = (channel.path, file[channel.group_name].path, "/")
     facts = [fact for path in paths for each in statements.get(path, {}).values() for fact in each]
     rate_hz, trouble = stated_rate_hz(facts)
-    starts_s = {first: start for first, each in parts.items() if (start := told_start_s(each)) is not None}
+    starts_s = {
+        first: start_s
+        for first, each in (statements[channel.path] if own else {}).items()
+        if (start_s := told_start_s(each)) is not None and first < len(channel)
+    }
     runs, jumps = restarts(starts_s, rate_hz, len(channel))
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
@@ -106,11 +110,3 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
         runs=runs,
         time_trouble=trouble or jumps,
     )
-
-
-def _plain(properties: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Return the facts of a segment, its times as npTDMS gives those of a file."""
-    return [
-        (name, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
-        for name, value in properties.items()
-    ]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
-from ..errors import InvalidRequest, UnusableData
+from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel
@@ -108,28 +108,25 @@ def open_wav(path: Path) -> Iterator[WavSource]:
 
 
 def _require_whole(path: Path) -> None:
-    """Raise ValueError when a file ends before its samples do, and UnusableData for several chunks of them.
-
-    Its reader says what is no WAV at all.
-    """
+    """Raise ValueError when a file ends before its samples do, or has several chunks of them."""
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
         file.seek(FIRST_CHUNK)
-        found = 0
+        chunks = 0
         while order is not None:
             name, told = file.read(4), file.read(4)
-            if not name or len(told) < len(name):
-                if found:
+            if len(told) < len(name) or not name:
+                if chunks:
                     return
                 raise ValueError("it ends before its samples")
             (size,) = struct.unpack(f"{order}I", told)
             left = path.stat().st_size - file.tell()
-            if left < size != UNKNOWN_SIZE and not found:
+            if left < size != UNKNOWN_SIZE and not chunks:
                 what = "of samples" if name == b"data" else "about its samples"
                 raise ValueError(f"it announces {size} bytes {what}, and {left} follow")
-            found += name == b"data"
-            if found > 1:
-                raise UnusableData(f"{path.name} holds samples in several chunks; export them as one")
+            chunks += name == b"data"
+            if chunks > 1:
+                raise ValueError("it has samples in several chunks; only one can be read")
             file.seek(size + size % 2, os.SEEK_CUR)
 
 

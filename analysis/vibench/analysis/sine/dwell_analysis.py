@@ -40,8 +40,6 @@ _BURST = 15.0
 """Median deviations by which the largest of many maxima of noise does not lie above their median."""
 _LEAST_RISE = 0.01
 """Part of its usual maximum by which |x| rises in a burst."""
-_FEWEST_BLOCKS = 5
-"""Maxima that have a median deviation."""
 
 
 @dataclass(frozen=True)
@@ -148,10 +146,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     # Few points of a short burst look like noise, and its maximum may lie outside of the window.
     rise = _largest_rise(response, is_clear, verdict.evidence.periods)
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
-        why = (
-            f"the motion repeats except for a burst, in which |x| rises {100 * rise:.2g} % above its usual "
-            "maximum; find the disturbance and dwell again"
-        )
+        why = f"|x| rises {100 * rise:.2g} % above its usual maximum in a burst; find its cause, dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
     # Bridges make no motion repeat, but one that repeats irregular.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
@@ -171,12 +166,10 @@ def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> flo
     blocks = min(size.size // block, periods // LONGEST_PERIOD)
     largest = np.max(size[size.size - blocks * block :].reshape(blocks, block), axis=1)
     largest = largest[largest > 0.0]
-    if largest.size < _FEWEST_BLOCKS:
+    if not largest.size:
         return 0.0
-    usual = float(np.median(largest))
-    rise = float(np.max(largest)) - usual
-    scatter = float(np.median(np.abs(largest - usual)))
-    return rise / usual if rise > _BURST * scatter else 0.0
+    off = largest / np.median(largest) - 1
+    return float(np.max(off)) if np.max(off) > _BURST * np.median(np.abs(off)) else 0.0
 
 
 @dataclass(frozen=True)
