@@ -156,7 +156,10 @@ def without_plan(file):
     ("change", "said"),
     [
         (newer, "format version 99; this vibench reads version 1. Update"),
-        (renamed, "no channel m0_velocity; the recording has drive_voltage, base_acceleration, laser"),
+        (
+            renamed,
+            "no channel shows the motion of m0: the recording has drive_voltage, base_acceleration, laser",
+        ),
         (
             without_scale,
             "physical_per_volt of the channel 'm0_velocity': input should be a finite number; it is 'nan'",

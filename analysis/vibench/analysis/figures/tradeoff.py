@@ -18,7 +18,15 @@ _LEAST = 1e-14
 
 
 def curve_figure(points: Sequence[CurvePoint], scene: str) -> DrawnFigure:
-    """Draw the error of the responses over time, a line for each method and a ring around the choice."""
+    """Draw the error of the responses over time, a line for each method and a ring around the choice.
+
+    Parameters
+    ----------
+    points
+        Error and processor time of each method, as `vibench tradeoff` measured them.
+    scene
+        Name of the scene, for the title.
+    """
     methods = list(dict.fromkeys(each.method for each in points))
     with styled():
         figure = new_figure(4.6)

@@ -40,7 +40,7 @@ class Search(NamedTuple):
     """Where it was found without a contact model."""
     claimed: float = 1.0
     """Part of the standard deviation that a filter claims which its errors have; parameters that wander look
-    less certain than they are. Found on 31 random rigs; held against others by the slow tests."""
+    less certain than they are. Found on 31 random rigs; checked on others by the slow tests."""
 
 
 SEARCHES = {

@@ -25,9 +25,9 @@ from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSetti
 # contact its acceleration steps, and changes its slope. The shape of that kink is the same for every
 # impact, and the smooth motion between impacts is far slower. So the smooth motion is taken away by a sixth
 # difference, the kinks are looked for by their shape, and the strongest is taken away first, then the next
-# one, until only noise is left: neighbours a tenth of a millisecond apart are told from one another.
+# one, until only noise is left: neighbours a tenth of a millisecond apart are distinguished.
 #
-# Held against simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to
+# Checked against simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to
 # 99 % of the impacts are counted where there are 330 to 1800 a second, and none where there are none.
 # What is lost is weak: grazing contacts, which change m0's motion less than the noise does, are not seen.
 

@@ -471,7 +471,7 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
-    # Noise of the voltage's channel would shake the simulated table: only what surely is voltage is played.
+    # Noise of this channel would shake the simulated table: only lines far above it are played.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
     played = np.asarray(np.fft.irfft(spectrum, volts.size))

@@ -100,7 +100,7 @@ class TargetReport:
     time_s: float
     """Since the request."""
     starts: int
-    """Starts in the mean; 1 where the start is not forgotten."""
+    """Number of starts that are averaged; 1 where the start is not forgotten."""
     is_met: bool
     """The error is what was requested, or less."""
     needed_s: tuple[float, float, float] | None

@@ -53,7 +53,7 @@ ITERATIONS = 8
 MOST_PUSH = 1000.0
 """Drive amplitudes that stand for the gap, at most, where other starts are drawn."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""The motion from the start is looked at every so many drive periods, whenever its time has doubled up to
+"""The motion from the start is looked at after this many drive periods, whenever its time has doubled up to
 looks of this length, and then after this share of its way."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
 SAME, ALIKE = 1e-3, 1e-2
@@ -231,7 +231,7 @@ class _Refinement:
         return parts
 
     def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
-        """Observe so many drive periods of a motion; None where time has run out."""
+        """Observe a number of drive periods of a motion; None where time has run out."""
         begins = run.apart()
         made = round(run.time_s * self._frequency_hz)
         parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
@@ -269,7 +269,7 @@ class _Refinement:
         return bool(now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE))
 
     def _newton(self, period: int) -> _Orbit | None:
-        """Find the stable motion of so many drive periods, or of fewer, near where the motion is now."""
+        """Find the stable motion of this many drive periods, or of fewer, near where the motion is now."""
         cost_s = NEWTON_COST * self._main.cost_s / self._main.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None

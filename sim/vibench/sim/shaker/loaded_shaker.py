@@ -139,7 +139,7 @@ class ShakenMotion:
     ends: FloatArray
     """Shape (steps, 9), columns MOTION_COLUMNS, at the ends of the steps; no rows unless asked for."""
     begun: FloatArray
-    """Contacts begun up to the end of each block of steps, shape (blocks,); none unless asked for."""
+    """Number of contacts up to the end of each block of steps, shape (blocks,); none unless asked for."""
 
     @classmethod
     def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
@@ -253,7 +253,7 @@ class LoadedShaker:
         end_rows
             For how many steps, counted from the first, the state at their ends is kept.
         block
-            Steps of a block, at the end of which the contacts begun are kept; 0 for none.
+            Steps of a block, at the end of which the number of contacts is kept; 0 for none.
 
         Raises
         ------
