@@ -77,9 +77,9 @@ def write(folder):
         export_samples(excerpt(recording), Format.NEXUS, folder / "new.nxs")
 """,
     "spectrum": """
-from vibench.analysis.dynamics._dynamics_file import _created
+from vibench.analysis.dynamics._dynamics_file import _new_file
 def write(folder):
-    with _created(folder / "new.h5", "spectrum", "{}", 1.0) as file:
+    with _new_file(folder / "new.h5", "spectrum", "{}", 1.0) as file:
         file["column"] = [0.0] * 9
 """,
     "study": """

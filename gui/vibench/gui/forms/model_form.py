@@ -7,7 +7,7 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from vibench.sim import SpecimenWarning
@@ -260,7 +260,8 @@ class OptionalGroupEditor(GroupEditor):
         self._there = QCheckBox(f"Give {facts.label.lower()}")
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
-        self._layout.insertWidget(0, self._there)
+        # No wider than its words: a form may be wider than a small window.
+        self._layout.insertWidget(0, self._there, alignment=Qt.AlignmentFlag.AlignLeft)
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
         self.form.hide()
