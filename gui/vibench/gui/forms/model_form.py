@@ -228,9 +228,11 @@ class GroupEditor:
     def _turn(self, *_: object) -> None:
         """Change the kind; fields of the same name keep their values."""
         assert self._kind is not None
-        left = self.form.content()
+        left, chosen = self.form.content(), self._kind.content()
+        if chosen is None:  # a heading
+            self._kind.show_content(left["kind"])
+            return
         self._memories[left["kind"]] = left
-        chosen = self._kind.content()
         known_of = self._memories.get(chosen, self._fresh.get(chosen, {}))
         self._memory = {**self._usual, **self._memory, **left}
         model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)

@@ -43,6 +43,13 @@ def test_kinds_stand_below_headings_that_cannot_be_chosen_with_a_line_on_each(fo
     assert box.currentData() == form.value.excitation.kind
 
 
+def test_a_heading_that_becomes_current_leaves_the_kind_as_it_was(form):
+    box = form.form.editors["excitation"].kind_choice
+    kind = form.value.excitation.kind
+    box.setCurrentIndex(box.findText("STEPS"))
+    assert (box.currentData(), form.value.excitation.kind) == (kind, kind)
+
+
 @pytest.mark.parametrize("word", EXCITATION_KINDS)
 def test_a_new_kind_has_its_name_and_values_that_the_rig_allows(form, word):
     choose(form, "dwell" if word != "dwell" else "white_noise")
