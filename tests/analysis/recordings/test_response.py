@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tests.analysis.conftest import A0_STRONG, DWELL_PART, NOISE, dwell_plan, synthetic
-from vibench.acquisition import open_recording
+from vibench.acquisition import Overload, open_recording
 from vibench.acquisition.plan import WhiteNoise
 from vibench.analysis import Simulation, analyse_files
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.recordings.channels import RecordedChannels
 from vibench.analysis.recordings.response import ResponseChannel
 
 RATE = synthetic.RATE
@@ -78,6 +80,40 @@ def test_what_is_read_does_not_depend_on_where_it_begins(dwell_motions, tmp_path
     np.testing.assert_array_equal(part, whole[10_001:23_456])
     # In the first second the transient moves slower than 5 Hz, too.
     assert np.abs(whole - velocity)[round(RATE) : -64].max() < 2e-3 * np.abs(velocity).max()
+
+
+def test_a_clipped_acceleration_marks_all_that_its_integral_reaches(dwell_motions, tmp_path):
+    motion, velocity, _ = dwell_motions["strong"]
+    path = synthetic.write_recording(
+        tmp_path,
+        dwell_plan(A0_STRONG),
+        motion,
+        accelerations(velocity),
+        [DWELL_PART],
+        response=ACCELERATION,
+        overloads=(Overload("m0_acceleration", 16_000, 16_002),),
+    )
+    with open_recording(path) as recording:
+        marks = RecordedChannels(recording).overloaded(0, recording.samples)
+    assert np.flatnonzero(marks)[[0, -1]].tolist() == [16_000 - RATE, 16_002 + RATE]
+
+
+def test_an_acceleration_of_half_a_second_is_refused(dwell_motions, tmp_path):
+    motion, velocity, _ = dwell_motions["weak"]
+    path = synthetic.write_recording(
+        tmp_path,
+        dwell_plan(0.5e-6),
+        motion,
+        accelerations(velocity),
+        [],
+        response=ACCELERATION,
+        samples=round(RATE / 2),
+    )
+    with (
+        open_recording(path) as recording,
+        pytest.raises(UnusableData, match=r"0\.5 s of m0_acceleration are too short .* record more than 1 s"),
+    ):
+        ResponseChannel(recording)
 
 
 def test_samples_near_a_hole_are_not_told(dwell_motions, tmp_path):

@@ -55,9 +55,10 @@ class PhaseLaw:
     The phase of a motion over its drive drifts by ``2 pi L (r - f) - h e`` in a look of the time L: f the
     frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
     forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
-    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. Of the n-th
-    harmonic r and w are taken at the drive, and L is n times as long. Of a subharmonic e is that of this many
-    times its phase, r and w are taken at the drive as well, and a look has this many times the drives.
+    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. For the n-th
+    harmonic, r and w refer to the drive (the mode's, divided by n), and L is n times as long. For a
+    subharmonic of order n, e is the error of n times its phase, r and w refer to the drive again, and a look
+    has n times as many drive periods.
 
     A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
     follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and

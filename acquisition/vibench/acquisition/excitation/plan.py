@@ -236,7 +236,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the same in a direction; None where the excitation has none of its own, or not this one."""
+        """Return the same excitation in this direction; None where its kind has no direction, or not this."""
         del direction
         return None
 

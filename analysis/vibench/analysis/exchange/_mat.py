@@ -236,7 +236,7 @@ def _holds_samples(values: np.ndarray[Any, Any]) -> bool:
 
 
 def _channels(name: str, values: np.ndarray[Any, Any], unit: str) -> Iterator[tuple[SourceChannel, Any]]:
-    """Yield the rows or columns of a matrix, whichever are the fewer, as numbers of their own."""
+    """Yield a channel for each row of a matrix, or for each column where there are fewer columns."""
     rows = np.atleast_2d(values) if values.ndim == 1 or values.shape[0] < values.shape[1] else values.T
     label = name.removesuffix(".values").rsplit(".", 1)[-1]
     for number, row in enumerate(rows, start=1):

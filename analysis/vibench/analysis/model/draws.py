@@ -51,8 +51,8 @@ class PlayedVoltage:
     The converter's noise did not shake the table: simulated under the voltage as recorded, with as much added
     for what is not known of it, a weak motion is lifted twice too much by noise. Frame by frame and line by
     line the part that is likely stays (Wiener's filter; all of what certainly is no noise), and what that
-    leaves open is drawn: draws scatter as far as the voltage is not known, and their power is that of the
-    recording less the converter's.
+    leaves open is drawn. So draws scatter by the uncertainty of the voltage, and their power is that of the
+    recording without the converter's noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:

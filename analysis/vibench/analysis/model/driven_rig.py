@@ -47,8 +47,7 @@ class DrivenRig:
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
     """Return what the recorded voltage was played into.
 
-    Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with, or does
-    not hold the velocity of m0.
+    Raises UnusableData when the recording does not name its shaker or amplifier, or has no velocity of m0.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ def largest_of_chance(largest: Reals) -> float:
 
     The quantile of Gumbel's distribution with their mean and deviation, widened because few draws determine
     these poorly: without that, one draw more lies beyond in 2 % of all cases for 16 draws, 5 % for five. The
-    factor is that of simulated draws, to 1 %, and the same for every location and scale.
+    factor was fitted to simulated draws, to 1 %. It does not depend on location or scale.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)

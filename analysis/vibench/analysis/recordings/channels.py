@@ -181,7 +181,10 @@ class RecordedChannels:
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, self._response.role):
-                marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
+                # A clipped peak of an acceleration shifts the velocity as far as its integral reaches.
+                reach = self._response.reach if each.channel == self._response.role else 0
+                first, last = each.first_sample - reach, each.last_sample + reach
+                marks[max(0, first - start) : max(0, last + 1 - start)] = True
         for dropout in self._response.dropouts(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = False
         return marks

@@ -49,22 +49,14 @@ def derivative_kernel(rate_hz: float) -> Reals:
     return np.concatenate((-half[::-1], [0.0], half))
 
 
-@dataclass(frozen=True)
-class _Conversion:
-    """How samples of one quantity become velocities."""
-
-    kernel: Callable[[float], Reals]
-    about: float
-    """Samples beyond an end are ``about`` times the last one, minus the mirrored ones."""
-
-
-_CONVERSIONS: MappingProxyType[str, _Conversion] = MappingProxyType(
+_CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = MappingProxyType(
     {
         # Mirrored with the opposite sign, the velocity goes on as it was, backwards in time.
-        ACCELERATION: _Conversion(integral_kernel, 0.0),
-        DISPLACEMENT: _Conversion(derivative_kernel, 2.0),
+        ACCELERATION: (integral_kernel, 0.0),
+        DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
+"""Kernel, and ``about``: samples beyond an end are this times the last one, minus the mirrored ones."""
 
 
 @dataclass(eq=False)
@@ -74,12 +66,11 @@ class ResponseChannel:
     An acceleration is integrated, which makes its noise grow towards low frequencies; a displacement is
     differentiated, which makes it grow towards high ones. Both happen with zero phase.
 
-    Raises UnusableData when the recording has none of them.
+    Raises UnusableData when the recording has none of them, or is too short to integrate.
     """
 
     recording: Recording
     role: str = field(init=False)
-    _conversion: _Conversion | None = field(init=False, default=None)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
     """Number and velocities of the block that was made last: estimators read one after the other."""
@@ -92,39 +83,49 @@ class ResponseChannel:
                 f"an analysis needs one of {', '.join(RESPONSE_ROLES)}"
             )
         self.role = found
-        self._conversion = _CONVERSIONS.get(found)
-        if self._conversion is not None:
-            self._kernel = self._conversion.kernel(self.recording.sample_rate_hz)
+        if found in _CONVERSIONS:
+            self._kernel = _CONVERSIONS[found][0](self.recording.sample_rate_hz)
+        if found in _CONVERSIONS and self.recording.samples <= self.reach:
+            raise UnusableData(
+                f"{self.recording.duration_s:.3g} s of {found} are too short for the velocity of m0; record "
+                f"more than {self.reach / self.recording.sample_rate_hz:.3g} s"
+            )
+
+    @property
+    def reach(self) -> int:
+        """Number of samples on either side that a velocity depends on."""
+        return self._kernel.size // 2
 
     def read(self, start: int, stop: int) -> Reals:
         """Give velocities [m/s], shape (samples,); lost samples are NaN, a vibrometer's drop-outs bridged."""
-        if self._conversion is None:
+        if self.role not in _CONVERSIONS:
             return BridgedChannel(self.recording, self.role).read(start, stop)
         size = max(_BLOCK_REACHES * self._kernel.size, _LEAST_BLOCK)
         parts = [np.empty(0)]
         for number in range(start // size, -(-stop // size)):
             first = number * size
-            block = self._velocities(self._conversion, number, size)
+            block = self._velocities(number, size)
             parts.append(block[max(start - first, 0) : stop - first])
         return np.concatenate(parts)
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
         """Give the drop-outs that reach into these samples; only light drops out."""
-        if self._conversion is not None:
+        if self.role in _CONVERSIONS:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
 
-    def _velocities(self, conversion: _Conversion, number: int, size: int) -> Reals:
+    def _velocities(self, number: int, size: int) -> Reals:
         if self._block is None or self._block[0] != number:
-            reach, samples = self._kernel.size // 2, self.recording.samples
+            reach, samples = self.reach, self.recording.samples
             start, stop = number * size, min((number + 1) * size, samples)
             first, last = max(start - reach, 0), min(stop + reach, samples)
             given = self.recording.read(self.role, first, last)
             lost = np.isnan(given)
             given = np.where(lost, 0.0, given - (0.0 if lost.all() else np.nanmean(given)))
             before, behind = first - (start - reach), (stop + reach) - last
-            near = [_mirrored(given[::-1], behind, conversion.about)]
-            given = np.concatenate((_mirrored(given, before, conversion.about)[::-1], given, *near))
+            about = _CONVERSIONS[self.role][1]
+            ends = _mirrored(given, before, about)[::-1], _mirrored(given[::-1], behind, about)
+            given = np.concatenate((ends[0], given, ends[1]))
             found = _convolved(given, self._kernel)
             if lost.any():
                 marks = np.pad(lost.astype(np.float64), (before, behind))
@@ -134,9 +135,8 @@ class ResponseChannel:
 
 
 def _mirrored(samples: Reals, count: int, about: float) -> Reals:
-    """Give samples before the first one, the nearest first; zeros where a recording is too short."""
-    found = about * samples[:1] - samples[1 : count + 1]
-    return np.pad(found, (0, count - found.size))
+    """Return ``count`` samples before the first one, the nearest first."""
+    return np.asarray(about * samples[:1] - samples[1 : count + 1])
 
 
 def _convolved(samples: Reals, kernel: Reals) -> Reals:

@@ -191,7 +191,7 @@ class Expected(Labelled):
 
 
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
-    """Return how well a plan will tell what it is made for; opens no instrument.
+    """Return the uncertainty that the results of a plan will have; opens no instrument.
 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
     Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
@@ -289,7 +289,7 @@ def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
         for each in found:
             if each.scatter is None:
                 return None
-            # A scatter of 0 does not fall with time: it is that of a maximum, which `lasting` holds.
+            # The uncertainty of a maximum does not fall with time: its scatter is 0, and `lasting` holds it.
             share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
             fixed = float(np.inf) if share > 1.0 else 0.0
             needs.append(each.time_s * share**2 if each.scatter else fixed)

@@ -79,7 +79,7 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
 
 
 def _cost(measurement: Measurement) -> float:
-    """Time on the rig per recorded time: each realisation of noise has ramps and a wait of its own."""
+    """Return the time on the rig per recorded time; each realisation of noise adds ramps and a wait."""
     has_many = measurement.excitation.stretches > 1
     return measured_s(measurement) / recorded_s(measurement) if has_many else 1.0
 
