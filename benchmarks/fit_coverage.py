@@ -37,6 +37,10 @@ from vibench.analysis import (
     analyse_files,
     update_model,
 )
+from vibench.analysis.fit.parameters import Parameter
+from vibench.analysis.fit.specimen_fit import fit_specimen
+from vibench.analysis.fit.suspects import Assumption
+from vibench.analysis.fit.updated_specimen import UpdatedSpecimen
 from vibench.analysis.frequency_response.distortion import scatters_beyond_noise
 from vibench.analysis.frequency_response.periodic import PeriodicSums
 from vibench.analysis.frequency_response.results import (
@@ -44,10 +48,6 @@ from vibench.analysis.frequency_response.results import (
     converted_frequency_response,
 )
 from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.model_updating.parameters import Parameter
-from vibench.analysis.model_updating.specimen_fit import fit_specimen
-from vibench.analysis.model_updating.suspects import Assumption
-from vibench.analysis.model_updating.updated_specimen import UpdatedSpecimen
 from vibench.analysis.signals.quantity import Quantity
 from vibench.sim import Specimen, base_transmissibility, gong2025
 

@@ -23,8 +23,8 @@ import numpy as np
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError
+from vibench.analysis.fit.statistical_numbers import statistical_numbers
 from vibench.analysis.hidden_motion import Hidden, tracked_specimen, value_of
-from vibench.analysis.model_updating.statistical_numbers import statistical_numbers
 from vibench.sim import Hertz, Specimen, gong2025
 
 WORLD = Path(__file__).parents[1] / "tests" / "analysis" / "hidden_motion" / "shaken_world.py"

@@ -26,7 +26,7 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
-from vibench.analysis.model.ensemble import EnsembleCurve, z_limit
+from vibench.analysis.overlay.ensemble import EnsembleCurve, z_limit
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import Specimen, gong2025
 

@@ -22,7 +22,7 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation.progress import SimulatedPoint, SimulationProgress
+from vibench.analysis.prediction.progress import SimulatedPoint, SimulationProgress
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.pages.files.files_page import FilesPage

@@ -35,8 +35,8 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
     state_error,
 )
 from vibench.sim.accuracy_benchmark.measuring import settled_state
-from vibench.sim.model.state import Floats
 from vibench.sim.scene.followed_run import FollowedRun
+from vibench.sim.specimen.state import Floats
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
 """For errors. Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""

@@ -29,7 +29,7 @@ enum Law : int64_t {
   LAWS,
 };
 
-// How a run ended: the numbers of `vibench.sim.model.Outcome`; below zero what was given is refused.
+// How a run ended: the numbers of `vibench.sim.specimen.Outcome`; below zero what was given is refused.
 enum Outcome : int64_t {
   REFUSED = -1,
   REACHED_END,

@@ -69,7 +69,7 @@ FACES_WITH_AN_EXAMPLE = [
     "vibench.analysis.dynamics",
     "vibench.analysis.hidden_motion",
     "vibench.analysis.exchange",
-    "vibench.analysis.simulation",
+    "vibench.analysis.prediction",
     "vibench.cli.paper",
 ]
 

@@ -42,7 +42,7 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.operating_system",
     "vibench.stop_files",
     "vibench.sim.accuracy_benchmark",
-    "vibench.analysis.simulation",
+    "vibench.analysis.prediction",
 )
 ONE_FILE_ROOMS = (
     "background",

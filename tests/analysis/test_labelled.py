@@ -15,13 +15,13 @@ from vibench import analysis
 from vibench.acquisition import open_recording
 from vibench.analysis import dynamics, hidden_motion, transmissibility
 from vibench.analysis.chaos.verdict import MotionVerdict
+from vibench.analysis.fit.parameters import FittedValue, Parameter
+from vibench.analysis.fit.specimen_fit import SpecimenFit
+from vibench.analysis.fit.updated_specimen import UpdatedSpecimen
 from vibench.analysis.frequency_response.distortion import Distortion
 from vibench.analysis.kinds.analysis_kind import Result
-from vibench.analysis.model.measurement_prediction import MeasurementPrediction
-from vibench.analysis.model.overlay import AbstractOverlay
-from vibench.analysis.model_updating.parameters import FittedValue, Parameter
-from vibench.analysis.model_updating.specimen_fit import SpecimenFit
-from vibench.analysis.model_updating.updated_specimen import UpdatedSpecimen
+from vibench.analysis.overlay.measurement_prediction import MeasurementPrediction
+from vibench.analysis.overlay.overlay import AbstractOverlay
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.compared_recording import ComparedRecording
 from vibench.analysis.sine.dwell_analysis import DwellMotion

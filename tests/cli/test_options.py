@@ -9,7 +9,7 @@ import typer
 
 from vibench.analysis import AnalysisOptions, InvalidRequest
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpecimenChoice, SpectrumRequest
-from vibench.analysis.simulation.field_docstrings import field_docstring
+from vibench.analysis.prediction.field_docstrings import field_docstring
 from vibench.cli.__main__ import COMMANDS
 from vibench.cli.options import RequestOptions, option_name
 

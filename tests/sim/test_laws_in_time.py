@@ -24,7 +24,7 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.accuracy_benchmark.independent_solution import independent_state
-from vibench.sim.model.stops import Stops
+from vibench.sim.specimen.stops import Stops
 
 DRIVE = Harmonic(130.0, 20e-6)
 STILL = Harmonic(100.0, 0.0)

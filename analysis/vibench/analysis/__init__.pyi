@@ -14,6 +14,11 @@ from .errors import (
     InvalidRequest as InvalidRequest,
     NotEnoughData as NotEnoughData,
 )
+from .fit.parameters import Parameter as Parameter
+from .fit.updated_specimen import (
+    UpdatedSpecimen as UpdatedSpecimen,
+    update_model as update_model,
+)
 from .frequency_response.modal_fit import Resonance as Resonance
 from .frequency_response.request import (
     FrequencyResponseRequest as FrequencyResponseRequest,
@@ -23,28 +28,23 @@ from .frequency_response.request import (
 from .frequency_response.resonance import resonances as resonances
 from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
 from .frequency_response.transmissibility import transmissibility as transmissibility
-from .model.draws import DRAWS as DRAWS
-from .model.ensemble import FEWEST_DRAWS as FEWEST_DRAWS, CurveDifference as CurveDifference
-from .model.measurement_prediction import (
+from .overlay.draws import DRAWS as DRAWS
+from .overlay.ensemble import FEWEST_DRAWS as FEWEST_DRAWS, CurveDifference as CurveDifference
+from .overlay.measurement_prediction import (
     MeasurementPrediction as MeasurementPrediction,
     predict_measurement as predict_measurement,
 )
-from .model.overlay import Simulation as Simulation
-from .model.prediction import (
+from .overlay.overlay import Simulation as Simulation
+from .overlay.prediction import (
     PAPER_RESONANCES_HZ as PAPER_RESONANCES_HZ,
     PAPER_TERMINAL_RESONANCES_HZ as PAPER_TERMINAL_RESONANCES_HZ,
 )
-from .model.similarity import (
+from .overlay.similarity import (
     SIMILARITY_THRESHOLD as SIMILARITY_THRESHOLD,
     LogarithmOf as LogarithmOf,
     Similarity as Similarity,
     SimilarityCurve as SimilarityCurve,
     similarity as similarity,
-)
-from .model_updating.parameters import Parameter as Parameter
-from .model_updating.updated_specimen import (
-    UpdatedSpecimen as UpdatedSpecimen,
-    update_model as update_model,
 )
 from .results.campaign_results import (
     AnalysisFailure as AnalysisFailure,

@@ -117,7 +117,7 @@ def _option(model: "type[BaseModel]", name: str, panel: str | None) -> OptionInf
 
 def _help(model: "type[BaseModel]", name: str) -> str:
     """Read the help of a field's option: its docstring, and its default, which the model alone has."""
-    from vibench.analysis.simulation.field_docstrings import field_docstring
+    from vibench.analysis.prediction.field_docstrings import field_docstring
 
     default = model.model_fields[name].default
     shown = default.value if isinstance(default, Enum) else default

@@ -22,11 +22,11 @@ from vibench.sim import (
     periodic_branch_within,
     periodic_orbit,
 )
-from vibench.sim.model.state import VY, VZ, Floats, Y, Z
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.harmonic_balance import BalanceEnd, structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
+from vibench.sim.specimen.state import VY, VZ, Floats, Y, Z
 
 from .branch_continuation import BranchContinuation
 from .law import LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law

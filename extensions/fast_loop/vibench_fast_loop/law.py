@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import fmin
 
-from vibench.sim.model.state import Table, Vector
+from vibench.sim.specimen.state import Table, Vector
 
 from .plant import SampledPlant
 

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from vibench.sim.model.state import Table, Vector
+from vibench.sim.specimen.state import Table, Vector
 
 Complexes = NDArray[np.complex128]
 _HALF = 4

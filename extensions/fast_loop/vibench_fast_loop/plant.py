@@ -8,9 +8,9 @@ from math import ceil
 import numpy as np
 from scipy.linalg import block_diag, expm
 
-from vibench.sim.model.specimen import Specimen
-from vibench.sim.model.state import Table, Vector
 from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
+from vibench.sim.specimen.specimen import Specimen
+from vibench.sim.specimen.state import Table, Vector
 
 TABLE_V, M0_X = 1, 3
 """Rows of the table's velocity and of m0's displacement in the state of table and specimen."""

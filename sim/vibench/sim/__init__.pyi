@@ -9,45 +9,6 @@ from .exponents.lyapunov_spectrum import (
     LyapunovSpectrum as LyapunovSpectrum,
     lyapunov_spectrum as lyapunov_spectrum,
 )
-from .model.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
-from .model.contact_law import CONTACT_LAWS as CONTACT_LAWS, ContactLaw as ContactLaw
-from .model.drive import (
-    Drive as Drive,
-    Harmonic as Harmonic,
-    LinearSweep as LinearSweep,
-    LogarithmicSweep as LogarithmicSweep,
-    Sampled as Sampled,
-)
-from .model.frozen_model import FrozenModel as FrozenModel
-from .model.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
-from .model.hunt_crossley import HuntCrossley as HuntCrossley
-from .model.linear_gap import LinearGap as LinearGap
-from .model.modes import (
-    BaseResponse as BaseResponse,
-    base_response as base_response,
-    base_transmissibility as base_transmissibility,
-)
-from .model.no_contact import NoContact as NoContact
-from .model.outcome import Outcome as Outcome
-from .model.power_law import PowerLaw as PowerLaw
-from .model.rigid_stops import RigidStops as RigidStops
-from .model.specimen import Specimen as Specimen, bound_matrices as bound_matrices, gong2025 as gong2025
-from .model.specimen_description import (
-    USUAL_SPECIMEN as USUAL_SPECIMEN,
-    DampingTime as DampingTime,
-    SpecimenDescription as SpecimenDescription,
-    SpecimenTable as SpecimenTable,
-    SpecimenWarning as SpecimenWarning,
-    UnknownSpecimenError as UnknownSpecimenError,
-    load_specimen as load_specimen,
-    shipped_specimens as shipped_specimens,
-    usual_specimen as usual_specimen,
-)
-from .model.toml_table import (
-    UnreadableTomlError as UnreadableTomlError,
-    fault_in_words as fault_in_words,
-    toml_table as toml_table,
-)
 from .motion.integrate import (
     FollowedMotion as FollowedMotion,
     Impacts as Impacts,
@@ -124,4 +85,43 @@ from .scene.solve import (
     settle_scene as settle_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
+)
+from .specimen.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
+from .specimen.contact_law import CONTACT_LAWS as CONTACT_LAWS, ContactLaw as ContactLaw
+from .specimen.drive import (
+    Drive as Drive,
+    Harmonic as Harmonic,
+    LinearSweep as LinearSweep,
+    LogarithmicSweep as LogarithmicSweep,
+    Sampled as Sampled,
+)
+from .specimen.frozen_model import FrozenModel as FrozenModel
+from .specimen.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
+from .specimen.hunt_crossley import HuntCrossley as HuntCrossley
+from .specimen.linear_gap import LinearGap as LinearGap
+from .specimen.modes import (
+    BaseResponse as BaseResponse,
+    base_response as base_response,
+    base_transmissibility as base_transmissibility,
+)
+from .specimen.no_contact import NoContact as NoContact
+from .specimen.outcome import Outcome as Outcome
+from .specimen.power_law import PowerLaw as PowerLaw
+from .specimen.rigid_stops import RigidStops as RigidStops
+from .specimen.specimen import Specimen as Specimen, bound_matrices as bound_matrices, gong2025 as gong2025
+from .specimen.specimen_description import (
+    USUAL_SPECIMEN as USUAL_SPECIMEN,
+    DampingTime as DampingTime,
+    SpecimenDescription as SpecimenDescription,
+    SpecimenTable as SpecimenTable,
+    SpecimenWarning as SpecimenWarning,
+    UnknownSpecimenError as UnknownSpecimenError,
+    load_specimen as load_specimen,
+    shipped_specimens as shipped_specimens,
+    usual_specimen as usual_specimen,
+)
+from .specimen.toml_table import (
+    UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
+    toml_table as toml_table,
 )

@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 from vibench.acquisition import open_recording
 from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
-from vibench.analysis.model.ensemble import EnsembleCurve
-from vibench.analysis.model.overlay import RESPONSE_I, RESPONSE_II
+from vibench.analysis.overlay.ensemble import EnsembleCurve
+from vibench.analysis.overlay.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.uncertainty.budget import Cause, Contribution, stated_uncertainties

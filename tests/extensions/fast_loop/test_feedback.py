@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from vibench.sim import gong2025
-from vibench.sim.model.power_law import PowerLaw
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
+from vibench.sim.specimen.power_law import PowerLaw
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
 from vibench_fast_loop.law import LawWeights, LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant

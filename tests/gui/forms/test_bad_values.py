@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QAbstractSpinBox, QComboBox
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement, SineSweep
 from vibench.analysis import AnalysisOptions
-from vibench.analysis.simulation.progress import MapRequest, SimulationRequest
+from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
 from vibench.gui.forms.editor import Choice
 from vibench.gui.forms.model_form import GroupEditor, JudgedForm
 from vibench.gui.pages.queue.queue_page import SweepForm

@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
-from vibench.analysis.simulation.progress import MapRequest, SimulationRequest
+from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
 from vibench.gui.forms.model_form import JudgedForm
 from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN
 

@@ -20,7 +20,7 @@ from vibench.acquisition.recording import (
 )
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.analysis.simulation.progress import SimulatedPoint, SimulatedSignal, SimulationProgress
+from vibench.analysis.prediction.progress import SimulatedPoint, SimulatedSignal, SimulationProgress
 from vibench.gui.engine_link.bridge import warm_up
 from vibench.gui.pages.queue.draft import with_sweep
 from vibench.gui.widgets.notice import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST

@@ -20,7 +20,7 @@ from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Sup
 from vibench.acquisition.plan import EXCITATION_KINDS, Dwell, HeldDwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation.progress import SettledMotion
+from vibench.analysis.prediction.progress import SettledMotion
 from vibench.gui.forms.model_form import JudgedForm
 from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
 from vibench.gui.page.app_context import AppContext, Settings

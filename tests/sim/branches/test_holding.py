@@ -7,9 +7,9 @@ import pytest
 
 from vibench.sim import FrequencyPath, integrate, periodic_orbit
 from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shot_branches
-from vibench.sim.model.drive import Harmonic
-from vibench.sim.model.power_law import PowerLaw
-from vibench.sim.model.specimen import gong2025, state_scales
+from vibench.sim.specimen.drive import Harmonic
+from vibench.sim.specimen.power_law import PowerLaw
+from vibench.sim.specimen.specimen import gong2025, state_scales
 
 PERIODS = 12
 

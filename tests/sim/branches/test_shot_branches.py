@@ -19,8 +19,8 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
-from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
+from vibench.sim.specimen.specimen import state_scales
 
 pytestmark = pytest.mark.timeout(300)
 """Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.sim.model.modes import diagonal_form
+from vibench.sim.specimen.modes import diagonal_form
 
 MASSES_PER_CELL = 3
 

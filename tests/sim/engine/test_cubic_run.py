@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from vibench.sim import Accuracy, Outcome, gong2025
 from vibench.sim.engine.run import CubicRun, RunRecord
-from vibench.sim.model.modes import state_matrix
+from vibench.sim.specimen.modes import state_matrix
 
 UNITS = np.repeat([1e-4, 0.1], 3)
 LAWS = (

@@ -10,7 +10,7 @@ from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents.lyapunov_spectrum import kaplan_yorke
 from vibench.sim.exponents.tangent_run import interval_for, run_with_tangent
-from vibench.sim.model.modes import state_matrix
+from vibench.sim.specimen.modes import state_matrix
 
 pytestmark = pytest.mark.timeout(300)
 """Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""

@@ -16,8 +16,8 @@ from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
 from vibench.sim.engine.run import MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, most_impacts, start_motion
 from vibench.sim.exponents.lyapunov import intervals_to_skip
 from vibench.sim.exponents.tangent_run import BlockedMean, block_mean, interval_for
-from vibench.sim.model.specimen import energy_metric
-from vibench.sim.model.state import Floats
+from vibench.sim.specimen.specimen import energy_metric
+from vibench.sim.specimen.state import Floats
 
 DISTANCE = 1e-7
 """Of the two motions after each return, over the state's scale: far above the error of a run at reference

@@ -11,11 +11,11 @@ from vibench.sim import (
     periodic_branch,
     periodic_orbit,
 )
-from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.branch import BifurcationKind, Parameter
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic.orbit_branch import periodic_branch_within
 from vibench.sim.periodic.shooting import OrbitShape
+from vibench.sim.specimen.specimen import state_scales
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 STEPS = ArcSteps(first=0.02, longest=0.3, shortest=1e-7, tolerance=1e-9, most_points=60)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, base_transmissibility, gong2025, integrate
-from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
+from vibench.sim.specimen.specimen import state_scales
 
 DRIVE = Harmonic(130.0, 20e-6)
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import PhaseReference, PowerLaw, gong2025, integrate, phase_resonance_branch
-from vibench.sim.model.drive import Harmonic
-from vibench.sim.model.modes import base_transmissibility
+from vibench.sim.specimen.drive import Harmonic
+from vibench.sim.specimen.modes import base_transmissibility
 
 
 def hardening():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate, periodic_orbit
-from vibench.sim.model.specimen import state_scales
 from vibench.sim.motion.poincare import smallest_period, stroboscopic_section
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap, ShootingEnd
+from vibench.sim.specimen.specimen import state_scales
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 TRACE = 390.081

@@ -15,10 +15,10 @@ from vibench.sim import (
     solve_scene,
     steady_response,
 )
-from vibench.sim.model.modes import modal_form
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.scene.prediction import Method, MotionKind, StartMemory
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
+from vibench.sim.specimen.modes import modal_form
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [

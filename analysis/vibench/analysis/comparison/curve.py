@@ -14,7 +14,7 @@ import scipy
 
 from ..errors import NotEnoughData
 from ..live import column_starts, envelope
-from ..model.ensemble import CurveDifference, logarithmic_difference
+from ..overlay.ensemble import CurveDifference, logarithmic_difference
 from ..signals.arrays import Reals
 from ..tables import Labelled
 

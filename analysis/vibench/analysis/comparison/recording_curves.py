@@ -12,8 +12,8 @@ from vibench.sim import FrozenModel
 from ..frequency_response.noise_response import NoiseResponse
 from ..frequency_response.request import FrequencyResponseRequest
 from ..frequency_response.results import Estimator
-from ..model.overlay import Simulation
-from ..model.prediction import ResponsePrediction
+from ..overlay.overlay import Simulation
+from ..overlay.prediction import ResponsePrediction
 from ..signals.arrays import Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE
 from ..signals.window import Window

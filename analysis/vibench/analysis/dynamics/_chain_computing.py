@@ -29,7 +29,7 @@ from vibench.sim.chain import (
 
 from ..errors import InvalidRequest
 from ..frequency_response.transmissibility import transmissibility
-from ..model.simulated_channels import recorded_base_motion
+from ..overlay.simulated_channels import recorded_base_motion
 from ..recordings.facts import plan_of, require_intact, require_measured_size
 from ..signals.arrays import Reals
 from ..tables import Labelled

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from ..model.overlay import SteppedSineOverlay
+from ..overlay.overlay import SteppedSineOverlay
 from ..signals.arrays import Reals
 from ..sine.stepped_response import (
     SteppedSineAnalysis,

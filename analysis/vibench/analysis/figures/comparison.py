@@ -10,7 +10,7 @@ from vibench.acquisition import printable
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
-from ..model.ensemble import CurveDifference
+from ..overlay.ensemble import CurveDifference
 from ..tables import Table, table
 from .style import (
     BOUNDS,

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..chaos.verdict import MotionKind
-from ..model.overlay import SPECTRUM, DwellOverlay
+from ..overlay.overlay import SPECTRUM, DwellOverlay
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse

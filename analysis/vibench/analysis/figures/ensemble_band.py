@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 
 from vibench.sim import Specimen
 
-from ..model.draws import SimulatedRun
-from ..model.overlay import AbstractOverlay
-from ..model.prediction import ResponsePrediction
+from ..overlay.draws import SimulatedRun
+from ..overlay.overlay import AbstractOverlay
+from ..overlay.prediction import ResponsePrediction
 from ..signals.arrays import Reals
 from ..tables import Table, columns, table
 from .style import BOUNDS, SIMULATED, TERMINAL

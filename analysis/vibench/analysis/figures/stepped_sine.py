@@ -15,7 +15,7 @@ from vibench.acquisition.plan import (
     SteppedSine,
 )
 
-from ..model.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
 from ..signals.arrays import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis, feedback_sentences, noted_jumps

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from ..model.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals.arrays import Reals
 from ..sine.collision_region import Collisions
 from ..sine.sweep import SweepResponse

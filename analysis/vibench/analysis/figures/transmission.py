@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.request import MagnitudeScale
-from ..model.overlay import TRANSMISSION, NoiseOverlay
-from ..model.prediction import linear_transmissibility
+from ..overlay.overlay import TRANSMISSION, NoiseOverlay
+from ..overlay.prediction import linear_transmissibility
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, columns, plus_minus, table

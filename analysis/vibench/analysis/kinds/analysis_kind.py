@@ -7,10 +7,10 @@ from typing import Any, Generic, TypeAlias, TypeVar
 from ..comparison.curve import Curve, CurveOrigin
 from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw, Drawn
-from ..model.ensemble import Quantity
-from ..model.overlay import AbstractOverlay, DwellOverlay, NoiseOverlay, SteppedSineOverlay, SweepOverlay
-from ..model.simulated_channels import SimulatedChannels
+from ..overlay.draws import Draw, Drawn
+from ..overlay.ensemble import Quantity
+from ..overlay.overlay import AbstractOverlay, DwellOverlay, NoiseOverlay, SteppedSineOverlay, SweepOverlay
+from ..overlay.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts

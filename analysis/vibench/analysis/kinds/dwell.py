@@ -10,10 +10,10 @@ from vibench.acquisition.recording import SegmentLabel
 from ..chaos.verdict import MotionKind
 from ..comparison.recording_curves import dwell_traces
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw
-from ..model.ensemble import Ending, Quantity
-from ..model.overlay import dwell_overlay, dwell_quantities
-from ..model.simulated_channels import SimulatedChannels
+from ..overlay.draws import Draw
+from ..overlay.ensemble import Ending, Quantity
+from ..overlay.overlay import dwell_overlay, dwell_quantities
+from ..overlay.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts

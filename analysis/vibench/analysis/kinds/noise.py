@@ -15,9 +15,9 @@ from ..frequency_response.noise_response import (
     streamed_response,
 )
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw
-from ..model.overlay import NoiseOverlay, noise_overlay, noise_quantities
-from ..model.simulated_channels import SimulatedChannels
+from ..overlay.draws import Draw
+from ..overlay.overlay import NoiseOverlay, noise_overlay, noise_quantities
+from ..overlay.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import Check, Verdict, measurement_checks
 from ..recordings.facts import RecordingFacts

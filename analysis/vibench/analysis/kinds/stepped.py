@@ -10,10 +10,10 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison.recording_curves import stepped_traces
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw
-from ..model.ensemble import Quantity
-from ..model.overlay import SteppedSineOverlay, stepped_overlay, stepped_quantities
-from ..model.simulated_channels import SimulatedChannels
+from ..overlay.draws import Draw
+from ..overlay.ensemble import Quantity
+from ..overlay.overlay import SteppedSineOverlay, stepped_overlay, stepped_quantities
+from ..overlay.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts

@@ -6,9 +6,9 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison.recording_curves import sweep_traces
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw
-from ..model.overlay import sweep_endings, sweep_overlay, sweep_quantities
-from ..model.simulated_channels import SimulatedChannels
+from ..overlay.draws import Draw
+from ..overlay.overlay import sweep_endings, sweep_overlay, sweep_quantities
+from ..overlay.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts, known_specimen

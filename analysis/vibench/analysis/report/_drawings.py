@@ -40,9 +40,9 @@ from ..kinds.analysis_kind import (
     SteppedSineResult,
     SweepResult,
 )
-from ..model.draws import CLOCK_TOLERANCE
-from ..model.overlay import AbstractOverlay
-from ..model.prediction import PREDICTION_S, WINDOW_S
+from ..overlay.draws import CLOCK_TOLERANCE
+from ..overlay.overlay import AbstractOverlay
+from ..overlay.prediction import PREDICTION_S, WINDOW_S
 from ..recordings.checks import AbstractAnalysis
 from ..results.campaign_results import CampaignResults, budgets_of
 from ..sine.stepped_response import feedback_sentences, tracked_resonances

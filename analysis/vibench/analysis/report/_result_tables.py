@@ -7,8 +7,8 @@ import numpy as np
 from ..figures.portraits import verdict_text
 from ..frequency_response.modal_fit import Resonance
 from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, SweepResult
-from ..model.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
-from ..model.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
+from ..overlay.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..recordings.facts import specimen_of
 from ..results.campaign_results import budgets_of
 from ..sine.collision_region import Edge

@@ -18,10 +18,10 @@ from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
 from ..kinds.noise import NOISE_FAMILY
-from ..model.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
-from ..model.driven_rig import says_shaker
-from ..model.overlay import AbstractOverlay, Simulation
-from ..model.shaker_fit import FittedShaker, fit_shaker
+from ..overlay.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
+from ..overlay.driven_rig import says_shaker
+from ..overlay.overlay import AbstractOverlay, Simulation
+from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..sine.dwell_analysis import DwellAnalysis

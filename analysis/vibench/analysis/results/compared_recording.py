@@ -17,7 +17,7 @@ from ..errors import NotEnoughData
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult
-from ..model.overlay import AbstractOverlay, Simulation
+from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.checks import Verdict
 from ..sine.stepped_response import SteppedResponse
 from ..sine.sweep import SweepResponse

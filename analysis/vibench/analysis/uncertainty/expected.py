@@ -27,7 +27,7 @@ from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
 from ..errors import AnalysisError
-from ..model.overlay import RESPONSE_I, RESPONSE_II
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II
 from ..recordings.checks import Check, Verdict
 from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals

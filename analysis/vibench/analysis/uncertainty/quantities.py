@@ -9,7 +9,7 @@ import numpy as np
 from ..chaos.verdict import MotionKind
 from ..frequency_response.modal_fit import Resonance
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
-from ..model.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
 from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Flags, Reals
 from ..sine.dwell import DwellResponse

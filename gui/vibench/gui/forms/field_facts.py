@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from vibench.acquisition import ChosenFrom
-from vibench.analysis.simulation.field_docstrings import field_docstring
+from vibench.analysis.prediction.field_docstrings import field_docstring
 
 from ..widgets.units import CHOICES, UNITS
 

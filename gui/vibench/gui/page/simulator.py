@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QObject
 
-from vibench.analysis.simulation.progress import PartialResult
-from vibench.analysis.simulation.worker import Asked, answer
+from vibench.analysis.prediction.progress import PartialResult
+from vibench.analysis.prediction.worker import Asked, answer
 from vibench.sim.background import Job
 
 from ..background.background import Background

@@ -7,8 +7,6 @@ from functools import partial
 
 import numpy as np
 
-from ..model.accuracy import Accuracy
-from ..model.state import Floats
 from ..periodic.balance_branch import BalanceOptions, balance
 from ..periodic.first_order_balance import first_order_states
 from ..periodic.harmonic_balance import BalanceEnd, HarmonicSet, structure_of
@@ -18,6 +16,8 @@ from ..scene.prediction import Method, ScenePrediction
 from ..scene.refinement import refine_scene
 from ..scene.scene import AutomaticDuration, FixedDuration, Scene
 from ..scene.solve import solve_scene
+from ..specimen.accuracy import Accuracy
+from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.specimen import Specimen, gong2025
 from ..scene.prediction import Ensemble, FoundMotion, MotionKind, ScenePrediction
 from ..scene.scene import AutomaticDuration, Scene
 from ..scene.solve import solve_ensemble, solve_scene
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.specimen import Specimen, gong2025
 
 SEED = 4242
 """Another draw of starts than an answer's own."""
@@ -129,7 +129,7 @@ class Motion:
 
     regime: Regime
     model: str
-    """Name of the contact law in `vibench.sim.model`."""
+    """Name of the contact law in `vibench.sim.specimen`."""
     frequency_hz: float
     amplitude_m: float
 

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from ..model.drive import Harmonic
-from ..model.no_contact import NoContact
-from ..model.power_law import PowerLaw
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen
-from ..model.state import Floats
+from ..specimen.drive import Harmonic
+from ..specimen.no_contact import NoContact
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
 
 # The paper's equations as a textbook writes them, for general solvers and second opinions. SI units.
 #

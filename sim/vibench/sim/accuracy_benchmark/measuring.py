@@ -13,14 +13,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..exponents.lyapunov import lyapunov_exponent
-from ..model.accuracy import Accuracy
-from ..model.specimen import state_scales
-from ..model.state import Floats
 from ..motion.integrate import integrate
 from ..motion.poincare import flow_derivative, smallest_period, stroboscopic_section
 from ..motion.response import steady_response
 from ..scene.scene import FixedDuration, Scene
 from ..scene.solve import solve_scene
+from ..specimen.accuracy import Accuracy
+from ..specimen.specimen import state_scales
+from ..specimen.state import Floats
 from ..study import software
 from .figures import (
     LOTTERIES,

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from functools import partial
 
-from ..model.drive import Harmonic
-from ..model.specimen import Specimen
 from ..periodic.balance_branch import (
     BalanceOptions,
     balance,
@@ -17,6 +15,8 @@ from ..periodic.continuation import ArcSteps
 from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet, structure_of
 from ..periodic.restoring_force import PowerSpring, spring_of
 from ..periodic.shooting import OrbitShape
+from ..specimen.drive import Harmonic
+from ..specimen.specimen import Specimen
 from ._motion_search import MotionSearch, periodic_motions
 from ._shot_branches import BranchOrigin, BranchStart, FoundBranch, branches_from
 

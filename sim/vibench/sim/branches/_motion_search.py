@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.modes import base_transmissibility
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Floats, Vector
 from ..motion.integrate import integrate
 from ..motion.poincare import smallest_period
 from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.modes import base_transmissibility
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
 """A section repeats when it changes by less, over the state's scale: Newton's iteration does the rest."""

@@ -10,14 +10,14 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.drive import Harmonic
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Floats, Vector
 from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent
 from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd, ArcSteps
 from ..periodic.orbit_branch import periodic_branch_within
 from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+from ..specimen.drive import Harmonic
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Floats, Vector
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Matrix, Specimen, Triple
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Matrix, Specimen, Triple
 
 MASSES_PER_CELL = 3
 """m0, m1, m2: a cell's displacements x, y, z."""

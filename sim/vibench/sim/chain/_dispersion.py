@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.specimen import Specimen
-from ..model.state import Complex
+from ..specimen.specimen import Specimen
+from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9

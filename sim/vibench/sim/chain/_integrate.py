@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, MOST_IMPACTS, SPARE_IMPACTS, Watch, native_engine
 from ..engine.scene import collision_structure, fill_drive, power_structure
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Drive, Harmonic
-from ..model.outcome import Outcome
-from ..model.state import Complex, Floats
-from ..model.stops import chosen
 from ..motion.integrate import ROUNDING, Trajectory, check_impact_rate, check_times, check_within, integrate
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Drive, Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.state import Complex, Floats
+from ..specimen.stops import chosen
 from ._chain import Chain
 from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces_between
 

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from ..engine.run import MAX_IMPACT_RATE_HZ
 from ..exponents.tangent_run import BlockedMean, block_mean
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Harmonic
-from ..model.outcome import Outcome
-from ..model.state import Floats, Table
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats, Table
+from ..specimen.stops import chosen
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impacts
 from ._tables import chain_tables, longest_window_s

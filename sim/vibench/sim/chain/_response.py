@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, Watch
 from ..exponents.tangent_run import block_mean
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Harmonic
-from ..model.outcome import Outcome
-from ..model.power_law import PowerLaw
-from ..model.specimen import Specimen
-from ..model.state import Complex, Floats
-from ..model.stops import chosen
 from ..motion.response import Response, steady_response, whole_periods
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.power_law import PowerLaw
+from ..specimen.specimen import Specimen
+from ..specimen.state import Complex, Floats
+from ..specimen.stops import chosen
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, most_chain_impacts, start_motion
 from ._tables import chain_tables, longest_window_s

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from ..engine.library import Structure
 from ..engine.run import native_engine
 from ..engine.scene import fill_cell
-from ..model.accuracy import Accuracy
-from ..model.drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled
-from ..model.specimen import Specimen
-from ..model.state import Table, Vector
 from ..motion.integrate import sampled_motion
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled
+from ..specimen.specimen import Specimen
+from ..specimen.state import Table, Vector
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2

@@ -13,11 +13,11 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.hertz import Hertz
-from ..model.modes import modal_form
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import VY, VZ, Y, Z
+from ..specimen.hertz import Hertz
+from ..specimen.modes import modal_form
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import VY, VZ, Y, Z
 from .library import Engine, Structure
 from .run import DIRECTIONS, Floats, NativeRun, native_engine
 from .shapes import (

@@ -9,14 +9,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.modes import state_matrix
-from ..model.outcome import Outcome
-from ..model.power_law import PowerLaw
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen, gong2025
-from ..model.state import Y, Z
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.modes import state_matrix
+from ..specimen.outcome import Outcome
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen, gong2025
+from ..specimen.state import Y, Z
 from .library import Engine, EngineError, Structure, Tables, library_path
 from .scene import fill_power, fill_specimen, scene_of
 

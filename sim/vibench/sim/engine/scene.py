@@ -9,15 +9,15 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.drive import Harmonic
-from ..model.hertz import Hertz
-from ..model.linear_gap import LinearGap
-from ..model.modes import PULL, RATE, ROW, SHAPE, bound_motion, harmonic_motion, modal_form
-from ..model.no_contact import NoContact
-from ..model.power_law import PowerLaw
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen
-from ..model.state import Y, Z
+from ..specimen.drive import Harmonic
+from ..specimen.hertz import Hertz
+from ..specimen.linear_gap import LinearGap
+from ..specimen.modes import PULL, RATE, ROW, SHAPE, bound_motion, harmonic_motion, modal_form
+from ..specimen.no_contact import NoContact
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen
+from ..specimen.state import Y, Z
 from .library import Engine, Structure
 from .shapes import (
     ABOUT_MIDDLE,

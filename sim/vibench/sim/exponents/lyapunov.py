@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import MAX_IMPACT_RATE_HZ
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Harmonic
-from ..model.modes import modal_form
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Floats
-from ..model.stops import chosen
 from ..motion.poincare import flow_derivative
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Harmonic
+from ..specimen.modes import modal_form
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Floats
+from ..specimen.stops import chosen
 from .tangent_run import (
     ALIGNING,
     ALMOST,

@@ -15,13 +15,13 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Harmonic
-from ..model.modes import state_matrix
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Floats
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Harmonic
+from ..specimen.modes import state_matrix
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Floats
+from ..specimen.stops import chosen
 from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from .tangent_run import (
     BlockedMean,

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, GrowthReadings, NativeRun, RunRecord, most_impacts, start_motion
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.modes import modal_form
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen, energy_metric
-from ..model.state import Floats, Table
 from ..motion.integrate import check_impact_rate
 from ..motion.poincare import smallest_period
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.modes import modal_form
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen, energy_metric
+from ..specimen.state import Floats, Table
 
 # How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
 #

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..model.outcome import Outcome
-from ..model.specimen import state_scales
-from ..model.state import Floats
 from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.scene import Given, Scene
 from ..scene.shares import Share, wilson_share
 from ..scene.solve import settle_scene
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import state_scales
+from ..specimen.state import Floats
 from ..study import InvalidStudy
 from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
-from ..model.outcome import Outcome
-from ..model.state import Floats
 from ..scene.cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
 from ..scene.solve import InBatches, Question, Solved, settle_scene
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
 from ..study import (
     NUMBERS,
     Arrays,

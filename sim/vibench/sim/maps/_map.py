@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.frozen_model import FrozenModel
-from ..model.specimen import Specimen, Triple
-from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.scene import AutomaticDuration, Given, Observable, Rest, Scene
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.frozen_model import FrozenModel
+from ..specimen.specimen import Specimen, Triple
+from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..study import COLUMNS, MESSAGE, Cell, Column, GridPlan, Start, StudyAxis
 
 KEPT = (

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.state import Floats
+from ..specimen.state import Floats
 
 Mask = NDArray[np.bool_]
 Codes = NDArray[np.int64]

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.state import Floats
 from ..scene.prediction import MotionKind
 from ..scene.shares import UNSURE, Count, Share, shares_of, wilson_share
+from ..specimen.state import Floats
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
 from ._expansion import BASIN_JUMP, cell_codes, refinement_of
 from ._map import Map, labels_of, without_impacts

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from ..background import Cancelled, Observer
-from ..model.state import Floats
+from ..specimen.state import Floats
 from ..study import (
     Arrays,
     Executor,

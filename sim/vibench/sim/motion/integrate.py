@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, CubicRun, NativeRun, RunRecord, most_impacts, start_motion
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Drive, Harmonic, Sampled, Sweep
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import Floats, Table, Vector
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import Drive, Harmonic, Sampled, Sweep
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats, Table, Vector
+from ..specimen.stops import chosen
 
 # A drive cut into intervals on which the base displacement is a cubic polynomial. SI units.
 #

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, most_impacts, start_motion
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import Floats
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
 from .integrate import integrate
 
 

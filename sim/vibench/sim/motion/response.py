@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from ..engine.run import MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, Watch, most_impacts, start_motion
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import WHOLE, Harmonic
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import Floats
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.drive import WHOLE, Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
+from ..specimen.stops import chosen
 from .integrate import check_impact_rate
 
 

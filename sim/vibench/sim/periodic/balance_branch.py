@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.drive import Harmonic
-from ..model.state import Complex, Table, Vector, Y, Z
-from ..model.stops import chosen
+from ..specimen.drive import Harmonic
+from ..specimen.state import Complex, Table, Vector, Y, Z
+from ..specimen.stops import chosen
 from .branch import Branch, OrbitSigns, Symmetry
 from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
 from .continuation import ArcSteps

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..model.drive import Harmonic
-from ..model.state import Vector
+from ..specimen.drive import Harmonic
+from ..specimen.state import Vector
 from .branch import (
     POINTWISE,
     BifurcationKind,

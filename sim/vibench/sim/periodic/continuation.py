@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.state import Table, Vector
+from ..specimen.state import Table, Vector
 
 
 class Curve(Protocol):

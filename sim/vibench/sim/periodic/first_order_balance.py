@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..model.state import Complex, Floats
+from ..specimen.state import Complex, Floats
 from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 

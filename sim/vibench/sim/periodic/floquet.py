@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..model.state import Complex, Floats
+from ..specimen.state import Complex, Floats
 from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_grid, waveform
 from .restoring_force import RestoringForce
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.specimen import Specimen
-from ..model.state import Complex, Floats, Table, Vector
+from ..specimen.specimen import Specimen
+from ..specimen.state import Complex, Floats, Table, Vector
 from .restoring_force import RestoringForce
 
 # A linear structure seen from its one nonlinear spring. SI units.

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.drive import Harmonic
-from ..model.specimen import state_scales
-from ..model.state import Table, Vector
-from ..model.stops import chosen
+from ..specimen.drive import Harmonic
+from ..specimen.specimen import state_scales
+from ..specimen.state import Table, Vector
+from ..specimen.stops import chosen
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
     DrivePath,

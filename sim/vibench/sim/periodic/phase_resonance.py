@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..model.drive import Harmonic
-from ..model.modes import base_transmissibility
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Table, Vector
-from ..model.stops import chosen
+from ..specimen.drive import Harmonic
+from ..specimen.modes import base_transmissibility
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Table, Vector
+from ..specimen.stops import chosen
 from .branch import Branch
 from .branch_following import AmplitudePath, DrivePath, Family, OrbitReport, follow
 from .continuation import ArcSteps, correct

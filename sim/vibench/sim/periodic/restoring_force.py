@@ -9,11 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.no_contact import NoContact
-from ..model.power_law import PowerLaw
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen
-from ..model.state import Floats
+from ..specimen.no_contact import NoContact
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
 
 
 class RestoringForce(Protocol):

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import start_motion
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.no_contact import NoContact
-from ..model.outcome import Outcome
-from ..model.power_law import PowerLaw
-from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen, state_scales
-from ..model.state import Complex, Floats, Table, Vector, Y, Z
-from ..model.stops import chosen
 from ..motion.integrate import Trajectory, integrate
 from ..motion.poincare import flow_derivative
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.no_contact import NoContact
+from ..specimen.outcome import Outcome
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen, state_scales
+from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
+from ..specimen.stops import chosen
 from .branch import NEUTRAL, BifurcationKind, OrbitSigns, Symmetry
 from .floquet import multipliers
 from .harmonic_balance import phasors_of

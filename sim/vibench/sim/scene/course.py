@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..engine.run import Watch
-from ..model.outcome import Outcome
-from ..model.state import Floats
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
 from .followed_run import (
     Block,
     FollowedRun,

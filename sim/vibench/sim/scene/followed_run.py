@@ -21,13 +21,13 @@ from ..engine.run import (
     most_impacts,
     start_motion,
 )
-from ..model.contact_law import ContactLaw
-from ..model.drive import WHOLE, Harmonic
-from ..model.linear_gap import LinearGap
-from ..model.outcome import Outcome
-from ..model.power_law import PowerLaw
-from ..model.specimen import Specimen, energy_metric, state_scales
-from ..model.state import Floats
+from ..specimen.contact_law import ContactLaw
+from ..specimen.drive import WHOLE, Harmonic
+from ..specimen.linear_gap import LinearGap
+from ..specimen.outcome import Outcome
+from ..specimen.power_law import PowerLaw
+from ..specimen.specimen import Specimen, energy_metric, state_scales
+from ..specimen.state import Floats
 
 # What it costs to follow a motion on the machine of docs/accuracy.md: the measure of a budget. SI units.
 #

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.drive import Harmonic
-from ..model.modes import harmonic_motion, modal_form
-from ..model.no_contact import NoContact
-from ..model.power_law import PowerLaw
-from ..model.specimen import Specimen
-from ..model.state import Complex, Floats, X, Y, Z
+from ..specimen.drive import Harmonic
+from ..specimen.modes import harmonic_motion, modal_form
+from ..specimen.no_contact import NoContact
+from ..specimen.power_law import PowerLaw
+from ..specimen.specimen import Specimen
+from ..specimen.state import Complex, Floats, X, Y, Z
 from .followed_run import whole_periods
 from .prediction import Method
 from .repetition import MOST_STATES

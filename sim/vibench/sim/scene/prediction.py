@@ -5,8 +5,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..model.outcome import Outcome
-from ..model.state import Floats
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
 from .shares import EscapeRate, Share
 
 State = tuple[float, float, float, float, float, float]

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..engine.run import Watch
-from ..model.accuracy import Accuracy
-from ..model.modes import modal_form
-from ..model.outcome import Outcome
-from ..model.state import Floats
+from ..specimen.accuracy import Accuracy
+from ..specimen.modes import modal_form
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
 from .followed_run import (
     FollowedRun,
     ObservedWindow,

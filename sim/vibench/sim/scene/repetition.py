@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.accuracy import Accuracy
-from ..model.contact_law import ContactLaw
-from ..model.power_law import PowerLaw
-from ..model.specimen import Specimen
-from ..model.state import Floats
+from ..specimen.accuracy import Accuracy
+from ..specimen.contact_law import ContactLaw
+from ..specimen.power_law import PowerLaw
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
 from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.state import Complex, Floats
+from ..specimen.state import Complex, Floats
 from .followed_run import Block
 from .shares import student_quantile
 

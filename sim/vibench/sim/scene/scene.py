@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 from pydantic import ConfigDict
 
-from ..model.accuracy import Accuracy
-from ..model.drive import WHOLE, Harmonic
-from ..model.specimen import Specimen
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import WHOLE, Harmonic
+from ..specimen.specimen import Specimen
+from ..specimen.stops import chosen
 from .prediction import State
 
 _STRICT = ConfigDict(extra="forbid")

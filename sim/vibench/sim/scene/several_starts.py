@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.run import Watch
-from ..model.drive import Harmonic
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import Floats, Y, Z
+from ..specimen.drive import Harmonic
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats, Y, Z
 from .course import SceneRun
 from .followed_run import FollowedRun, Stretch, follow_with_section, observe_window, window_of
 from .plan import LinearMotion, never_touches

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..model.accuracy import Accuracy
-from ..model.outcome import Outcome
-from ..model.state import Floats
-from ..model.stops import chosen
+from ..specimen.accuracy import Accuracy
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
+from ..specimen.stops import chosen
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..engine.run import Watch
-from ..model.accuracy import Accuracy
-from ..model.outcome import Outcome
-from ..model.state import Floats
+from ..specimen.accuracy import Accuracy
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
 from .course import Lead, SceneRun
 from .followed_run import FollowedRun, ObservedWindow, observe_window
 from .prediction import MotionKind, ScenePrediction

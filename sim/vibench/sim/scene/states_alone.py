@@ -12,9 +12,9 @@ from typing import Self
 import numpy as np
 
 from ..engine.batch import batches_pay, is_batchable
-from ..model.outcome import Outcome
-from ..model.specimen import Specimen
-from ..model.state import Floats
+from ..specimen.outcome import Outcome
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
 from .followed_run import (
     FollowedRun,
     Stretch,

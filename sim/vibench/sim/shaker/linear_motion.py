@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model.specimen import Specimen
+from ..specimen.specimen import Specimen
 from .loaded_shaker import Amplifier, FloatArray, Shaker
 
 ComplexArray = NDArray[np.complex128]

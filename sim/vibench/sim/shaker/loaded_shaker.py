@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
 from ..engine.run import cubic_tables, native_engine, start_on_cubics
-from ..model.accuracy import Accuracy
-from ..model.specimen import Specimen
+from ..specimen.accuracy import Accuracy
+from ..specimen.specimen import Specimen
 
 FloatArray = NDArray[np.float64]
 

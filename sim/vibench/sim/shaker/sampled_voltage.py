@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-from ..model.specimen import Specimen
+from ..specimen.specimen import Specimen
 from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
 
 ComplexArray = NDArray[np.complex128]

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import ClassVar, Self
 
-from ..model.frozen_model import FrozenModel
-from ..model.outcome import Outcome
 from ..scene.prediction import Method, MotionKind, StartMemory
+from ..specimen.frozen_model import FrozenModel
+from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2

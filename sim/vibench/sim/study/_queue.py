@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Cancelled, Observer, Progress
-from ..model.state import Floats
 from ..scene.scene import Scene
 from ..scene.solve import Solved
+from ..specimen.state import Floats
 from ._executor import Bundle, Executor, Reply
 from ._grid import TAKEN, Grid, PointState
 from ._store import Arrays, PointAnswer, Store, is_failed, states

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ..model.state import Floats
 from ..scene.prediction import ScenePrediction
+from ..specimen.state import Floats
 from . import _grid as layout
 from ._errors import InvalidStudy, StudyError
 from ._grid import CONTINUES, ENDED, MESSAGE, GridPlan, PointState, StudyAxis

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..background import Cancelled, Observer
-from ..model.outcome import Outcome
-from ..model.state import Floats
-from ..model.stops import chosen
 from ..scene.cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene
 from ..scene.solve import Solved, solve_scene
+from ..specimen.outcome import Outcome
+from ..specimen.state import Floats
+from ..specimen.stops import chosen
 from ._errors import ClusterLost
 from ._executor import Executor, Solver, ThreadExecutor
 from ._grid import (

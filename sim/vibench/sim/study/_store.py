@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.outcome import Outcome
-from ..model.stops import chosen
 from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
 from ..scene.shares import EscapeRate, Share
+from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.outcome import Outcome
+from ..specimen.stops import chosen
 from . import _grid as layout
 from ._grid import (
     ENDED,

@@ -16,13 +16,13 @@ from pydantic import (
     model_validator,
 )
 
-from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
-from ..model.frozen_model import FrozenModel
-from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene, Target
 from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
+from ..specimen.accuracy import Accuracy
+from ..specimen.drive import Harmonic
+from ..specimen.frozen_model import FrozenModel
+from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
@@ -215,7 +215,7 @@ class Study(GridPlan):
     amplitudes_m: Positive
     """Amplitudes of the base displacement."""
     models: Annotated[tuple[ContactWord, ...], Field(min_length=1, default_factory=_own_law)]
-    """Contact laws as `vibench.sim.model` spells them; the specimen's own when absent."""
+    """Contact laws as `vibench.sim.specimen` spells them; the specimen's own when absent."""
     damping_times_s: Annotated[NotNegative | None, Field(default_factory=_own_damping)]
     """c_i = damping time * k_i; as the specimen has it when absent."""
     gaps_m: Annotated[Positive | None, Field(default_factory=_own_gap)]

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation.progress import SimulatedPoint, SimulationProgress
+from vibench.analysis.prediction.progress import SimulatedPoint, SimulationProgress
 from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.widgets.theme import DARK
 

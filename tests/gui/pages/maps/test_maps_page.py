@@ -6,7 +6,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
-from vibench.analysis.simulation.progress import MapRequest
+from vibench.analysis.prediction.progress import MapRequest
 from vibench.gui.pages.maps.maps_page import MapsPage
 from vibench.gui.widgets.notice import SIMULATE
 from vibench.gui.widgets.theme import DARK

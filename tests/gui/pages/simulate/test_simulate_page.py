@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis.simulation.accuracy_cost import MEASURED
-from vibench.analysis.simulation.progress import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from vibench.analysis.prediction.accuracy_cost import MEASURED
+from vibench.analysis.prediction.progress import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.widgets.theme import DARK
 from vibench.sim import Accuracy, Ensemble, FoundMotion, MotionKind, Share, StartMemory

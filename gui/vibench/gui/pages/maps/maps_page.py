@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QLabel, QLayout, QSplitter, QVBoxLayout, QWidget
 
 from vibench.analysis import recorded_response
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
-from vibench.analysis.simulation.progress import (
+from vibench.analysis.prediction.progress import (
     MapPicture,
     MapRequest,
     MotionRequest,

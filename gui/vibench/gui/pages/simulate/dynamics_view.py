@@ -20,8 +20,8 @@ from vibench.analysis.dynamics import (
     SpectrumPoint,
     SpectrumRequest,
 )
-from vibench.analysis.simulation.progress import PartialResult, Trouble
-from vibench.analysis.simulation.worker import Asked
+from vibench.analysis.prediction.progress import PartialResult, Trouble
+from vibench.analysis.prediction.worker import Asked
 
 from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QStackedWidget, QWidget
 
 from vibench.analysis import SIMILARITY_THRESHOLD
 from vibench.analysis.dynamics import BranchDiagram, ChainAnswer, ChainDrive, ChainRun, ExponentSpectrum
-from vibench.analysis.simulation.progress import SimulationProgress
+from vibench.analysis.prediction.progress import SimulationProgress
 from vibench.sim import Parameter
 
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale

@@ -7,8 +7,8 @@ from contextlib import suppress
 
 from PySide6.QtWidgets import QLayout, QTabWidget, QVBoxLayout, QWidget
 
-from vibench.analysis.simulation.accuracy_cost import cost_sentences
-from vibench.analysis.simulation.progress import (
+from vibench.analysis.prediction.accuracy_cost import cost_sentences
+from vibench.analysis.prediction.progress import (
     MOTION_COLUMNS,
     PartialResult,
     SimulationProgress,

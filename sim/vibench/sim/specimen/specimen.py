@@ -174,7 +174,7 @@ def gong2025(
         Clearance at each stop [m], or (lower, upper); a power law is fitted at the nearer.
     contact
         ``"hertz"``: the paper's stops; ``"linear"``: none; ``"power:5"`` and others as
-        `vibench.sim.model` says.
+        `vibench.sim.specimen` says.
 
     Raises
     ------

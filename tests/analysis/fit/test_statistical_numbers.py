@@ -14,13 +14,13 @@ from scipy.stats import t as student
 
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError, Simulation, analyse_files, update_model
-from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.model.draws import stretch_draws
-from vibench.analysis.model_updating.statistical_numbers import (
+from vibench.analysis.fit.statistical_numbers import (
     above_sensor_noise,
     chaos_statistics,
     statistical_numbers,
 )
+from vibench.analysis.hidden_motion import Hidden
+from vibench.analysis.overlay.draws import stretch_draws
 from vibench.sim import gong2025
 
 TRUE = gong2025(gap_m=51e-6)

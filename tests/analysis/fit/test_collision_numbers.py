@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from vibench.analysis import Simulation, analyse_files, update_model
+from vibench.analysis.fit.collision_numbers import tracked_numbers
+from vibench.analysis.fit.suspects import Assumption
 from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.model_updating.collision_numbers import tracked_numbers
-from vibench.analysis.model_updating.suspects import Assumption
 from vibench.sim import gong2025
 
 TRUE = gong2025(gap_m=(35e-6, 55e-6))

@@ -15,8 +15,8 @@ from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response.distortion import scatters_beyond_noise
 from ..frequency_response.noise_response import NoiseAnalysis
 from ..kinds.analysis_kind import NoiseResult
-from ..model.driven_rig import described_shaker
-from ..model.shaker_fit import fit_shaker
+from ..overlay.driven_rig import described_shaker
+from ..overlay.shaker_fit import fit_shaker
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Labelled, columns, plain, plus_minus

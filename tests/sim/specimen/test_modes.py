@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.sim import base_transmissibility, gong2025
-from vibench.sim.model.modes import modal_form, state_matrix
+from vibench.sim.specimen.modes import modal_form, state_matrix
 
 DAMPINGS = st.floats(0.0, 1e-2)
 

@@ -16,8 +16,8 @@ from vibench.sim.background import Observer, stage
 
 from ..errors import AnalysisError
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
-from ..model.driven_rig import says_shaker
-from ..model.shaker_fit import FittedShaker, fit_shaker
+from ..overlay.driven_rig import says_shaker
+from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..results.campaign_results import CampaignResults
 from ..sine.dwell_analysis import DwellAnalysis
 from .specimen_fit import SpecimenFit

@@ -9,7 +9,7 @@ from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import Measurement, SineSweep, base_motion, predicted_loads
 from vibench.acquisition.rig import BaseQuantity, load_rig
 from vibench.analysis import predict_measurement
-from vibench.analysis.model.measurement_prediction import bands_of
+from vibench.analysis.overlay.measurement_prediction import bands_of
 
 ROOT = Path(__file__).resolve().parents[3]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}

@@ -9,9 +9,9 @@ from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
-from vibench.sim.model.contact_law import CONTACT_LAWS, ContactLaw, law_by_name
-from vibench.sim.model.linear_gap import fit_linear_gap
-from vibench.sim.model.power_law import fit_power_law
+from vibench.sim.specimen.contact_law import CONTACT_LAWS, ContactLaw, law_by_name
+from vibench.sim.specimen.linear_gap import fit_linear_gap
+from vibench.sim.specimen.power_law import fit_power_law
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.analysis.simulation.accuracy_cost import MEASURED, cost_sentences
-from vibench.analysis.simulation.progress import (
+from vibench.analysis.prediction.accuracy_cost import MEASURED, cost_sentences
+from vibench.analysis.prediction.progress import (
     SimulatedPoint,
     SimulationProgress,
     SimulationRequest,
     Trouble,
 )
-from vibench.analysis.simulation.worker import answer, simulate
+from vibench.analysis.prediction.worker import answer, simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
 from vibench.sim.background import Pool
 

@@ -13,8 +13,8 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures.dwells import dwells_figure
 from vibench.analysis.kinds.analysis_kind import Result
-from vibench.analysis.model.driven_rig import Driven
-from vibench.analysis.model.shaker_fit import fit_shaker
+from vibench.analysis.overlay.driven_rig import Driven
+from vibench.analysis.overlay.shaker_fit import fit_shaker
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 

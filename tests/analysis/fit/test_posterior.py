@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.model_updating.statistical_numbers import _FAR, _distance, posterior
+from vibench.analysis.fit.statistical_numbers import _FAR, _distance, posterior
 
 ROUNDS = (60, 60, 120)
 BOX = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])

@@ -9,7 +9,7 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Measurement, WhiteNoise
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files, update_model
-from vibench.analysis.model_updating.suspects import Assumption
+from vibench.analysis.fit.suspects import Assumption
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg

@@ -6,7 +6,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, Specimen, gong2025
-from vibench.sim.model.hertz import Elasticity, hertz_stiffness
+from vibench.sim.specimen.hertz import Elasticity, hertz_stiffness
 
 
 def test_the_papers_materials_give_the_stiffness_of_its_contact():

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEnoughData
+from vibench.analysis.fit.lines import own_response
+from vibench.analysis.fit.parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis.fit.specimen_fit import fit_specimen
+from vibench.analysis.fit.suspects import Assumption
 from vibench.analysis.frequency_response.results import FrequencyResponseSettings
-from vibench.analysis.model_updating.lines import own_response
-from vibench.analysis.model_updating.parameters import LINEAR, Parameter, parameter_value, with_values
-from vibench.analysis.model_updating.specimen_fit import fit_specimen
-from vibench.analysis.model_updating.suspects import Assumption
 from vibench.analysis.signals.confidence import student_half_width
 from vibench.sim import base_transmissibility, gong2025
 

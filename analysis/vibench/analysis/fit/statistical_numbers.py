@@ -14,8 +14,8 @@ from vibench.sim import Hertz, HuntCrossley, LinearGap, Specimen
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
-from ..model.draws import StretchDraws, stretch_draws
-from ..model.shaker_fit import FittedShaker
+from ..overlay.draws import StretchDraws, stretch_draws
+from ..overlay.shaker_fit import FittedShaker
 from ..signals.arrays import Flags, Integers, Reals
 from .specimen_fit import SpecimenFit
 

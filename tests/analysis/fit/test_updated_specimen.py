@@ -9,8 +9,8 @@ import synthetic_recordings as synthetic
 
 from vibench.acquisition.plan import SineSweep, WhiteNoise
 from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
-from vibench.analysis.model_updating.gap_fit import bracketed_gap, brackets, fit_gap, onsets, swept_relative
-from vibench.analysis.model_updating.parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis.fit.gap_fit import bracketed_gap, brackets, fit_gap, onsets, swept_relative
+from vibench.analysis.fit.parameters import LINEAR, Parameter, parameter_value, with_values
 from vibench.analysis.report import findings
 from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.analysis import InvalidRequest, NotEnoughData, similarity
-from vibench.analysis.model.similarity import LogarithmOf, SimilarityCurve
+from vibench.analysis.overlay.similarity import LogarithmOf, SimilarityCurve
 
 FREQUENCY_HZ = np.arange(10.0, 510.0, 5.0)
 

@@ -46,7 +46,7 @@ from ..dynamics import (
     motion_classes,
 )
 from ..errors import AnalysisError
-from ..model.similarity import Similarity, SimilarityCurve, similarity
+from ..overlay.similarity import Similarity, SimilarityCurve, similarity
 from ..signals.arrays import Reals
 
 BETWEEN_PICTURES_S = 0.5

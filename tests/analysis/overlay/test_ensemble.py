@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from vibench.analysis.model.ensemble import (
+from vibench.analysis.overlay.ensemble import (
     Ending,
     EnsembleCurve,
     Quantity,

@@ -4,8 +4,8 @@ One specimen, one drive over frequency, up to two models; answers come piece by 
 their own, which computes one request after another and can be told to stop. Errors and costs of each
 accuracy are those of docs/accuracy.md.
 
->>> from vibench.analysis.simulation.progress import SimulationRequest
->>> from vibench.analysis.simulation.accuracy_cost import cost_sentences
+>>> from vibench.analysis.prediction.progress import SimulationRequest
+>>> from vibench.analysis.prediction.accuracy_cost import cost_sentences
 >>> request = SimulationRequest(start_hz=250.0, stop_hz=270.0, step_hz=5.0)
 >>> request.models, request.points
 (('hertz', 'linear'), 10)
