@@ -37,8 +37,8 @@ def test_noise_is_known_as_well_as_was_said_before(tmp_path):
     for said, found in zip(expected, budgets, strict=True):
         assert said.quantity == found.quantity
         assert said.not_stated == found.not_stated
-        # An estimate: fits lose something to their background, and scatter is of few realisations.
-        assert 0.25 < said.scatter / found.share(Cause.NOISE) < 2.5, said.quantity
+        # The sensors' noise alone: hiss of the generator and the amplifier, which no rig states, comes on top.
+        assert 0.5 < said.scatter / found.share(Cause.NOISE) < 1.2, said.quantity
 
 
 def test_four_times_the_time_halves_the_scatter_and_no_calibration():

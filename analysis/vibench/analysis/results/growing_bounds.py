@@ -10,6 +10,7 @@ import re
 import sys
 import time
 from dataclasses import dataclass
+from itertools import accumulate
 from math import hypot
 from pathlib import Path
 
@@ -33,18 +34,23 @@ _PAUSE_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class _ChannelsSoFar(RecordedChannels):
-    """A recording up to a look: realisations that are whole, or one stretch as if it ended there."""
+    """A recording up to a look: realisations that were whole, or one stretch as if it ended there."""
 
     stretch: int = 1
-    samples_of_it: int = 0
+    samples_so_far: int = 0
+    """Of that stretch, or of all realisations."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Give what belongs to the look."""
         found = super().stretches(label)
         if label == SegmentLabel.REALISATION:
-            return tuple(each for each in found if each.is_complete)
+            whole = [each for each in found if each.is_complete]
+            total = accumulate(each.samples for each in whole)
+            return tuple(
+                each for each, so_far in zip(whole, total, strict=True) if so_far <= self.samples_so_far
+            )
         return tuple(
-            Stretch(each.start, each.start + self.samples_of_it, each.numbers, is_complete=True)
+            Stretch(each.start, each.start + self.samples_so_far, each.numbers, is_complete=True)
             for each in found[self.stretch - 1 : self.stretch]
         )
 
@@ -77,7 +83,7 @@ def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, rec
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)
-    channels = _ChannelsSoFar(recording, stretch=stretch, samples_of_it=samples)
+    channels = _ChannelsSoFar(recording, stretch=stretch, samples_so_far=samples)
     return Result(ANALYSES[plan.kind].analyse(facts, channels, plan, DEFAULT_REQUEST), None)
 
 

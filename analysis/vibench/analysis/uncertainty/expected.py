@@ -12,12 +12,15 @@ from vibench.acquisition.plan import (
     FEWEST_REALISATIONS,
     LOOK_FACTOR,
     Dwell,
+    Excitation,
     Family,
     HeldDwell,
     HeldNoise,
     Measurement,
+    OddMultisine,
     SteppedSine,
     Until,
+    WhiteNoise,
     base_motion,
     preview_measurement,
 )
@@ -26,11 +29,14 @@ from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, amplifier_of, s
 from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, InvalidRequest
+from ..frequency_response.resonance import resonances
+from ..frequency_response.results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II
 from ..recordings.checks import Check, Verdict
 from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals
+from ..signals.window import Window
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Labelled
 from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, Stated, stated_uncertainties
@@ -336,51 +342,84 @@ def _densities(rig: Rig) -> tuple[float, float] | None:
 
 
 def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
-    """Scatter by noise over signal at each mode: of a line, and of a pole from the lines of its bandwidth.
-
-    For H = a / (1 + i x), x = (f - f0) / (zeta f0), with unknown complex a, the Fisher information of f0 in
-    lines of relative variance v, one every d Hz, is (pi / 4) (zeta f0 / d) / (zeta f0)^2 / v; v d does not
-    depend on d.
-    """
-    time_s = sum(each.record_s for each in measurement.excitation.steps())
-    specimen = rig.specimen.specimen()
-    low_hz, high_hz = measurement.excitation.band_hz
+    """Yield what the fit of the analysis tells of the linear specimen's lines under the sensors' noise."""
+    excitation, specimen = measurement.excitation, specimen_of(rig)
+    time_s = recorded_s(measurement)
+    low_hz, high_hz = excitation.band_hz
     rms_v = preview_measurement(measurement, rig).rms_v * rig.generator.terminal_factor()
-    noise = _densities(rig)
-    own_hz = np.asarray(specimen.natural_frequencies_hz, dtype=np.float64)
-    moved = np.abs(base_transmissibility(specimen, own_hz)[:, 0])
-    per_volt = np.abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, own_hz))
-    base = (rms_v * per_volt) ** 2 / (high_hz - low_hz)
-    response = base * (moved / (2 * np.pi * own_hz)) ** 2
     if _fills_gap(specimen, rig, rms_v, low_hz, high_hz):
         yield Expected("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
         return
-    for hz, damping, x, u in zip(own_hz, specimen.damping_ratios, response, base, strict=True):
-        if not low_hz <= hz <= high_hz:
-            continue
-        half_hz = float(damping * hz)
-        pole = None
-        if noise is not None:
-            # Relative variance of a line times its width and the recording time.
-            line = (noise[0] / x + noise[1] / u) / 2.0
-            pole = float(np.sqrt(line / time_s / half_hz / (np.pi / 4)))
-        ratio = None if pole is None else pole * float(np.sqrt(np.pi / 4))
-        clock = stated.timed(1)
-        lasting = float(stated.clock.relative or 0.0)
-        where = f"{hz:.0f} Hz"
-        scaled = None if pole is None else pole * float(damping)
+    modes: list[tuple[float, tuple[float | None, ...]]] = [
+        (hz, (None, None, None)) for hz in specimen.natural_frequencies_hz if low_hz <= hz <= high_hz
+    ]
+    if (noise := _densities(rig)) is not None:
+        lines = _expected_lines(excitation, rig, rms_v**2 / (high_hz - low_hz), noise, time_s)
+        try:
+            found = resonances(lines, low_hz=low_hz, high_hz=high_hz)
+        except InvalidRequest:  # the band has too few lines for a fit
+            return
+        modes = [
+            (
+                each.frequency_hz,
+                (
+                    each.sd_frequency_hz / each.frequency_hz,
+                    each.sd_damping_ratio / each.damping_ratio,
+                    each.sd_peak_magnitude / each.peak_magnitude,
+                ),
+            )
+            for each in found
+        ]
+    clock, lasting = stated.timed(1), float(stated.clock.relative or 0.0)
+    scale = float(np.hypot(stated.scale_sd, lasting))
+    calibrations = _missing(stated.response, stated.base, clock)
+    for hz, (frequency, damping, peak) in modes:
+        at = f"{hz:.0f} Hz"
         yield Expected(
-            f"resonance at {where}, frequency", time_s, scaled, Cause.NOISE, lasting, _missing(clock)
+            f"resonance at {at}, frequency", time_s, frequency, Cause.NOISE, lasting, _missing(clock)
         )
-        yield Expected(f"resonance at {where}, damping ratio", time_s, pole, Cause.NOISE, 0.0, ())
-        yield Expected(
-            f"transmissibility at {where}",
-            time_s,
-            ratio,
-            Cause.NOISE,
-            float(np.hypot(stated.scale_sd, lasting)),
-            _missing(stated.response, stated.base, clock),
-        )
+        yield Expected(f"resonance at {at}, damping ratio", time_s, damping, Cause.NOISE, 0.0, ())
+        yield Expected(f"transmissibility at {at}", time_s, peak, Cause.NOISE, scale, calibrations)
+
+
+def _expected_lines(
+    excitation: Excitation, rig: Rig, density_v: float, noise: tuple[float, float], time_s: float
+) -> FrequencyResponse:
+    """Return the linear transmission at the lines of a noise, each with its scatter after a recorded time.
+
+    Parameters
+    ----------
+    density_v
+        Of the voltage at the terminal, one-sided [V^2/Hz].
+    noise
+        One-sided densities of the response's velocity [(m/s)^2/Hz] and the base's acceleration [(m/s2)^2/Hz].
+    """
+    if isinstance(excitation, WhiteNoise | OddMultisine):
+        lines_hz = np.asarray(excitation.lines, dtype=np.float64) * excitation.repetition_hz
+        apart_hz = (excitation.band_hz[1] - excitation.band_hz[0]) / lines_hz.size
+    else:
+        apart_hz = _GRID_HZ
+        lines_hz = np.arange(*excitation.band_hz, apart_hz, dtype=np.float64)
+    value = base_transmissibility(specimen_of(rig), lines_hz)[:, 0]
+    base = density_v * np.abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, lines_hz)) ** 2
+    response = base * np.abs(value / (2 * np.pi * lines_hz)) ** 2
+    by_response, by_base = noise[0] / response, noise[1] / base
+    relative_sd = np.sqrt((by_response + by_base) / (2 * time_s * apart_hz))
+    settings = FrequencyResponseSettings(Estimator.DRIVE, 1.0, 1, Window.BOXCAR, overlap=0.0, confidence=0.95)
+    return FrequencyResponse(
+        frequency_hz=lines_hz,
+        value=value,
+        coherence=1 / ((1 + by_response) * (1 + by_base)),
+        n_eff=max(time_s * apart_hz, 2.0),
+        relative_sd_magnitude=relative_sd,
+        sd_phase_rad=relative_sd,
+        half_width=COVERAGE * relative_sd,
+        coherence_significance=0.0,
+        resolution_hz=0.0,
+        segments_used=1,
+        segments_excluded=0,
+        settings=settings,
+    )
 
 
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
