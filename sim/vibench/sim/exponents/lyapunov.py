@@ -1,9 +1,9 @@
 """The largest Lyapunov exponent of a specimen under a harmonic drive, with its error. SI units.
 
-One small change of the motion is carried along exactly, through flight and every contact; its growth,
-averaged, is the exponent. What the run ends in decides how it is taken: from the modes if no impact will
+One small variation of the motion is propagated exactly through flight and contacts; its mean growth rate
+is the exponent. The final motion decides how it is found: from the modes if no impact will
 follow, from the multipliers if the motion has become periodic, else as a mean with a standard error that
-knows of the correlation between neighbouring intervals. Chaos that has died out on the way is distinguished.
+allows for correlation between neighbouring intervals. Transient chaos is reported separately.
 """
 
 import math
@@ -38,11 +38,11 @@ from .tangent_run import (
 )
 
 FEWEST_INTERVALS = 32
-"""Intervals that must fit into the duration, so that a mean can have an error."""
+"""Fewest intervals in the duration, so that the mean has a known error."""
 
 
 class ExponentVerdict(StrEnum):
-    """What the exponent says, within its error."""
+    """Meaning of the exponent within its error."""
 
     CHAOTIC = "chaotic: neighbouring motions part"
     REGULAR = "regular: neighbouring motions come together"
@@ -51,7 +51,7 @@ class ExponentVerdict(StrEnum):
 
 
 class Source(StrEnum):
-    """Where an exponent was taken from."""
+    """How an exponent was found."""
 
     AVERAGE = "mean growth over the run"
     MULTIPLIERS = "multipliers of the periodic motion at the end"
@@ -60,10 +60,10 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class ChaoticTransient:
-    """Chaos that died out."""
+    """Transient chaos."""
 
     exponent_per_s: float
-    """While it lasted."""
+    """Exponent during the transient."""
     standard_error_per_s: float
     until_s: float
     impacts: int
@@ -71,7 +71,7 @@ class ChaoticTransient:
 
 @dataclass(frozen=True)
 class Precision:
-    """How small an error is small enough."""
+    """Required error of an exponent."""
 
     absolute_per_s: float
     """Standard error [1/s]."""
@@ -84,7 +84,7 @@ class Precision:
             raise ValueError(msg)
 
     def is_reached_by(self, exponents: Floats) -> bool:
-        """Return whether the mean of local exponents, shape (n,), is known so well."""
+        """Return whether the mean of local exponents, shape (n,), is known to this precision."""
         if len(exponents) < FEWEST_INTERVALS:
             return False
         found = block_mean(exponents)
@@ -138,7 +138,7 @@ def lyapunov_exponent(
     precision: Precision | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovEstimate:
-    """Return whether neighbouring motions part, and how fast.
+    """Return the largest Lyapunov exponent: how fast neighbouring motions separate.
 
     The first ``settle_s`` only find the attractor; the exponent is that of the following ``duration_s``, or
     of the motion in which they end. Together the defaults are the paper's 30 s from rest.
@@ -146,7 +146,7 @@ def lyapunov_exponent(
     Parameters
     ----------
     specimen, drive
-        What moves, by any contact law, and what moves it.
+        Specimen with any contact law, and its drive.
     accuracy
         Of the motion. In chaos an exponent is the same at every level, within its error.
     duration_s, settle_s
@@ -209,13 +209,13 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
 
 @dataclass(frozen=True)
 class _Exponent:
-    """An exponent as it was taken."""
+    """An exponent and how it was found."""
 
     mean: float
     error: float
     source: Source
     since: int
-    """Interval in which it begins."""
+    """Interval in which the averaged part begins."""
     blocks: BlockedMean | None = None
 
 
@@ -223,7 +223,7 @@ _LOST = _Exponent(math.nan, math.nan, Source.AVERAGE, 0)
 
 
 def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, skipped: int) -> _Exponent:
-    """Take the exponent from what says most about the final motion."""
+    """Find the exponent from modes, multipliers or an average, whichever suits the final motion."""
     match end.motion:
         case FinalMotion.QUIET:
             slowest = float(np.max(modal_form(specimen).rates.real))
@@ -279,7 +279,7 @@ def _estimate(
 
 
 def verdict_of(mean: float, error: float) -> ExponentVerdict:
-    """Return what an exponent means within its error."""
+    """Return the verdict on an exponent with its error."""
     if not (math.isfinite(mean) and math.isfinite(error)):
         return ExponentVerdict.UNKNOWN
     if abs(mean) <= SURE * error:
@@ -294,7 +294,7 @@ def _verdict(taken: _Exponent) -> ExponentVerdict:
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
-    """Return whether a run was chaotic before its final motion."""
+    """Return the chaotic transient before the final motion; None without one."""
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None

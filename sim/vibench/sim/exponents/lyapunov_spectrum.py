@@ -1,8 +1,8 @@
 """All six Lyapunov exponents of a specimen under a harmonic drive, and the dimension they give. SI units.
 
-Six small changes span every direction of the state; carried along together and made orthogonal as they go,
+Six small variations span all directions of the state. Propagated together and made orthogonal repeatedly,
 they give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is the mean
-rate at which volumes shrink: -tr(M^-1 C) for every elastic law and any motion, which tests the whole
+rate at which volumes shrink: -tr(M^-1 C) for every elastic law and any motion, which tests the
 calculation.
 """
 
@@ -41,7 +41,7 @@ class LyapunovSpectrum:
     drive: Harmonic
     accuracy: Accuracy
     exponents_per_s: Floats
-    """Descending, shape (6,); minus infinity for a direction that a stop which holds m1 has taken away."""
+    """Descending, shape (6,); minus infinity for a direction that is lost while a stop holds m1."""
     standard_errors_per_s: Floats
     """Shape (6,); zero where the exponents are those of the modes."""
     blocks: NDArray[np.int64]
@@ -63,7 +63,7 @@ class LyapunovSpectrum:
 
     @property
     def sum_per_s(self) -> float:
-        """Mean rate at which the logarithm of a volume changes."""
+        """Sum of the exponents: mean rate of change of a volume's logarithm."""
         return float(np.sum(self.exponents_per_s))
 
     @property
@@ -99,10 +99,10 @@ def lyapunov_spectrum(
     interval_s: float | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovSpectrum:
-    """Return how fast neighbouring motions part or come together, in every direction.
+    """Return all Lyapunov exponents: how fast neighbouring motions separate or converge in each direction.
 
     Arguments as in `vibench.sim.lyapunov_exponent`, ``initial_state`` of shape (6,) [m, m/s]; the
-    errors need blocks as long as the motion's memory too.
+    standard errors need blocks longer than the correlation time of the motion.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
@@ -178,7 +178,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
         return _Taken(
             decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
         )
-    # A motion that settles late may leave little to average: never less than half of what was asked for.
+    # A motion that settles late leaves little to average; at least half of the requested time is used.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]
     means = [_mean(each) for each in rates.T]
@@ -218,7 +218,7 @@ def _dimension_error(rates: Floats, exponents: Floats) -> float:
 
 
 def kaplan_yorke(exponents: Floats) -> float:
-    """Dimension that exponents in descending order give an attractor; all of them where none shrinks.
+    """Return the Kaplan-Yorke dimension from descending exponents; their number where none shrinks.
 
     j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative (Kaplan and Yorke, Lecture
     Notes in Mathematics 730 (1979) 204).

@@ -1,9 +1,9 @@
-"""A run that reads, at even intervals, how much small changes of the state have grown. SI units.
+"""Integration with small variations of the state, whose growth is read at even intervals. SI units.
 
-Between readings the changes are carried along exactly; at a reading they are made orthogonal and of unit
+Between readings the variations are propagated exactly. At a reading they are made orthogonal and of unit
 length in the energy norm s' diag(K, M) s, and the logarithms of what was divided out are kept (Benettin,
 Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9 and 21). The energy without stops is the specimen's
-natural norm: free motion can only shrink in it, so that what grows was made to grow by impacts.
+natural norm: free motion only shrinks in it, so that any growth is due to impacts.
 """
 
 import math
@@ -46,7 +46,7 @@ class BlockedMean:
     standard_error: float
     """Standard error of the mean; zero where all values are equal, NaN for a single one."""
     block_length: int
-    """Values in a block: a power of two, as few as make neighbouring blocks independent."""
+    """Values in a block: the smallest power of two for which neighbouring blocks are independent."""
     blocks: int
     correlation_length: float
     """Values that carry as much as one independent value: variance of the mean over that of as many
@@ -56,7 +56,7 @@ class BlockedMean:
 
 
 def block_mean(values: ArrayLike) -> BlockedMean:
-    """Average a series of evenly spaced values, shape (n,), n >= 1.
+    """Return the mean of evenly spaced values, shape (n,), n >= 1, with its error.
 
     Raises ValueError when there is no value, or one is not finite.
     """
@@ -110,11 +110,11 @@ LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
 """Several changes are made orthogonal at least this often, in radians and decays of the fastest mode: they
 stay apart by several digits."""
 CHECKS = 32
-"""How often at most a run asks whether it has lasted long enough."""
+"""Most checks per run whether it has lasted long enough."""
 ALMOST = 1e-9
-"""A duration this close to a whole number of intervals is taken for it."""
+"""A duration this close to a whole number of intervals counts as whole."""
 Enough = Callable[[Floats], bool]
-"""Asked on the way, with the growth of the intervals so far, shape (n, m): may the run end here?"""
+"""Called during a run with the growth of the intervals so far, shape (n, m): returns whether it may end."""
 CYCLES = 2.0
 """Cycles of the slowest mode in an interval, unless another is asked for."""
 
@@ -128,14 +128,14 @@ class Interval:
     """Drive periods in it; 0 if it is no whole number of them."""
 
     def count_in(self, duration_s: float) -> int:
-        """Return how many fit into a duration."""
+        """Return the number of intervals in a duration."""
         return math.floor(duration_s / self.length_s * (1.0 + ALMOST))
 
 
 def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = None) -> Interval:
     """Choose whole drive periods of ``about_s`` [s], two cycles of the slowest mode when None.
 
-    Drive periods longer than twice that are cut where they need not be whole.
+    Drive periods longer than twice that are divided.
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
     if not 0.0 < about < math.inf:
@@ -149,7 +149,7 @@ def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = No
 
 @dataclass(frozen=True, eq=False)
 class TangentRun:
-    """How small changes of a motion grew, interval by interval."""
+    """Growth of small variations of a motion in each interval."""
 
     interval: Interval
     growth: Floats
@@ -216,14 +216,14 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """In how many parts an interval is cut so that no change is lost among the others."""
+    """Return the number of parts of an interval that keep the variations numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
 
 
 def starting_changes(metric: Table, changes: int) -> Table:
-    """Make changes in general directions, the same in every run, orthonormal in the metric."""
+    """Return starting variations, orthonormal in the metric and the same in every run."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
     root = np.linalg.cholesky(metric)
@@ -231,7 +231,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
     return np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T
 
 
-# Where a run comes to rest in its final kind of motion, and whether it was chaotic before. SI units.
+# When a run settles into its final kind of motion, and whether it was chaotic before. SI units.
 #
 # A run can strike its stops thousands of times and then leave them for good: chaos that was a transient
 # (Grebogi, Ott and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run belongs to no state
@@ -253,7 +253,7 @@ ALIGNING = 8
 
 
 class FinalMotion(StrEnum):
-    """What a run ends in."""
+    """Final kind of motion of a run."""
 
     QUIET = "no impact will follow: the linear motion"
     PERIODIC = "a periodic motion"
@@ -263,7 +263,7 @@ class FinalMotion(StrEnum):
 
 @dataclass(frozen=True)
 class Settling:
-    """Since when a run was in its final kind of motion."""
+    """When a run settled into its final kind of motion."""
 
     motion: FinalMotion
     since: int
@@ -273,7 +273,7 @@ class Settling:
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Find the final motion of a run and its beginning; ``scales`` measure a state, shape (6,)."""
+    """Find the final motion of a run and its beginning; ``scales`` are those of a state, shape (6,)."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)
@@ -292,14 +292,14 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Find where the mean growth falls from certainly positive to not positive."""
+    """Find where the mean growth changes from significantly positive to not positive."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None
     places = np.arange(FEWEST_INTERVALS, count - FEWEST_INTERVALS + 1)
     sums = np.cumsum(growth)
     before, after = sums[places - 1] / places, (sums[-1] - sums[places - 1]) / (count - places)
-    # The split that leaves the least scatter about the two means.
+    # The split with the least scatter about the two means.
     place = int(places[np.argmax((before - after) * np.sqrt(places * (count - places)))])
     head, tail = block_mean(growth[:place]), block_mean(growth[place:])
     is_falling = head.mean > SURE * head.standard_error and tail.mean <= SURE * tail.standard_error

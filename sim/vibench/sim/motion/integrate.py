@@ -1,4 +1,4 @@
-"""The motion of a specimen under a drive, from a state to a later time. SI units."""
+"""Integration of a specimen's motion under a drive. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from ..specimen.stops import chosen
 HERMITE = 384.0
 """Cubic Hermite interpolation errs by h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
-"""Part of the accuracy's tolerance that the interpolation of a sweep may use."""
+"""Part of the accuracy's tolerance for the interpolation of a sweep."""
 SHORTEST_TURN = 0.005
 """Shortest interval [rad]: shorter ones gain nothing; its error is 2e-12 of the amplitude."""
 
@@ -42,7 +42,7 @@ class BaseMotion(NamedTuple):
 def sampled_motion(drive: Sampled) -> BaseMotion:
     """Cut a sampled drive at its samples."""
     interval = 1.0 / drive.sample_rate_hz
-    # In units of the interval: the spline of the sample numbers is exact about where the knots are.
+    # In units of the interval, so that the knots of the spline are exact.
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - harmonic drives do without scipy
 
     spline = CubicSpline(np.arange(len(drive.displacement_m), dtype=np.float64), drive.displacement_m)
@@ -50,7 +50,7 @@ def sampled_motion(drive: Sampled) -> BaseMotion:
 
 
 def sweep_interval_s(drive: Sweep, accuracy: Accuracy) -> float:
-    """Length of interval at which the interpolation keeps to its share of the tolerance."""
+    """Longest interval for which the interpolation error stays within its part of the tolerance."""
     turn = max(SHORTEST_TURN, (HERMITE * SHARE * accuracy.tolerance) ** 0.25)
     intervals = math.ceil(drive.duration_s * 2.0 * math.pi * drive.highest_hz / turn)
     interval: float = drive.duration_s / intervals
@@ -76,25 +76,25 @@ LATEST_START_S = 1e8
 MOST_SAMPLES = 1e9
 """48 gigabytes."""
 ROUNDING = 1e-9
-"""A duration this close to a whole number of samples or intervals is taken for it."""
+"""A duration this close to a whole number of samples or intervals counts as whole."""
 
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """When m1 touched a stop."""
+    """Impacts of m1 on its stops."""
 
     times_s: Floats
     """Ascending, shape (count,) [s]."""
 
     @property
     def count(self) -> int:
-        """How many contacts began."""
+        """Number of contacts that began."""
         return len(self.times_s)
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Where the specimen went, when it struck, and how the run ended."""
+    """States, impacts and outcome of a run."""
 
     time_s: Floats
     """Shape (n,); empty when no sample rate was asked for."""
@@ -105,7 +105,7 @@ class Trajectory:
     end_time_s: float
     impacts: Impacts
     outcome: Outcome
-    """Look here first: only REACHED_END reached the time that was asked for."""
+    """Only REACHED_END means that the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -164,7 +164,7 @@ def integrate(
     else:
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
-    # A sample that rounding puts at, or a hair beyond, the very end.
+    # Rounding may place the last sample at or just beyond the end.
     states = record.all_samples(run.motion) if is_whole else record.samples
     return Trajectory(
         time_s=start_time_s + np.arange(len(states)) / rate_hz,
@@ -178,14 +178,14 @@ def integrate(
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:
-    """Refuse a number of impacts that no run can be held to."""
+    """Refuse a limit of the impact rate that is not positive."""
     if not 0.0 <= max_impact_rate_hz < math.inf:
         msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
         raise ValueError(msg)
 
 
 def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | None) -> None:
-    """Refuse times and rates that no run can have."""
+    """Refuse impossible times and sample rates."""
     if not 0.0 <= duration_s < math.inf:
         msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
         raise ValueError(msg)
@@ -204,14 +204,14 @@ def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | 
 
 
 def check_within(available_s: float, end_s: float) -> None:
-    """Refuse a run that outlasts its drive."""
+    """Refuse a run that lasts longer than its drive."""
     if end_s > available_s * (1.0 + ROUNDING):
         msg = f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
         raise ValueError(msg)
 
 
 BATCH = 1 << 16
-"""Intervals of a sweep that are cut at a time: bounds the memory of a long sweep."""
+"""Intervals of a sweep that are made at once, which bounds the memory of a long sweep."""
 
 
 def integrate_cubics(
@@ -260,7 +260,7 @@ def integrate_cubics(
 
 
 def _place(time_s: float, interval_s: float) -> tuple[int, float]:
-    """Find the interval that begins at or holds an instant, and how far into it that is."""
+    """Return the interval that contains an instant, and the time from its beginning."""
     position = time_s / interval_s
     nearest = round(position)
     if abs(position - nearest) < ROUNDING * max(1.0, position):
@@ -268,7 +268,7 @@ def _place(time_s: float, interval_s: float) -> tuple[int, float]:
     return int(position), time_s - int(position) * interval_s
 
 
-# A specimen followed sample by sample of its base: what laying a model over a recording needs. SI units.
+# The motion at each sample of the recorded base, as overlays of a model on a recording need it. SI units.
 #
 # `integrate` answers more (impact times, samples anywhere, any end) and costs several times as much per
 # interval. Here every interval is whole, the state at its end is kept, and impacts are counted.

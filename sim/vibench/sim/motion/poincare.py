@@ -1,4 +1,4 @@
-"""The motion once a drive period: the stroboscopic map, and what it tells of a motion's period. SI units."""
+"""The stroboscopic map (one state per drive period), and the period of a motion. SI units."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ def stroboscopic_section(
     accuracy: Accuracy = Accuracy.STANDARD,
     initial_state: ArrayLike | None = None,
 ) -> Floats:
-    """Follow a motion from time zero and keep its state after every drive period, shape (periods, 6).
+    """Integrate from time zero and return the state after every drive period, shape (periods, 6).
 
     Raises ValueError when ``periods`` is below 1, or the run did not reach its end.
     """
@@ -41,7 +41,7 @@ def stroboscopic_section(
 
 
 def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, most: int = 32) -> int | None:
-    """Find the fewest drive periods after which the last points of a section repeat; None if they do not.
+    """Return the smallest number of drive periods after which a section repeats; None if it does not.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, mo
     tolerance
         Largest change of a state over its scale that counts as the same.
     most
-        Longest period tried.
+        Longest period to try.
     """
     points = section / scales
     for period in range(1, min(most, len(points) // 2) + 1):
@@ -69,9 +69,9 @@ def flow_derivative(
     duration_s: float,
     accuracy: Accuracy = Accuracy.REFERENCE,
 ) -> tuple[Floats, Floats]:
-    """Follow a motion from the drive's time zero and differentiate where it gets to.
+    """Integrate from the drive's time zero, and differentiate the final state by the initial one.
 
-    Where a rigid stop is just grazed no derivative exists, and very large numbers are returned.
+    At a grazing impact on a rigid stop no derivative exists, and very large numbers are returned.
 
     Parameters
     ----------

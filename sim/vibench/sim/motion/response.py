@@ -17,7 +17,7 @@ from .integrate import check_impact_rate
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What one point of a response curve says. NaN where the run did not reach its end."""
+    """One point of a response curve. NaN where the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
@@ -75,10 +75,10 @@ def steady_response(
     *,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> Response:
-    """Drive a specimen for a while and say how large its motion is at the end.
+    """Drive a specimen for some time and measure its motion at the end.
 
     The defaults are those of Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed. In
-    chaos Response I is one draw from a scatter of a few per cent, whatever the accuracy; the state
+    chaos Response I scatters by a few per cent at every accuracy. The state
     that is reached may depend on the ``initial_state``, shape (6,) [m, m/s], which therefore belongs to
     the record.
 
@@ -120,7 +120,7 @@ def steady_response(
 
 
 def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
-    """Refuse what cannot be observed; count the whole periods in the window."""
+    """Refuse windows that cannot be observed; return the number of whole periods in the window."""
     if drive.amplitude_m == 0.0:
         msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
         raise ValueError(msg)

@@ -4,5 +4,5 @@
 `hertz`. `Harmonic`, sweeps and `Sampled` say how the base moves, `Accuracy` how exactly to integrate,
 `Outcome` how a run ended. The linear specimen is solved exactly: state matrix, modes, transmissibility, the
 answer to the base with m1 free (`_modes`, `_against_stops`) or held by a rigid stop (`_bound_modes`). State
-order: x, y, z, vx, vy, vz [m, m/s], absolute. Knows nothing of steps or runs.
+order: x, y, z, vx, vy, vz [m, m/s], absolute. Nothing here integrates.
 """

@@ -1,25 +1,25 @@
-"""How exactly a simulation is asked to run: three named levels, each with one tolerance."""
+"""Accuracy of a simulation: three named levels, each with one tolerance."""
 
 from enum import StrEnum
 from typing import Literal
 
 
 class Accuracy(StrEnum):
-    """How far the state may be off after seconds of periodic impacts; flight is exact at every level.
+    """Largest error of the state after seconds of periodic impacts; flight is exact at every level.
 
     In units of 100 um and 0.1 m/s, against an independent solution; measured in docs/accuracy.md.
     """
 
     QUICK = "quick"
-    """1e-5: in chaos, as good as any other."""
+    """Error 1e-5. Chaotic motion gains nothing from a finer level."""
     STANDARD = "standard"
-    """1e-6."""
+    """Error 1e-6."""
     REFERENCE = "reference"
-    """1e-9: to judge the other two."""
+    """Error 1e-9: the reference for the other two."""
 
     @property
     def tolerance(self) -> float:
-        """Relative error allowed in one step of a contact: less than the promise, for errors add up."""
+        """Relative error allowed in one step of a contact; below the promise because errors add up."""
         return _TOLERANCES[self]
 
     @property

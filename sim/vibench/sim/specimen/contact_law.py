@@ -1,4 +1,4 @@
-"""The laws of contact between m1 and its stops: each a file of its own, its place in the union, and its row.
+"""Contact laws between m1 and its stops: their union type and their table. Each law has its own file.
 
 A law that yields, F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at the indentation d, needs nothing else: the
 native engine, the independent solution and harmonic balance take its `stops`. A force of another shape
@@ -28,7 +28,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
         "power": POWER,
     }
 )
-"""Contact laws by kind, as named on the command line and in files."""
+"""Contact laws by the names that the command line and files use."""
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
@@ -41,7 +41,7 @@ def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw
     text
         A word of `CONTACT_LAWS`, and what its form asks for behind a colon.
     contact_stiffness, gap_m
-        What a fitted law is fitted to: k_contact [N/m^1.5] of the paper's stops, and the clearance [m].
+        Contact that a fitted law approximates: k_contact [N/m^1.5] and clearance [m].
     """
     reference = Reference(contact_stiffness, gap_m)
     name, _, detail = text.strip().partition(":")

@@ -1,4 +1,4 @@
-"""What moves the base: its displacement as a function of time, from time zero on. SI units."""
+"""Drives: the base displacement as a function of time, from time zero. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ from pydantic import ConfigDict
 
 _STRICT = ConfigDict(extra="forbid")
 FEWEST_SAMPLES = 4
-"""A cubic spline without end conditions of its own needs four points."""
+"""A not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e100
-"""Beyond, squares of displacements are no numbers any more: errors of steps and scatters would be zero."""
+"""Squares of smaller displacements underflow, so that stated errors would be zero."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Far beyond, powers of a frequency overflow, and lengths in drive periods have no end."""
+"""Powers of higher frequencies overflow, and so do durations in drive periods."""
 
 
 @dataclass(frozen=True)
@@ -161,4 +161,4 @@ def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude
 
 
 WHOLE = 1e-9
-"""A window this close to a whole number of periods is taken for it."""
+"""A window this close to a whole number of periods counts as whole."""

@@ -1,4 +1,4 @@
-"""The base of every model that a TOML or JSON file describes."""
+"""Base class of every model that a TOML or JSON file describes."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ def _number(given: object) -> object:
 
 
 def _with_numbers_only(schema: Any) -> Any:
-    """Return a core schema in which nothing but a number is read as a number, nor as a truth value."""
+    """Return a core schema that reads only numbers as numbers and only booleans as booleans."""
     match schema:
         case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
             # pydantic's own strict mode would also refuse 1e3 for an integer, and numpy's numbers.
@@ -32,10 +32,10 @@ def _with_numbers_only(schema: Any) -> Any:
 
 
 class FrozenModel(BaseModel):
-    """Immutable, without unknown keys, and with numbers only where numbers are asked for.
+    """Immutable model that refuses unknown keys and accepts only numbers as numbers.
 
-    pydantic reads ``true`` as 1 and ``"45e-6"`` as a number. In a file both are slips of the pen, and
-    would become a mass of 1 kg. So every number of every field, however deep, must be a number.
+    pydantic reads ``true`` as 1 and ``"45e-6"`` as a number. In a file both are mistakes, and ``true`` would
+    become a mass of 1 kg. Therefore every number in every field, at any depth, must be a number.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -11,7 +11,7 @@ from .stops import STRICT, LawWord, Reference, Stops, require_nothing, require_p
 
 @dataclass(frozen=True)
 class Hertz:
-    """Elastic sphere on a plane: F = stiffness * penetration^(3/2), no loss of its own."""
+    """Elastic sphere on a plane: F = stiffness * penetration^(3/2), without loss."""
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5"}
 
@@ -40,7 +40,7 @@ HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz"
 
 @dataclass(frozen=True)
 class Elasticity:
-    """How stiff a body is: what its contact with another body needs."""
+    """Elastic constants of a body, for its contact with another one."""
 
     youngs_modulus: float
     """E [Pa]."""
@@ -56,7 +56,7 @@ class Elasticity:
 
     @property
     def plane_strain_compliance(self) -> float:
-        """(1 - nu^2) / E [1/Pa]: what each body adds to a contact's compliance."""
+        """(1 - nu^2) / E [1/Pa]: the body's share of a contact's compliance."""
         return (1.0 - self.poissons_ratio**2) / self.youngs_modulus
 
 

@@ -1,4 +1,4 @@
-"""A Hertz contact that loses energy. SI units."""
+"""Hertz contact with energy loss. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ class HuntCrossley:
     """Hertz contact that loses energy: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
 
     Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
-    forces m1 leaves more slowly than 1/loss whatever it came with, so that the stop never pulls; springs that
-    tear it off faster than that do make it pull, as the law says.
+    forces m1 leaves more slowly than 1/loss at any speed of approach, so that the stop never pulls. Springs
+    that pull m1 off faster make the force of this law negative.
     """
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}

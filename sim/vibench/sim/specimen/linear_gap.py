@@ -11,7 +11,7 @@ from .stops import PAPER_INDENTATION_M, STRICT, LawWord, Reference, Stops, numbe
 
 @dataclass(frozen=True)
 class LinearGap:
-    """Stops that are springs: F = stiffness * penetration, no loss of its own."""
+    """Stops that are springs: F = stiffness * penetration, without loss."""
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
 

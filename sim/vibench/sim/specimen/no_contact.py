@@ -10,7 +10,7 @@ from .stops import STRICT, LawWord, Reference, Stops, require_nothing
 
 @dataclass(frozen=True)
 class NoContact:
-    """No stops at all: the linear specimen, whatever the gap says."""
+    """No stops: the linear specimen. Its gap is ignored."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 

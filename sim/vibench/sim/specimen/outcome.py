@@ -1,4 +1,4 @@
-"""How a simulation ended: a value, not an exception, whose text says what to change."""
+"""Outcome of a simulation: a value, not an exception. Its text tells the user what to change."""
 
 from enum import IntEnum
 

@@ -1,4 +1,4 @@
-"""Powers of p at every p: the continuous substitute of stops. SI units."""
+"""Power-law forces that act at every p: the continuous substitute of stops. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Beyond it the law is a wall for every purpose: a part in a thousand of p changes the force by e."""
+"""Higher exponents act like a rigid wall: a thousandth of p changes the force by a factor of e."""
 
 
 @dataclass(frozen=True)
 class PowerLaw:
     """The continuous substitute of stops: F = sum force_i (p / reference)^exponent_i, at every p.
 
-    Held relative to a reference displacement, because a coefficient of p^47 in SI is 1e204 and overflows.
-    The gap plays no part in it (Gong et al. 2025, eq. 3).
+    Forces are stated at a reference displacement, because the coefficient of p^47 in SI units is 1e204.
+    The gap does not enter (Gong et al. 2025, eq. 3).
     """
 
     OWN_UNITS: ClassVar = {"reference": "m"}
@@ -83,9 +83,9 @@ def fit_power_law(
     exponents
         Odd, in any order: (5,) or (3, 5, 7).
     contact_stiffness, gap_m, indentation_m
-        k_contact [N/m^1.5] of what is fitted, and where.
+        k_contact [N/m^1.5] of the Hertz contact, and the place of equal force.
     shares
-        Part of that force which each power takes; they must add up to 1. The paper leaves it open; the
+        Part of the force that each power takes; they must add up to 1. The paper does not state it; the
         default is equal parts.
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)

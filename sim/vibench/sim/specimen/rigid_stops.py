@@ -1,4 +1,4 @@
-"""Stops that do not yield. SI units."""
+"""Rigid stops with a coefficient of restitution. SI units."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -10,7 +10,7 @@ from .stops import STRICT, LawWord, Reference, Stops, number_in
 
 @dataclass(frozen=True)
 class RigidStops:
-    """Stops that do not yield: m1 and m2 part with ``restitution`` times the speed of approach (Newton)."""
+    """Rigid stops: m1 and m2 separate with ``restitution`` times the speed of approach (Newton)."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 

@@ -26,7 +26,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Specimen:
-    """What is shaken. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
+    """The specimen on the shaker. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
 
     OWN_UNITS: ClassVar = {
         "masses": "kg",
@@ -134,7 +134,7 @@ JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
-    """Return M, C and K of the two bodies, x and z, that are left while m1 sticks to m2.
+    """Return M, C and K of the two bodies, x and z, that remain while m1 sticks to m2.
 
     Returns
     -------
@@ -168,13 +168,13 @@ def gong2025(
     Parameters
     ----------
     damping_time_s
-        c_i = damping_time_s * k_i [s]. The paper leaves it open; the default is the one reading
-        found under which both of its statements on chaos hold.
+        c_i = damping_time_s * k_i [s]. The paper does not state it. The default is the only value
+        found for which both of its statements on chaos hold.
     gap_m
         Clearance at each stop [m], or (lower, upper); a power law is fitted at the nearer.
     contact
-        ``"hertz"``: the paper's stops; ``"linear"``: none; ``"power:5"`` and others as
-        `vibench.sim.specimen` says.
+        ``"hertz"``: the paper's stops; ``"linear"``: no stops; ``"power:5"`` and others: see
+        `vibench.sim.specimen`.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]
 
 
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Measure of a state, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
+    """Return a state's scales, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
     speed = 2.0 * np.pi * drive.frequency_hz
     return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
 

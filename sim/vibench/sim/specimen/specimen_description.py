@@ -1,7 +1,7 @@
-"""A specimen as data: its numbers, in a file or in a table of another file, and where they come from.
+"""Description of a specimen: its numbers and their sources, in a file or in a table of another file.
 
-A description says everything of a specimen; nothing in it is assumed. It may start from another one
-(``model``, by name or by path) and say what differs, as the tables of rigs, studies and imports do.
+A description is complete: nothing is assumed. It may start from another one (``model``, by name or by
+path) and state only differences, as the tables of rigs, studies and imports do.
 """
 
 import math
@@ -45,15 +45,15 @@ of a file. Without it only shipped specimens can be named, so that a recording o
 SOURCES = "sources"
 SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
-"""Key by which a file may say which version it was written for, and the one that is read."""
+"""Key for the format version of a file, and the version that is read."""
 DEEPEST = 5
-"""Files that a file may start from, one after the other."""
+"""Longest chain of files that start from one another."""
 USUAL_SPECIMEN = "gong2025"
-"""The specimen of a rig, a study or a command that names none."""
+"""The specimen of a rig, study or command that names no specimen."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
-"""Pairs of keys that say the same: a specimen has one of each."""
+"""Pairs of alternative keys: a specimen has exactly one of each pair."""
 _ANY_GAP_M = 1e-5
-"""For asking whether a contact law is known, which depends on no gap."""
+"""Any gap, to find out whether a contact law is known."""
 PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
 NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
@@ -71,7 +71,7 @@ class _Described(FrozenModel):
 
 
 class Material(_Described):
-    """How stiff a body is."""
+    """Elastic constants of a body."""
 
     youngs_modulus_pa: PositiveFloat
     """E."""
@@ -80,12 +80,12 @@ class Material(_Described):
 
     @property
     def elasticity(self) -> Elasticity:
-        """The same for a contact."""
+        """Return the elastic constants without units."""
         return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
 
 
 class SphereOnPlane(_Described):
-    """Two bodies that touch: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
+    """A sphere on a plane: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
 
     radius_m: PositiveFloat
     """Radius of the sphere at the point that touches."""
@@ -108,27 +108,27 @@ ContactWord = Annotated[str, AfterValidator(_known_law)]
 
 
 def _infinity(said: object) -> object:
-    """Read the word that stands for an infinite gap in JSON, which has no such number."""
+    """Read the word for an infinite gap, because JSON has no infinite numbers."""
     return math.inf if said in ("inf", "Infinity") else said
 
 
 Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_infinity)]
 DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
-"""Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Far beyond, runs
-take minutes, or their numbers leave those of a computer."""
+"""Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Much longer ones
+make runs take minutes or overflow."""
 
 
 class SpecimenDescription(_Described):
     """Three masses in a chain, base - m0 - m2 - m1, with stops for m1 on m2 (Gong et al. 2025, eq. 1).
 
-    Fewer or more masses, other places for the stops, springs that harden by themselves, friction and
-    several pairs of stops are not described.
+    Other numbers of masses, other places of the stops, hardening springs, friction and several pairs of
+    stops are not supported.
     """
 
     name: Annotated[str, Field(min_length=1, max_length=60)]
-    """How the specimen is called in results."""
+    """Name of the specimen in results."""
     about: str = ""
-    """What it is, in a line."""
+    """Description in one line."""
     masses_kg: PositiveTriple
     """m0, m1, m2."""
     single_frequencies_hz: PositiveTriple | None = None
@@ -145,20 +145,20 @@ class SpecimenDescription(_Described):
     contact: ContactWord
     """Law of the stops: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
     hertz_stiffness: PositiveFloat | SphereOnPlane
-    """k of F = k d^(3/2) at a stop [N/m^1.5], or the bodies that touch; what other laws are fitted to."""
+    """k of F = k d^(3/2) at a stop [N/m^1.5], or the two bodies; other laws are fitted to it."""
     sources: dict[str, str] = Field(default={})
-    """Where a number comes from, by its key."""
+    """Source of each number, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
-    """What a table says that does not say it."""
+    """Value of a table that does not state it."""
 
     def __hash__(self) -> int:
-        # A table of sources has no hash of its own; all that is said is in the text.
+        # A table of sources has no hash; its text contains all of it.
         return hash(self.model_dump_json())
 
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, said: object, info: ValidationInfo) -> object:
-        """Fill in what a table leaves to the specimen that it names; a name alone is that specimen."""
+        """Fill in from the specimen that a table names; a name alone means that specimen."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match said:
             case str():
@@ -179,7 +179,7 @@ class SpecimenDescription(_Described):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Say what is wrong in the bodies, where bodies are given: pydantic complains of a number first."""
+        """Report errors of the bodies where they are given; pydantic would first report a missing number."""
         try:
             return handler(said)
         except ValidationError as error:
@@ -190,7 +190,7 @@ class SpecimenDescription(_Described):
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
-        """Write an infinite clearance as a word: JSON has no number for it, whatever holds the specimen."""
+        """Write an infinite clearance as a word, because JSON has no infinite numbers."""
         if isinstance(gap_m, float):
             return gap_m
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
@@ -282,13 +282,13 @@ class SpecimenDescription(_Described):
 
 
 class SpecimenTable(SpecimenDescription):
-    """A specimen in a rig, a study or an import: what differs from the one that it names, or the paper's."""
+    """Specimen of a rig, study or import: differences from the named specimen, by default the paper's."""
 
     _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
 
 
 def usual_specimen() -> SpecimenTable:
-    """Return the specimen that is meant where none is named: the paper's."""
+    """Return the default specimen: the paper's."""
     return SpecimenTable.model_validate(USUAL_SPECIMEN)
 
 
@@ -298,7 +298,7 @@ def load_specimen(specimen: str | Path) -> SpecimenDescription:
     Raises
     ------
     UnknownSpecimenError
-        In one sentence, when there is none, or when the file does not describe one.
+        When there is no such file, or it does not describe a specimen.
     """
     try:
         return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})
@@ -307,12 +307,12 @@ def load_specimen(specimen: str | Path) -> SpecimenDescription:
 
 
 def shipped_specimens() -> Mapping[str, SpecimenDescription]:
-    """Return the specimens that come with vibench, by the names that may stand for a file."""
+    """Return the specimens that come with vibench, by name."""
     return {name: SpecimenDescription.model_validate(name) for name in _shipped_texts()}
 
 
 def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
-    """Lay a table over the specimen that it starts from, and that over its own."""
+    """Merge a table into the specimen that it starts from, recursively."""
     if BASE not in table:
         return table
     if depth > DEEPEST:
@@ -338,7 +338,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Read a file, which may say the version that it was written for."""
+    """Read a file and check its format version, if it states one."""
     said = toml_table(path)
     written = said.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
@@ -360,7 +360,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace what is said again; the other of two keys that say the same goes, and so do its sources."""
+    """Replace given values. The alternative key of each given one and its sources are removed."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     kept = {key: value for key, value in base.items() if key not in replaced}
     _warn_of_changes(base, {**kept, **said}, said)
@@ -371,7 +371,7 @@ def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Mapping[str, Any]) -> None:
-    """Warn of springs and dampings that are not given, and follow from what is."""
+    """Warn of springs and dampings that change because they follow from given values."""
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
@@ -394,7 +394,7 @@ def _join(numbers: Triple) -> str:
 
 
 def _complaint(specimen: str, error: ValidationError) -> str:
-    """Say the first fault: the key, what was given, and what is allowed."""
+    """Describe the first fault: key, given value, and allowed values."""
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
     said = fault_in_words(first)

@@ -1,4 +1,4 @@
-"""What contact laws have in common: numbers for the engine, and a word that stands for each. SI units."""
+"""Common parts of the contact laws: numbers for the engine, and their names in one word. SI units."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ PAPER_INDENTATION_M = 1e-6
 
 
 class Stops(NamedTuple):
-    """A law for the engine: F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
+    """Numbers of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
 
     linear_stiffness: float = 0.0
     """[N/m]."""
@@ -26,7 +26,7 @@ class Stops(NamedTuple):
     loss: float = 0.0
     """[s/m]."""
     restitution: float | None = None
-    """Restitution of stops that do not yield; None where they do, or where there are none."""
+    """Restitution of rigid stops; None for elastic stops and without stops."""
 
     @property
     def term(self) -> tuple[float, float]:
@@ -43,7 +43,7 @@ class Stops(NamedTuple):
 
 @dataclass(frozen=True)
 class Reference:
-    """What a fitted law is fitted to: the paper's contact, and the clearance before it."""
+    """Contact that fitted laws approximate: the paper's, and its clearance."""
 
     stiffness: float
     """k_contact [N/m^1.5]."""
@@ -55,20 +55,20 @@ class Reference:
 
 @dataclass(frozen=True)
 class LawWord(Generic[Law_co]):
-    """A row of `CONTACT_LAWS`: how a law is written as one word, and how it is made of it."""
+    """A row of `CONTACT_LAWS`: the form of a law's name, and how the law is made from it."""
 
     form: str
-    """What may be written, for a message."""
+    """Allowed forms, for messages."""
     about: str
-    """What it is, in a few words, for a list."""
+    """Short description, for lists."""
     example: str
-    """One that is written so, for a picture."""
+    """Example of the form, for pictures."""
     made: Callable[[str, Reference], Law_co]
-    """Takes what stands behind the colon; raises `UnreadableLawError` for what is no number."""
+    """Makes the law from the text behind the colon; raises `UnreadableLawError` for an unreadable number."""
 
 
 class UnreadableLawError(ValueError):
-    """What stands behind a law's name is not of its form."""
+    """The text behind a law's name does not have the law's form."""
 
 
 def number_in(detail: str) -> float:
@@ -80,13 +80,13 @@ def number_in(detail: str) -> float:
 
 
 def require_nothing(detail: str) -> None:
-    """Refuse a number where a law takes none."""
+    """Refuse text behind the name of a law without parameters."""
     if detail:
         raise UnreadableLawError(detail)
 
 
 def require_positive(name: str, value: float, unit: str) -> None:
-    """Refuse what is no positive finite number."""
+    """Refuse numbers that are not positive and finite."""
     if not 0.0 < value < math.inf:
         msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
         raise ValueError(msg)
@@ -96,7 +96,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], word: str) -> Choice:
-    """Take the member of an enum that a user names, by itself or by its word.
+    """Return an enum's member from the member itself or from its name in text.
 
     Raises ValueError when the enum has no such word.
     """

@@ -1,4 +1,4 @@
-"""A TOML file as a table, or one sentence that says why it is none, or what a value of it should be."""
+"""Read TOML files, and describe what is wrong in one sentence."""
 
 import re
 import tomllib
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class UnreadableTomlError(ValueError):
-    """A file that cannot be read, or is no TOML; the sentence begins with its path."""
+    """A file that cannot be read or is not TOML; the message begins with its path."""
 
 
 def toml_table(path: Path) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def toml_table(path: Path) -> dict[str, Any]:
     Raises
     ------
     UnreadableTomlError
-        In one sentence, when the file is missing, is no text, or is not TOML.
+        When the file is missing, is not text, or is not TOML.
     """
     try:
         # Editors on Windows begin a file with a byte-order mark.
@@ -37,7 +37,7 @@ def toml_table(path: Path) -> dict[str, Any]:
 
 
 _ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
-"""A word as Python shows it, ``<Start.UP: 'up'>``."""
+"""An enum's member as Python prints it, ``<Start.UP: 'up'>``."""
 _LIST, _TABLE = "give a list, in square brackets", "give a table"
 _TIME = "give a date, time and time zone, such as 2026-03-01T12:00:00Z"
 _IN_WORDS_OF_TOML: Mapping[str, str] = {
@@ -62,11 +62,11 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it says what this is",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""What pydantic says in words of Python, by its type of fault."""
+"""Replacements of pydantic's messages that use Python's terms, by type of error."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:
-    """Return what a value of a TOML file should be, in words of TOML and not of Python.
+    """Return what a value in a TOML file should be, in terms of TOML instead of Python.
 
     Parameters
     ----------
