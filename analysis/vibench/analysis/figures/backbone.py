@@ -1,4 +1,4 @@
-"""A tracked resonance: frequency and amplitude over the level of the base, and the backbone they make."""
+"""A tracked resonance: frequency and amplitude over the base level, and the backbone curve."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -33,9 +33,9 @@ from .style import (
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
-"""Room around the points, in parts of their range: few points must not lie on the frame."""
+"""Margin around the points, as a part of their range, so that no point lies on the frame."""
 _MOST_MARKS = 5
-"""Intervals of the backbone's frequency axis: numbers such as 266.385 are wide."""
+"""Most intervals of the backbone's frequency axis, because numbers such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
@@ -44,7 +44,7 @@ _SIMULATED = "simulated under the recorded base"
 
 
 def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
-    """Draw the resonance over level, and m0's amplitude over the resonance; of levels where it was found."""
+    """Draw the resonance over level, and m0's amplitude over the resonance, for levels where it was found."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, laid)
@@ -78,7 +78,7 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
 
 
 def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
-    """Put a gap, which no line crosses, where a level was not met."""
+    """Interrupt the line where the controller did not reach a level."""
     nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
     gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
     return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
@@ -89,7 +89,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Return amplitudes in the unit to draw them in, with its scale and name."""
+    """Return amplitudes in a readable unit, with its factor and name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
@@ -139,7 +139,7 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
 
 
 def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> None:
-    """Name the amplitude, and draw it from zero to above the largest."""
+    """Label the amplitude axis, and let it reach from zero to above the largest value."""
     of = "at resonance"
     if levels[0].harmonic > 1:
         of = f"at {levels[0].harmonic} times the drive"
@@ -158,7 +158,7 @@ def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None
 ) -> Reals | None:
-    """Return m0's simulated amplitude at each level, where one recorded stretch belongs to each."""
+    """Return m0's simulated amplitude at each level, if each level has one recorded stretch."""
     if laid is None or not levels[0].is_fundamental or laid.response.left_out or analysis.response.left_out:
         return None
     found = laid.response.response_ii * laid.response.drive_amplitude_m

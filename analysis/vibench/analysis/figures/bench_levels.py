@@ -1,4 +1,4 @@
-"""What every channel recorded, from the bench check to the last ramp: the first figure to look at."""
+"""Extremes of every channel from the bench check to the last ramp: the first figure to look at."""
 
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts
@@ -40,7 +40,7 @@ def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
 
 
 def bench_levels_caption(facts: RecordingFacts) -> str:
-    """Return how much of its range each channel used."""
+    """State what part of its range each channel used."""
     parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
     return f"Extremes of every channel, ramps and waits included. Peaks: {', '.join(parts)}."
 

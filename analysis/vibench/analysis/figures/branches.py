@@ -31,7 +31,7 @@ from .style import (
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
-"""Height [in] of a third panel, where a bench is asked what it can hold."""
+"""Height [in] of the third panel, which shows what a bench can hold."""
 EVENT_MARKS = {
     "fold": ("o", "#d55e00"),
     "period doubling": ("s", "#009e73"),
@@ -39,25 +39,25 @@ EVENT_MARKS = {
     "symmetry breaking": ("^", "#e69f00"),
     "grazing": ("x", "#1b1b1b"),
 }
-"""Mark and colour of each special point."""
+"""Marker and colour of each kind of special point."""
 _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPONSE_II))
 
 
 def branches_figure(
     diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
 ) -> DrawnFigure:
-    """Draw Responses I and II of m0 on every branch, over what changes, and recordings beneath.
+    """Draw Responses I and II of m0 on every branch over the parameter, with recordings beneath.
 
-    Where the request names a bench's loop, a third panel says which unstable motions it can hold.
+    If the request names a bench's control loop, a third panel shows which unstable motions it can hold.
 
     Parameters
     ----------
     diagram
-        What was found.
+        The branches.
     measured
         Responses of stepped sines and sweeps; drawn where frequency changes.
     tracked
-        Resonances at every level; drawn over a phase resonance, whose first panel is its frequency.
+        Tracked resonances; drawn with a phase resonance, whose first panel shows its frequency.
     """
     with styled():
         holdable = diagram.holdable
@@ -107,7 +107,7 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
 
 
 def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
-    """Draw the frequency of a phase resonance in the place of Response I, and what was tracked."""
+    """Draw the frequency of a phase resonance instead of Response I, with tracked resonances."""
     panels[0].clear()
     for line in diagram.lines:
         draw_line(panels[0], line, _place(diagram, line), line.frequency_hz)
@@ -128,7 +128,7 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
 def _growth(
     axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
 ) -> None:
-    """Draw how fast unstable motions are left; below the line no loop of this bench holds them."""
+    """Draw the growth rates of unstable motions; this bench cannot hold motions below the line."""
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
         for told, chosen, colour in (

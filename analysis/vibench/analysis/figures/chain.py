@@ -1,4 +1,4 @@
-"""A chain: waves of the endless one, transmission from cell to cell, motion over place and time, energy."""
+"""A chain: waves of the infinite chain, transmission between cells, motion over place and time, energy."""
 
 import math
 
@@ -28,15 +28,15 @@ from .style import (
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
 """Heights without and with runs."""
 _SMALLEST = 1e-8
-"""Transmissions below are drawn at the foot of the axis."""
+"""Smaller transmissions are drawn at the bottom of the axis."""
 _DECADES = 4.0
-"""Decades shown of a map of motion below its largest."""
+"""Decades shown below the largest value of a map of motion."""
 _NOTHING = 1e-300
-"""Stands for a motion of zero where a logarithm is taken."""
+"""Replaces zero motion before a logarithm is taken."""
 
 
 def chain_figure(found: ChainAnswer) -> DrawnFigure:
-    """Draw waves and transmission; where there are runs, the last one's motion, energies and impacts."""
+    """Draw waves and transmission, and the motion, energies and impacts of the last run, if any."""
     last = found.shown_run
     with styled():
         figure = new_figure(_WAVES_IN if last is None else _RUNS_IN)

@@ -1,4 +1,4 @@
-"""Curves overlaid on one another, as they are compared in the window, for paper: always light."""
+"""Overlaid curves, as the window's Compare page shows them, in light colours for printing."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -37,7 +37,7 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
 }
 """Styles of the transmission or Response I, and of Response II."""
 _LONE = 1
-"""A curve of one point is drawn as a mark."""
+"""A curve of one point is drawn as a marker."""
 _SINGLE_BAND = 0.2
 
 
@@ -54,9 +54,9 @@ def comparison_figure(
     Parameters
     ----------
     name
-        Becomes the files' name.
+        Name of the files.
     pair
-        The curve and its reference, whose difference is drawn below.
+        Curve and reference; their difference is drawn below.
     """
     if not curves:
         raise InvalidRequest("a figure of no curves was asked for; choose one or more")
@@ -117,7 +117,7 @@ def _difference(axes: Axes, difference: CurveDifference) -> None:
 
 
 def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Let the curves fill the picture, not their bounds."""
+    """Return limits of the axis that fit the curves; bounds may exceed them."""
     known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
     positive = known[known > 0]
     return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
@@ -130,7 +130,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
-    """Return what each curve is, with its numbers."""
+    """Describe each curve with its numbers."""
     said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     said.append("Shaded: two standard deviations.")
     if pair is not None:

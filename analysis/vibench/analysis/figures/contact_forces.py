@@ -1,4 +1,4 @@
-"""The force between m1 and its stops over their relative displacement, a panel a contact law."""
+"""Contact force over relative displacement, one panel for each contact law."""
 
 import re
 from collections.abc import Mapping
@@ -15,18 +15,18 @@ from .style import MEASURED, SIMULATED, DrawnFigure, new_figure, styled
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Shown on both sides of a stop: the paper fits its models 1 um beyond. A power law is shown whole."""
+"""Range on both sides of a stop. The paper fits its models 1 um beyond it. Power laws are shown whole."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
-"""At which a law that depends on the speed is shown: the paper's specimen strikes so at 5 um and 260 Hz."""
+"""Speed for laws that depend on it: the impact speed of the paper's specimen at 5 um and 260 Hz."""
 _POINTS = 801
 
 
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> DrawnFigure:
     """Draw the force that pushes m1 back, for each specimen by its label; p = y - z.
 
-    The nearer stop is shown, on its side. A law that depends on the speed is drawn pressed in and
-    let go at 0.1 m/s; rigid stops, which have no finite force, as a wall.
+    The nearer stop is shown. A law that depends on the speed is drawn for loading and unloading at
+    0.1 m/s. Rigid stops, which have no finite force, are drawn as a wall.
     """
     rows = -(-len(specimens) // _COLUMNS)
     tables = []
@@ -77,5 +77,5 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
 
 
 def _force(specimen: Specimen, p: Reals, speed: float) -> Reals:
-    # Adding zero makes "-0" of a table "0".
+    # Adding zero turns "-0" into "0" in tables.
     return np.asarray(spring_of(specimen).force(p, np.full_like(p, speed))) + 0.0

@@ -27,7 +27,7 @@ _EVEN, _ODD = LINEAR, SIMULATED
 
 
 def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> DrawnFigure:
-    """Draw how much of the scatter is noise and how much distortion, and what lies on quiet lines."""
+    """Draw the parts of noise and distortion in the scatter, and the levels at lines without drive."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
     with styled():
@@ -76,7 +76,7 @@ def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     )
     varied = periodic.distortion_variance
     if varied is not None:
-        # Where noise explains all of the scatter there is nothing to draw.
+        # If noise explains all of the scatter, there is no distortion to draw.
         seen = np.where(varied > 0, _share(varied, periodic), np.nan)
         axes.plot(
             frequency_hz,
@@ -119,7 +119,7 @@ def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, st
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
-    """Return how much of the scatter does not repeat from period to period, and how much is distortion."""
+    """State the parts of the scatter that are noise and distortion."""
     found = distortion(periodic)
     said = [
         (
@@ -138,7 +138,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
 
 
 def _percent(share: float) -> str:
-    """Two digits, and never a power of ten: in chaos more than the transmission itself is usual."""
+    """Return a percentage with two digits, without powers of ten: in chaos it often exceeds 100 %."""
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 

@@ -43,7 +43,7 @@ Pair = tuple[DwellAnalysis, DwellOverlay | None]
 
 
 def dwells_figure(pairs: Sequence[Pair]) -> DrawnFigure:
-    """Draw one row a level, weak to strong: whole dwell, its last periods, spectrum of its window."""
+    """Draw one row for each level, weak to strong: whole dwell, its last periods, spectrum of its window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
     at = model_resonances(specimen_of(rising[0][0].facts.bench))
     with styled():
@@ -81,7 +81,7 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
 
 
 def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Time before the window's end [s] and x [m] over the last periods of the window."""
+    """Return time before the window's end [s] and x [m] for the last periods of the window."""
     rate = response.displacement.sample_rate_hz
     count = round(_ZOOM_PERIODS / response.drive.frequency_hz * rate)
     time_s: Reals = (np.arange(count, dtype=np.float64) - count) / rate
@@ -121,7 +121,7 @@ def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at
 
 
 def dwells_caption(rising: Sequence[Pair]) -> str:
-    """Say the responses and how much went to the terminal bands, level by level."""
+    """State the responses and the levels in the terminal bands for each level."""
     said = []
     for analysis, laid in rising:
         found = analysis.response

@@ -1,4 +1,4 @@
-"""The draws of a twin in a figure: their middle, the band of 95 %, and what is said of them."""
+"""The draws of a twin in a figure: median, 95 % band, and sentences."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from .style import BOUNDS, SIMULATED, TERMINAL
 
 
 def simulated_label(run: SimulatedRun) -> str:
-    """Name the simulated curve in a legend."""
+    """Return the legend's name of the simulated curve."""
     if not run.driven.by_voltage:
         return "simulated under the recorded base"
     return "simulated under the recorded voltage"
@@ -31,9 +31,9 @@ def draw_band(
     name: str,
     shown: Callable[[Reals], Reals] = lambda values: values,
 ) -> Reals | None:
-    """Fill the band of 95 % of one quantity, and give the middle to draw over it; None without an ensemble.
+    """Fill the 95 % band of one quantity, and return its median; None without an ensemble.
 
-    ``along`` belongs to the points of the quantity; ``shown`` turns its values into those of the axis.
+    ``along`` has the abscissae of the quantity; ``shown`` converts its values to those of the axis.
     """
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
@@ -46,13 +46,13 @@ def draw_band(
         alpha=0.25,
         linewidth=0,
         zorder=1.5,
-        label="95 % of draws",  # how many differs from recording to recording: the caption says it
+        label="95 % of draws",  # their number differs between recordings: the caption states it
     )
     return shown(found.median)
 
 
 def run_text(laid: AbstractOverlay[Any]) -> str:
-    """Return what was simulated, and where the measurement lies in it."""
+    """Describe the simulation, and state where the measurement lies in it."""
     run = laid.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
@@ -75,7 +75,7 @@ def run_text(laid: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(laid: AbstractOverlay[Any]) -> str:
-    """Say where the measurement lies within the draws, to go on a sentence; nothing under a base motion."""
+    """Return the end of a sentence on where the measurement lies in the draws; empty under a base motion."""
     if not laid.run.driven.by_voltage:
         return ""
     said = [*laid.agreement]
@@ -85,13 +85,13 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
 
 
 def sines_table(name: str, sines: ResponsePrediction) -> Table:
-    """Return the responses to steady sines that a figure shows beside a measurement."""
+    """Return a table of the responses to steady sines that a figure shows beside a measurement."""
     keys = "frequency_hz amplitude_m response_i response_ii linear impacts"
     return table(f"{name}_sines", **columns(sines, keys))
 
 
 def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
-    """Return the columns of a table that hold a quantity's draws."""
+    """Return a table's columns with the median and band of a quantity's draws."""
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
         return {}
@@ -112,7 +112,7 @@ _BOUND_LABEL = "terminal resonances (m1 stuck to m2)"
 
 @dataclass(frozen=True)
 class ModelResonances:
-    """Where the model has its resonances [Hz]."""
+    """The model's resonances [Hz]."""
 
     free_hz: tuple[float, ...]
     bound_hz: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""What an excitation promises to play, before anything moves."""
+"""The planned drive voltage, before anything moves."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from .style import PREDICTED, DrawnFigure, frequency_axis, new_figure, prefixed,
 
 _HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
-"""Of the highest frequency: enough for the look of a signal, and a whole sweep stays small."""
+"""Samples per period of the highest frequency: enough to draw a signal, and a whole sweep stays small."""
 _SMALLEST_PART = 0.2
 """The spectrum is shown around the frequencies where it is within 14 dB of its largest line."""
 _COLUMNS = 2000
 
 
 def excitation_figure(measurement: Measurement) -> DrawnFigure:
-    """Draw the voltage that a plan promises, in time and as a spectrum."""
+    """Draw the planned voltage in time and as a spectrum."""
     excitation = measurement.excitation
     rate_hz = _SAMPLES_PER_CYCLE * excitation.highest_frequency_hz
     seen = excitation.preview(rate_hz)
@@ -58,7 +58,7 @@ def excitation_figure(measurement: Measurement) -> DrawnFigure:
 
 
 def _largest_lines(seen: SignalPreview) -> tuple[Reals, Reals]:
-    """Frequency and size of the largest line in each of at most this many columns, above 0 Hz."""
+    """Return frequency and amplitude of the largest line in each column, above 0 Hz."""
     frequency_hz, size = seen.frequency_hz[1:], seen.spectrum_v[1:]
     width = -(-size.size // _COLUMNS)
     starts = np.arange(0, size.size, width)

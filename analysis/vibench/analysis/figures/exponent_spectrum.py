@@ -1,4 +1,4 @@
-"""All exponents and the dimension they give, over frequency or level, with their intervals."""
+"""Lyapunov exponents and Kaplan-Yorke dimension over frequency or level, with intervals."""
 
 import numpy as np
 from matplotlib.axes import Axes

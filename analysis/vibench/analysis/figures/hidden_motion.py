@@ -1,4 +1,4 @@
-"""The hidden motion of one recording: p between its stops, and what its collisions say."""
+"""The hidden motion of one recording: p between the stops, and its impacts."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,14 +23,14 @@ _MICRO = 1e6
 _COLUMNS = 1200
 _ZOOM_S = 0.025
 _BOUND = 1.96
-"""Standard deviations of bounds of 95 %."""
+"""Standard deviations in a 95 % bound."""
 _BINS = 40
 _DEEPEST_SHOWN_M = 2e-6
 _POINTS = 200
 
 
 def hidden_motion_figure(motion: HiddenMotion) -> DrawnFigure:
-    """Draw p over the whole stretch and over an instant of it, between the stops."""
+    """Draw p between the stops, over the whole stretch and over a short part of it."""
     with styled():
         figure = new_figure(4.4)
         whole, zoom = figure.subplots(2, 1)
@@ -79,7 +79,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
-    # The stretch that is shown closely: around the middle one of the impacts, or of the motion.
+    # The part that is enlarged: around the middle impact, or else the middle of the motion.
     count = round(_ZOOM_S * motion.sample_rate_hz)
     impacts = motion.tracked.collisions.samples
     middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
@@ -160,7 +160,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 
 def _band(depth: Reals, at_1um: FoundParameter, exponent: FoundParameter) -> tuple[Reals, Reals]:
-    """Return the largest band of laws whose two numbers lie within their bounds."""
+    """Return the envelope of all laws whose two parameters lie within their bounds."""
     exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
     laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
     return np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))

@@ -1,4 +1,4 @@
-"""An up and a down sweep in one picture: where the response depends on where one comes from."""
+"""Sweeps up and down in one figure: where the response depends on the direction."""
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> DrawnFigure:
 
 
 def jumps_text(jumps: tuple[Jump, ...]) -> str:
-    """Say jumps in words, with their bounds."""
+    """Describe jumps with their bounds."""
     if not jumps:
         return "no jump"
     return " and ".join(

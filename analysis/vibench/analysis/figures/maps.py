@@ -1,4 +1,4 @@
-"""Maps, basins and diagrams along one parameter: what motions there are, and one quantity of them."""
+"""Maps, basins of attraction and bifurcation diagrams: the kinds of motion and one quantity."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -60,12 +60,12 @@ def map_figure(
     results
         The map, complete or growing.
     shown
-        One of `SHOWN`, beside the kinds of motion. When None, Response I, and of a basin map how long each
-        start was followed.
+        One of `SHOWN`, beside the kinds of motion. None shows Response I; for a basin map, the time for
+        which each start was followed.
     diagram
-        Branches that are overlaid on a diagram along one quantity.
+        Branches to overlay on a diagram along one quantity.
     levels
-        Of recordings, overlaid on a map of frequency and amplitude as lines.
+        Levels of recordings, overlaid on a map of frequency and amplitude as lines.
     """
     with styled():
         if len(results.plan.varied) == 1:
@@ -112,7 +112,7 @@ def _draw(axes: Axes, results: MapResults, values: Reals, **style: Any) -> QuadM
 
 
 def _axis_edges(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
-    """Return the edges of the cells along one axis, in the unit that reads best, and its label."""
+    """Return the cell edges along one axis in a readable unit, and the axis label."""
     chosen = results.plan.range_of(quantity)
     edges = np.array(chosen.edges)
     factor, unit = (
@@ -172,7 +172,7 @@ def _scale(name: str, values: Reals) -> Normalize:
 
 
 def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
-    """Draw the level of a recording as a line, and on it what was measured, in the colours of the map."""
+    """Draw a recording's level as a line, with measured values in the colours of the map."""
     frequency_hz, amplitude_m = np.array(level.pairs).T
     axes.plot(frequency_hz, MICRO * amplitude_m, color=MEASURED, linewidth=4.0, label=plain_label(level.name))
     for curve in level.measured:
@@ -216,7 +216,7 @@ def _section(line: BranchLine) -> Reals:
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:
-    """Return the motions of a map and their shares."""
+    """Return a table of a map's motions and their shares."""
     return table(
         "map_motions",
         motion=[str(each.motion) for each in motions],

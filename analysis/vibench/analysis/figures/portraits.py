@@ -1,4 +1,4 @@
-"""Phase portraits of dwells with their Poincaré sections: how the motion repeats, level by level."""
+"""Phase portraits of dwells with Poincaré sections, one for each level."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ from .style import BOUNDS, SIMULATED, DrawnFigure, legend_above, new_figure, pre
 _PANEL_IN = 2.9
 _COLUMNS = 3
 _ORBIT_PERIODS = 60.0
-"""More lines would fill the panel."""
+"""Most lines drawn; more would fill the panel."""
 _MOST_POINTS = 2000
 
 
 def portraits_figure(analyses: Sequence[DwellAnalysis]) -> DrawnFigure:
-    """Draw velocity over displacement of m0, and a point once a drive period, one panel a level."""
+    """Draw m0's velocity over displacement with one point per drive period, one panel for each level."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     rows = -(-len(rising) // _COLUMNS)
     with styled():
@@ -45,7 +45,7 @@ def portraits_figure(analyses: Sequence[DwellAnalysis]) -> DrawnFigure:
 
 
 def verdict_text(verdict: MotionVerdict) -> str:
-    """Say the kind of motion in a few words."""
+    """Return the kind of motion in a few words."""
     match verdict:
         case MotionVerdict(kind=MotionKind.PERIODIC, period=period) if period is not None and period > 1:
             return f"periodic, {period} drive periods"

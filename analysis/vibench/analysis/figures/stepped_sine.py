@@ -1,4 +1,4 @@
-"""Responses I and II at every frequency, or every level, of a stepped sine, up and down apart."""
+"""Responses I and II at each frequency or level of a stepped sine, with both directions apart."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,19 +43,19 @@ P = TypeVar("P")
 
 @dataclass(frozen=True)
 class SteppedLook(Generic[P]):
-    """How a stepped sine is drawn and titled, by what was stepped."""
+    """Axis, title and caption of a stepped sine, for each stepped quantity."""
 
     along: Callable[[SteppedResponse], Reals]
     axis: str
     title: Callable[[P, SteppedResponse], str]
     caption: Callable[[P, SteppedResponse], str]
-    """Its first sentences, without feedback and simulation."""
+    """First sentences of the caption, without feedback and simulation."""
 
 
 def stepped_sine_figure(
     analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]
 ) -> DrawnFigure:
-    """Draw Response I and II against what was stepped, one marker a direction."""
+    """Draw Responses I and II over the stepped quantity, with one marker for each direction."""
     along = look.along(analysis.response)
     with styled():
         figure = new_figure(_HEIGHT_IN)
@@ -131,7 +131,7 @@ def _responses(
 def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
-    """Mark the middle of the draws at every step of one direction, with the band of 95 % as a bar."""
+    """Draw the median of the draws at every step of one direction, with the 95 % band as an error bar."""
     values, reach = getattr(laid.response, _ATTRIBUTES[what])[chosen], None
     found = laid.quantity(what)
     if found is not None and laid.run.draws > 1:
@@ -154,7 +154,7 @@ def _draw_simulated(
 
 
 def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
-    """Return what was found, and how far the simulation lies from it."""
+    """Return the caption with the distance of the simulation."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
@@ -163,7 +163,7 @@ def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, loo
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
-    """Return where the largest response was."""
+    """State the largest response and its frequency."""
     top = int(np.argmax(found.response_ii))
     return (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
@@ -174,7 +174,7 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
 
 
 def stepped_level_caption(found: SteppedResponse) -> str:
-    """Say between which levels the motion jumps, and how far apart the two ways lie."""
+    """State between which levels the motion jumps, and the hysteresis."""
     text = (
         f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
@@ -192,7 +192,7 @@ def stepped_level_caption(found: SteppedResponse) -> str:
 
 
 def tracked_caption(found: SteppedResponse) -> str:
-    """Return how many levels there are."""
+    """State the number of levels."""
     return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
 
 

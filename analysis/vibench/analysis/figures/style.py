@@ -1,4 +1,4 @@
-"""How all figures look: one set of colours that colour-blind readers tell apart, one set of sizes."""
+"""Style of all figures: colours that colour-blind readers can tell apart, and sizes."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,29 +24,29 @@ from ..tables import Table, write_tables
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
-"""Under the recorded voltage or base motion (vermillion of Okabe & Ito's palette)."""
+"""Simulation under the recorded voltage or base motion (vermillion of Okabe & Ito's palette)."""
 PREDICTED = "#0072b2"
-"""Under sines (blue)."""
+"""Simulation under sines (blue)."""
 LINEAR = "#56b4e9"
-"""Without contact (sky blue, always dashed)."""
+"""Specimen without contact (sky blue, always dashed)."""
 TERMINAL = "#8a3b7a"
 """Resonances with m1 stuck to m2 (purple, always dotted)."""
 BOUNDS = "#9a9a9a"
 COLLIDING = "#d9d9d9"
 LEVELS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
-"""For several levels in one figure, weak to strong, beside different line styles."""
+"""Colours of several levels in one figure, weak to strong, in addition to line styles."""
 LEVEL_STYLES = ("-", "--", "-.", ":", "-", "--")
 
 WIDTH_IN = 7.2
-"""Fits the text width of A4 and a report's column."""
+"""Width that fits the text of A4 and a report's column."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Margin of the axis beyond its ends: measured lines lie a few ppm off round numbers."""
+"""Margin beyond both ends of the axis, because measured lines lie a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratios of the ends of a frequency axis, between which marks at 3 and 7 help and fit."""
+"""Range of the ratio of a frequency axis' ends in which ticks at 3 and 7 help and fit."""
 _FEW_DECADES = (1.5, 0.5)
-"""Decades of a magnitude axis below which some, and all, marks between the powers of ten have numbers."""
+"""Decades of a magnitude axis below which some, or all, ticks between powers of ten have numbers."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -82,25 +82,25 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw inside this: the style holds for what is drawn here and changes nothing elsewhere."""
+    """Apply the style inside a ``with`` block, and nowhere else."""
     with mpl.rc_context(dict(STYLE)):
         yield
 
 
 def plain_label(name: str) -> str:
-    """Write a name of a file so that Matplotlib shows it as it is, also where it holds mathematics."""
+    """Escape a file's name so that Matplotlib shows it unchanged, even if it contains mathematics."""
     return printable(name).replace("$", r"\$")
 
 
 def new_figure(height_in: float) -> Figure:
-    """Begin a figure of the common width, ``height_in`` inches high; its layout lets nothing overlap."""
+    """Make a figure of the common width, ``height_in`` inches high, with a layout without overlaps."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None:
-    """Put one legend of all ``axes`` in ``columns`` over the ``figure``, where it never covers data."""
+    """Put one legend for all ``axes`` in ``columns`` above the ``figure``, where it covers no data."""
     found = {
         label: handle
         for each in axes
@@ -131,7 +131,7 @@ def magnitude_axis(axes: Axes) -> None:
 
 
 class _Between(LogFormatter):
-    """Numbers the marks that matplotlib would number, in our digits: its own read 4e−01."""
+    """Numbers the ticks that matplotlib would number, but writes 0.4 instead of 4e−01."""
 
     def __call__(self, value: float, place: int | None = None) -> str:
         return _plain(value) if super().__call__(value, place) else ""
@@ -146,7 +146,7 @@ def _plain(value: float, _place: int | None = None) -> str:
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """Return the factor and the unit with SI prefix in which a quantity reads 1 to 1000."""
+    """Return factor and unit with an SI prefix so that a quantity lies between 1 and 1000."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
     return 1 / scale, f"{prefix}{unit}"
@@ -154,7 +154,7 @@ def prefixed(largest: float, unit: str) -> tuple[float, str]:
 
 _NO_DATE = {"Date": None}
 _NO_PDF_DATE = {"CreationDate": None}
-"""Two figures of the same data are the same file."""
+"""Metadata without dates, so that the same data give the same file."""
 
 
 SCREEN = (ImageKind.PNG, ImageKind.SVG)
@@ -165,7 +165,7 @@ class DrawnFigure:
     """One figure, ready to be saved or put in a report."""
 
     name: str
-    """Becomes the files' name."""
+    """Name of the files."""
     title: str
     caption: str
     figure: Figure
@@ -191,12 +191,12 @@ class DrawnFigure:
         metadata = {"svg": _NO_DATE, "pdf": _NO_PDF_DATE}.get(kind)
         with styled():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
-        # The layout is found while drawing and costs as much: the next format takes it over.
+        # Drawing computes the layout, which is half of the cost; the next format reuses it.
         self.figure.set_layout_engine("none")
         return target.getvalue()
 
     def save(self, folder: Path, kinds: Sequence[ImageKind] = SCREEN) -> tuple[Path, ...]:
-        """Write the images asked for and the numbers as CSV; an older figure of that name is replaced."""
+        """Write the requested images, and the numbers as CSV; replace an older figure of that name."""
         folder.mkdir(parents=True, exist_ok=True)
         drawn = []
         for kind in kinds:

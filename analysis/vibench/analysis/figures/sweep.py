@@ -1,4 +1,4 @@
-"""A sweep: time envelope, responses against frequency, where the masses collide (the paper's Fig. 13 d)."""
+"""A sweep: envelope in time, responses over frequency, collisions (the paper's Fig. 13 d)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ _ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 
 
 def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> DrawnFigure:
-    """Draw the envelope in time under a frequency axis, and Responses I and II against frequency."""
+    """Draw the envelope in time with a frequency axis, and Responses I and II over frequency."""
     with styled():
         figure = new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
@@ -79,7 +79,7 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
 
 
 def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
-    """Write the frequency above the time at which it was played."""
+    """Add a frequency axis above the time axis."""
     order = np.argsort(found.frequency_hz)
 
     def to_frequency(time_s: ArrayLike) -> Reals:
@@ -141,7 +141,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
 
 
 def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
-    """Return where the masses collided, with bounds, and what the simulation says."""
+    """State where the masses collided, with bounds, and the result of the simulation."""
     found = analysis.response
     amplitudes = 1e6 * found.drive_amplitude_m
     said = [
@@ -171,7 +171,7 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
 
 
 def regions_text(found: Collisions) -> str:
-    """Say in words where a sweep collided."""
+    """State where a sweep had collisions."""
     unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
     unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
     if not found.regions:
@@ -181,7 +181,7 @@ def regions_text(found: Collisions) -> str:
         start, stop = region.start, region.stop
         middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
         begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
-        # Collisions live on by chance: where they end in one run is no edge with bounds.
+        # Collisions continue by chance, so that their end in one run is not an edge with bounds.
         end = f"{stop.frequency_hz:.1f} Hz in this run"
         first = "the sweep's beginning" if region.reaches_start else begin
         last = "the sweep's end" if region.reaches_stop else end

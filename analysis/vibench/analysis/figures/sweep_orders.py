@@ -1,4 +1,4 @@
-"""What a sweep holds besides the drive's own frequency: spectrogram, and orders 1/3 to 5."""
+"""Motion at other frequencies than the drive's in a sweep: spectrogram, and orders 1/3 to 5."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ from .style import (
 _HEIGHT_IN = 6.0
 _RANGE_DB = 80.0
 _SHOWN = (0.5, 1.0, 1.5, 2.0, 3.0)
-"""Orders drawn; all are in the table."""
+"""Orders that are drawn; the table has all."""
 _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 

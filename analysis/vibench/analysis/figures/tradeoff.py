@@ -1,4 +1,4 @@
-"""Error over cost: every level of ours and every general solver, motion by motion."""
+"""Error over cost for each level of accuracy and each general solver, for several motions."""
 
 from collections.abc import Sequence
 from itertools import cycle
@@ -14,11 +14,11 @@ from .style import BOUNDS, LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, new_
 
 _MARKERS = {"DOP853": "x", "LSODA": "+", "Radau": "1"}
 _LEAST = 1e-14
-"""An error below this is rounding."""
+"""Errors below this are rounding."""
 
 
 def curve_figure(points: Sequence[CurvePoint], scene: str) -> DrawnFigure:
-    """Draw the error of the responses over time, a line for each method and a ring around the choice.
+    """Draw the error of the responses over time, one line for each method, a ring around the choice.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ from .style import (
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
-"""Bounds are drawn no further from the curve than this: where nothing is known they would fill the figure."""
+"""Largest distance of drawn bounds from the curve; unknown values would otherwise fill the figure."""
 _DIFFERENCE_LIMIT_DB = 12.0
 _LINEAR_POINTS = 4000
 _HALF_TURN_DEG = 180.0
@@ -46,7 +46,7 @@ _BELOW = 0.5
 
 
 def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> DrawnFigure:
-    """Draw measured transmission and bounds, the simulation over it, coherence and difference."""
+    """Draw the measured transmission with bounds, the simulation, coherence and difference."""
     at = model_resonances(specimen_of(analysis.facts.bench) if laid is None else laid.run.specimen)
     with styled():
         figure = new_figure(_HEIGHT_IN)
@@ -143,7 +143,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
 
 
 def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
-    """Draw the phase in degrees, -180 to 180, with its bounds where they say anything."""
+    """Draw the phase in degrees, -180 to 180, with bounds where they are narrower than a turn."""
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
@@ -167,7 +167,7 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: 
 
 
 def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
-    """Interrupt a curve where its phase passes half a turn, so that no line crosses the panel."""
+    """Interrupt a phase curve where it wraps, so that no line crosses the panel."""
     wraps = np.flatnonzero(np.abs(np.diff(phase_deg)) > _HALF_TURN_DEG) + 1
     return np.insert(frequency_hz, wraps, frequency_hz[wraps]), np.insert(phase_deg, wraps, np.nan)
 
@@ -192,7 +192,7 @@ def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
 
 
 def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> str:
-    """Return what the figure shows, with its numbers."""
+    """Return the caption with the figure's numbers."""
     response = analysis.response
     view = analysis.request.view
     symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
@@ -225,7 +225,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
 
 
 def estimate_sentence(response: NoiseResponse) -> str:
-    """Return how a transmission was estimated, how fine its lines are, and what had to be left out."""
+    """State how a transmission was estimated, its resolution, and what was left out."""
     found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"

@@ -1,4 +1,4 @@
-"""All noise levels in one figure: how resonances go and others come as the motion grows."""
+"""All noise levels in one figure: resonances vanish and others appear as the level grows."""
 
 from collections.abc import Sequence
 
@@ -64,7 +64,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
 
 
 def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
-    """Return where each level has its peaks."""
+    """State the peaks of each level."""
     said = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]

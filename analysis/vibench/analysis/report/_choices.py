@@ -1,4 +1,4 @@
-"""What is chosen before a figure is drawn, and the columns beside it; needs no drawing library."""
+"""Choices for figures, and tables; this module needs no drawing library."""
 
 from ..figure_choices import SHOWN, ImageKind
 from ..tables import Table, table

@@ -1,4 +1,4 @@
-"""A comparison as files: a figure, its numbers, or the full report of its recordings."""
+"""Export of a comparison: figure, table, or the full report of its recordings."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -21,7 +21,7 @@ Pair = tuple[Curve, Curve]
 
 
 class ExportKind(StrEnum):
-    """What a comparison can become; the word is the file's suffix."""
+    """Formats of a comparison; the value is the file's suffix."""
 
     PNG = "png"
     SVG = "svg"
@@ -38,26 +38,26 @@ def write_comparison(
     pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
 ) -> Path:
-    """Write a comparison as a report, a table or a picture; gives the path written.
+    """Write a comparison as a report, a table or a picture; return the path.
 
     Parameters
     ----------
     path
-        Its suffix says what is made: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. A name that
-        is taken becomes ``NAME-2``.
+        Its suffix selects the format: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. An existing
+        name becomes ``NAME-2``.
     curves
-        What the table and the pictures show, over frequency [Hz].
+        Curves of the table and the pictures, over frequency [Hz].
     recordings
-        What the report is of.
+        Recordings of the report.
     pair
-        Two of the curves, whose difference is shown beside them.
+        Two of the curves; their difference is shown too.
     markers_hz
         Vertical lines in pictures.
 
     Raises
     ------
     InvalidRequest
-        When the suffix names nothing that a comparison can become, or there is nothing to write.
+        When the suffix is unknown, or there is nothing to write.
     """
     try:
         kind = ExportKind(path.suffix.removeprefix(".").lower())
@@ -86,7 +86,7 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
 
 
 def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
-    """Lay all curves side by side; headings name the curve and the unit."""
+    """Return all curves in one table; headings name curve and unit."""
     if not curves:
         raise InvalidRequest("numbers of no curves were asked for; choose one or more")
     columns: list[tuple[str, tuple[float | str, ...]]] = []

@@ -1,4 +1,4 @@
-"""What a report shows of each kind of excitation: figures, sentences, numbers and tables; one row a kind."""
+"""Figures, sentences, numbers and tables of a report for each kind of excitation, in one table."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ from ._result_tables import collision_table, dwell_table, edge_text, line_table,
 
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
-    """Yield where the resonances are, and how far the simulation lies from the transmission."""
+    """Yield sentences on the resonances and the simulated transmission."""
     peaks = ", ".join(f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances)
     where = f"resonances at {peaks} Hz" if peaks else "no resonance above its uncertainty"
     yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
@@ -69,7 +69,7 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
 
 
 def sweep_findings(result: SweepResult) -> Iterator[str]:
-    """Yield where the masses collide, measured and simulated."""
+    """Yield sentences on where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     yield (
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz, "
@@ -80,7 +80,7 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Yield how far Response II went in steps of frequency, and what feedback found."""
+    """Yield sentences on the range of Response II and the results of feedback."""
     found, plan = result.analysis.response.response_ii, result.analysis.excitation
     yield (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp: Response II "
@@ -90,7 +90,7 @@ def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
 
 
 def dwell_findings(result: DwellResult) -> Iterator[str]:
-    """Say both responses, measured and simulated, and how the motion repeats."""
+    """Yield sentences on both responses, measured and simulated, and the kind of motion."""
     found, plan = result.analysis.response, result.analysis.excitation
     verdict = result.analysis.motion.verdict
     text = (
@@ -164,14 +164,14 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True)
 class Drawing(Generic[A, L]):
-    """How results of one kind are shown, each on its card and several together."""
+    """Presentation of results of one kind, on each card and together."""
 
     figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
-    """The first shows the result; the others unfold."""
+    """Figures of a card; all but the first are folded."""
     findings: Callable[[Result[A, L]], Iterator[str]]
-    """The first sentence is the result, the others are its statistics."""
+    """Sentences: the result first, then its statistics."""
     numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]
-    """The main numbers, each with its bounds, the most important first."""
+    """Main numbers with bounds, the most important first."""
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
     together: Callable[[Sequence[Result[A, L]]], Iterator[DrawnFigure]] = lambda _: iter(())
 
@@ -193,7 +193,7 @@ def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
 
 
 def _dwell_levels(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
-    """Draw the dwells at one frequency together."""
+    """Draw dwells of one frequency in one figure."""
     for _, group in groupby(dwells, key=lambda each: each.analysis.excitation.frequency_hz):
         same = tuple(group)
         if len(same) > 1:
@@ -218,7 +218,7 @@ def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
 
 
 def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
-    """Pair each sweep upwards with the first one downwards of the same level over some of its band."""
+    """Pair each upward sweep with the first downward sweep of the same level that overlaps its band."""
     for up in sweeps:
         plan = up.analysis.excitation
         for down in sweeps:
@@ -235,7 +235,7 @@ def _budget_numbers(result: AnyResult) -> Iterator[tuple[str, str]]:
 
 
 def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
-    """Yield the frequencies of the resonances, the level of the base, and the rest of the budgets."""
+    """Yield the resonances, the level of the base, and the other budgets."""
     budgets = budgets_of(noise)
     yield from ((each.quantity, each.text) for each in budgets if each.unit == "Hz")
     level = noise.analysis.response.base_level
@@ -245,7 +245,7 @@ def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
 
 
 def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
-    """Yield where collisions begin, and the budgets."""
+    """Yield the beginning of collisions and the budgets."""
     for region in sweep.analysis.collisions.regions[:1]:
         yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
     amplitude, *largest = _budget_numbers(sweep)
@@ -267,7 +267,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
 STEPPED: Drawing[Any, Any] = Drawing(
     _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
 )
-"""Drawings of what is recorded step after step: a kind of another package may replace parts of it."""
+"""Drawing of stepped recordings; other packages may replace parts of it for their kinds."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(
@@ -309,20 +309,20 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
 
 
 def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:
-    """Draw what several recordings of one kind show together."""
+    """Draw figures of several recordings of one kind together."""
     for drawing, group in groupby(results.in_order, key=lambda each: DRAWINGS[each.kind]):
         yield from drawing.together(tuple(group))
 
 
 def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
-    """Draw what was found: transmissions, sweeps, dwells, stepped sines."""
+    """Draw the figures of all results: transmissions, sweeps, dwells, stepped sines."""
     yield from figures_together(results)
     for each in results.in_order:
         yield from DRAWINGS[each.kind].figures(each)
 
 
 def findings(results: CampaignResults) -> Iterator[str]:
-    """Yield what each measurement found, weak to strong, and how far the simulation lies from it.
+    """Yield sentences on each measurement, weak to strong, and on its simulation.
 
     Parameters
     ----------
@@ -339,12 +339,12 @@ def findings(results: CampaignResults) -> Iterator[str]:
 
 
 def result_sentence(result: AnyResult) -> str:
-    """Return the first of the findings; what was played, where nothing was found."""
+    """Return the first finding, or a description of the plan if nothing was found."""
     said = next(DRAWINGS[result.kind].findings(result), "")
     return said or f"{excitation_text(result.analysis.excitation)}: no result."
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:
-    """Draw what was planned and what every channel recorded."""
+    """Draw the plan and the extremes of every channel."""
     facts = result.analysis.facts
     return excitation_figure(facts.measurement), bench_levels_figure(facts)

@@ -1,4 +1,4 @@
-"""Figures that belong to no recording, and the style of all figures for those of your own."""
+"""Figures without a recording, and the common style for your own figures."""
 
 from ..figures.branches import branches_figure, draw_line
 from ..figures.chain import chain_figure

@@ -1,4 +1,4 @@
-"""The page of every report: first screen, a card for each part, and what unfolds below them."""
+"""Page layout of every report: first screen, one card for each part, and folds below the cards."""
 
 import base64
 import re
@@ -20,9 +20,9 @@ Rows = tuple[tuple[str, str], ...]
 LONGEST_CAPTION = 280
 """Characters of title and caption together: three lines in the column of a figure."""
 MOST_OPEN_CARDS = 12
-"""With more of them each card is folded too, so that the page stays short."""
+"""Most cards that are shown unfolded, which keeps the page short."""
 _LARGEST_SVG_BYTES = 300_000
-"""Above this a PNG is smaller and quicker to show, and as legible."""
+"""Size of an SVG above which a PNG is smaller, faster to show, and equally legible."""
 _SENTENCE_ENDS = re.compile(r"(?<=\.)(?<!\bal\.)(?<!\bFig\.)\s+(?=[A-Z0-9])")
 
 
@@ -36,7 +36,7 @@ class Agreement(StrEnum):
 
 @dataclass(frozen=True)
 class ReportTable:
-    """Text in rows and columns, with a sentence under it."""
+    """Table of text with a sentence below it."""
 
     title: str
     headings: tuple[str, ...]
@@ -46,7 +46,7 @@ class ReportTable:
 
 @dataclass(frozen=True)
 class Fold:
-    """What a reader unfolds: sentences, tables and figures below a heading."""
+    """Folded part of a page: sentences, tables and figures below a heading."""
 
     title: str
     sentences: tuple[str, ...] = ()
@@ -56,14 +56,14 @@ class Fold:
 
 @dataclass(frozen=True)
 class Card:
-    """One recording, or one group of claims: its row in the first table and what is shown of it below."""
+    """One recording, or one group of claims: its row in the first table and its card."""
 
     name: str
     result: str
     """A sentence."""
     agreement: Agreement
     look_at: str
-    """What to look at before the result is used."""
+    """Warnings to read before the result is used."""
     numbers: Rows = ()
     """Up to three, each with its bounds."""
     warnings: tuple[str, ...] = ()
@@ -73,21 +73,21 @@ class Card:
 
 @dataclass(frozen=True)
 class Page:
-    """Everything that a report shows, in the order of its fields."""
+    """Content of a report, in the order of its fields."""
 
     title: str
     about: str
-    """What was reported, beside when and by which version."""
+    """Subject of the report, shown beside date and version."""
     warnings: tuple[str, ...]
-    """Those that change a conclusion."""
+    """Warnings that change a conclusion."""
     findings: str
     """At most 120 words."""
     figure: DrawnFigure | None
     noun: str
-    """What the rows of the first table are: recording, claims."""
+    """Heading of the first table's rows, such as recording or claims."""
     cards: tuple[Card, ...]
     further: Fold
-    """Shown, not folded: figures of several recordings, and sentences on the model."""
+    """Unfolded part: figures of several recordings, and sentences on the model."""
     folds: tuple[Fold, ...]
     limits: tuple[str, ...]
 
@@ -99,7 +99,7 @@ class _Embedded:
     """A ``data:`` address with the whole image in it."""
     caption: str
     rest: str
-    """The sentences of the caption that unfold."""
+    """Folded sentences of the caption."""
 
 
 def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:
@@ -133,7 +133,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
 
 
 def _figures(page: Page) -> Iterator[DrawnFigure]:
-    """Yield every figure in the order of their numbers: shown ones first, then those in folds."""
+    """Yield every figure in numerical order: unfolded ones first, then those in folds."""
     yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
     yield from page.further.figures
     for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):
@@ -155,7 +155,7 @@ def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
 
 
 def divided_caption(drawn: DrawnFigure) -> tuple[str, str]:
-    """Divide a caption into the first sentences that fill three lines, and the rest."""
+    """Split a caption into first sentences of at most three lines and the rest."""
     sentences = _SENTENCE_ENDS.split(drawn.caption)
     lengths = [len(drawn.title) + len(" ".join(sentences[:end])) for end in range(len(sentences) + 1)]
     fitting = sum(each <= LONGEST_CAPTION for each in lengths) - 1

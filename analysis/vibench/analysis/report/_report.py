@@ -38,7 +38,7 @@ _REST = "The table has the rest."
 
 
 def summary(results: CampaignResults, verdicts: Sequence[Agreement]) -> str:
-    """State what was found, and whether the simulation agrees with each result, in at most 120 words."""
+    """Summarise the findings and the agreement of the simulation in at most 120 words."""
     last = _agreement(verdicts)
     kept: list[str] = []
     for each in _sentences(results):
@@ -67,7 +67,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
-    """Yield which resonances the weakest noise has, and what has become of them under the strongest."""
+    """Yield sentences on the resonances at the weakest noise and their change at the strongest."""
     if not noise:
         return
     weak, strong = noise[0], noise[-1]
@@ -106,7 +106,7 @@ def _resonances(result: NoiseResult) -> str:
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
-    """Yield at which levels the motion is of which kind, frequency by frequency."""
+    """Yield sentences on the kind of motion at each level, for each frequency."""
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
@@ -143,7 +143,7 @@ def _level(result: NoiseResult) -> str:
 
 
 def _band(result: NoiseResult) -> tuple[float, float]:
-    """Return the ends of the measured band, rounded: two clocks differ by some ppm."""
+    """Return the ends of the measured band, rounded because two clocks differ by some ppm."""
     found = result.analysis.response.frequency_response.frequency_hz
     return round(float(found[0])), round(float(found[-1]))
 
@@ -171,7 +171,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
-    """Draw each map, with the levels and Responses I of everything that was measured under many sines."""
+    """Draw each map with levels and Responses I of stepped sines and sweeps."""
     levels = [
         RecordedLevel(each.analysis.facts.name, level, tuple(_curves(each, CurveKind.RESPONSE_I)))
         for each in results.in_order
@@ -190,7 +190,7 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each diagram along frequency over everything that was measured under sines of many frequencies."""
+    """Draw each diagram along frequency with the results of stepped sines and sweeps."""
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
@@ -206,7 +206,7 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
 
 
 def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
-    """Draw a phase resonance beneath those that were tracked around it."""
+    """Draw a computed phase resonance with the tracked ones near it."""
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]
     bands = [each.measurement.excitation.band_hz for each in facts]
@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """Return what the model has at a level at which no resonance was found: multipliers, or no motion."""
+    """State what the model has at a level without a found resonance: multipliers, or no motion."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -235,7 +235,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
-    """Say by what factor a recording's level lies above the branches', where both are."""
+    """State the ratio of a recording's level to the branches' level, where both exist."""
     request = diagram.request
     ratios = [
         amplitude / request.path.drive(frequency)[1]
@@ -250,7 +250,7 @@ def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tupl
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:
-    """Return what was played, when, and how it ended."""
+    """Return a table of what was played, when, and how it ended."""
     plan = facts.measurement
     reason = f": {facts.reason}" if facts.reason else ""
     rows = (
@@ -266,7 +266,7 @@ def measured_table(facts: RecordingFacts) -> ReportTable:
 
 
 def excitation_text(plan: Mapping[str, Any]) -> str:
-    """Say a plan in one line, all its numbers included."""
+    """Describe a plan in one line with all its numbers."""
     rest = [
         f"{key} = {value}" for key, value in plan.items() if key != "kind" and not isinstance(value, list)
     ]
@@ -274,7 +274,7 @@ def excitation_text(plan: Mapping[str, Any]) -> str:
 
 
 def bench_table(facts: RecordingFacts) -> ReportTable:
-    """Return which bench it was, who answered, and what was confirmed by hand."""
+    """Return a table of the bench, its instruments, and the settings confirmed by hand."""
     rows = [("bench", str(facts.bench.get("name", "not named")))]
     rows += [
         (part, f"{who.maker} {who.model}, serial {who.serial}, firmware {who.firmware}")
@@ -303,7 +303,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return how the last check of the whole bench came out, how long before, and what it did not like."""
+    """State the result of the last check of the bench, its age, and its complaints."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -335,7 +335,7 @@ _HEADINGS = "channel, input, sensor, serial, sensitivity, range, coupling, calib
 
 
 def channel_table(facts: RecordingFacts) -> ReportTable:
-    """Return how every channel was set and calibrated."""
+    """Return a table of every channel's settings and calibration."""
     rows = tuple(
         (
             each.header.role.replace("_", " "),
@@ -356,7 +356,7 @@ def channel_table(facts: RecordingFacts) -> ReportTable:
 
 
 def version_table(facts: RecordingFacts) -> ReportTable:
-    """Return which programs made the recording."""
+    """Return a table of the programs that made the recording."""
     provenance = facts.provenance
     packages = ", ".join(f"{name} {which}" for name, which in dict(provenance.get("packages", {})).items())
     rows = (
@@ -369,13 +369,13 @@ def version_table(facts: RecordingFacts) -> ReportTable:
 
 
 def check_table(checks: tuple[Check, ...]) -> ReportTable:
-    """Verdict, what, and text of each check."""
+    """Return a table of each check's verdict, name and text."""
     rows = tuple((each.verdict.value, each.what, each.text) for each in checks)
     return ReportTable("Checks", (), rows)
 
 
 CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Overloads", "Drop-outs", "Drive level"})
-"""Checks whose warnings say that a result is wrong or not the planned one; those of others qualify it."""
+"""Checks whose warnings mean that a result is wrong or unplanned; other warnings only qualify it."""
 _MOST_NUMBERS = 3
 
 
@@ -387,12 +387,12 @@ def write_report(
     hidden: Sequence[HiddenMotion] = (),
     maps: Sequence[MapResults] = (),
 ) -> Path:
-    """Write one HTML file with all figures inside; an older report of that name is replaced.
+    """Write one HTML file with all figures; replace an older report of that name.
 
     Parameters
     ----------
     results
-        What `analyse_files` gave, of a whole campaign or of one recording.
+        Results of `analyse_files`, of a whole campaign or of one recording.
     path
         Of the HTML file; its folder is made.
     figures_folder
@@ -483,12 +483,12 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
 
 
 def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
-    """Return whether the measurement could be one of the simulated draws, and if not yes, why.
+    """Return whether the measurement could be one of the simulated draws, with the reason if not.
 
     Parameters
     ----------
     failure
-        Why there is no simulation, where one was tried.
+        Reason why a simulation failed.
     """
     laid = result.laid
     if laid is None:
@@ -505,7 +505,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
 
 
 def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:
-    """Yield what to look at before a result is trusted.
+    """Yield the warnings of checks to read before a result is trusted.
 
     Parameters
     ----------
@@ -525,7 +525,7 @@ def check_warnings(results: CampaignResults, checks: frozenset[str] | None = Non
 
 
 def _benches(results: CampaignResults) -> Iterator[Fold]:
-    """Group recordings that say the same of their bench, so that it is said once."""
+    """Group recordings with the same bench, so that it is described once."""
     groups: dict[tuple[ReportTable, ...], list[str]] = {}
     for facts in results.facts:
         said = (bench_table(facts), channel_table(facts), version_table(facts))

@@ -17,16 +17,16 @@ from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
 
 _NEAR = 0.08
-"""Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
+"""Largest distance of resonances in one row; modes lie at least 9 % apart."""
 ABSENT = "–"
 _SMALLEST_BIAS = 1e-3
-"""Smallest bias that is shown; less means that noise plays no part."""
+"""Smallest bias that is shown; below it noise does not matter."""
 _PAPER_COLLISION = "about 240 to 290 Hz"
 """Gong et al. 2025, section 5: the grey area of the sweep."""
 
 
 def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
-    """Set measured, simulated, modelled and published resonances side by side."""
+    """Return a table of measured, simulated, modelled and published resonances."""
     return ReportTable(
         "Resonances of the transmission",
         (
@@ -46,7 +46,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
 
 
 def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
-    """Return what each cause adds to the uncertainty of each quantity."""
+    """Return a table of each cause's part in the uncertainty of each quantity."""
     return ReportTable(
         "Uncertainty, and what it is made of",
         ("recording", "quantity", "value", *(each.value for each in Cause)),
@@ -94,7 +94,7 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
 
 
 def nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
-    """Return the nearest of some resonances, where it may be the same mode; else None."""
+    """Return the nearest resonance if it may be the same mode, else None."""
     near = [each for each in among if abs(each.frequency_hz - frequency_hz) < _NEAR * frequency_hz]
     return min(near, key=lambda each: abs(each.frequency_hz - frequency_hz), default=None)
 
@@ -107,7 +107,7 @@ def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str)
 
 
 def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
-    """Return where each sweep collided, measured, simulated and published."""
+    """Return a table of each sweep's collisions: measured, simulated and published."""
     return ReportTable(
         "Where the masses collide in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
@@ -140,17 +140,17 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 
 def edge_text(edge: Edge, instead: str) -> str:
-    """Return an edge with its bounds, or what is said in its place."""
+    """Return an edge with its bounds, or the given text if there is none."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 
 def _last(edge: Edge) -> str:
-    """Say an end without bounds: collisions live on by chance, and another run ends elsewhere."""
+    """Return an end without bounds: collisions continue by chance and end elsewhere in another run."""
     return f"{edge.frequency_hz:.1f} Hz in this run"
 
 
 def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
-    """Say both responses of every dwell, measured and simulated."""
+    """Return a table of both responses of every dwell, measured and simulated."""
     return ReportTable(
         "Dwells: responses over the last seconds",
         (
@@ -198,7 +198,7 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
 
 
 def _simulated_response(laid: DwellOverlay | None, name: str) -> tuple[str, str]:
-    """Say one response of the draws with the band of 95 %, and the measured one's place in it."""
+    """Return one response of the draws with the 95 % band, and the rank of the measured one."""
     found = None if laid is None else laid.quantity(name)
     if laid is None or found is None:
         return ABSENT, ABSENT
@@ -210,7 +210,7 @@ def _simulated_response(laid: DwellOverlay | None, name: str) -> tuple[str, str]
 
 
 def _simulated_band(laid: DwellOverlay, towards_hz: float) -> str:
-    """Say a band's level in the draws [dB]; of the one run, or below what is compared, the first one's."""
+    """Return a band's level in the draws [dB]; for a single run or a low level, that of the first run."""
     found = next((each for each in laid.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in laid.terminal if each.towards_hz == towards_hz]
@@ -223,7 +223,7 @@ def _simulated_band(laid: DwellOverlay, towards_hz: float) -> str:
 
 
 def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
-    """Return how much of each dwell's motion lies at orders of the drive and in the terminal bands."""
+    """Return a table of each dwell's motion at orders of the drive and in the terminal bands."""
     rows = []
     for each in dwells:
         plan = each.analysis.excitation
