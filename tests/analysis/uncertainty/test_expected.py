@@ -37,7 +37,7 @@ def test_noise_is_known_as_well_as_was_said_before(tmp_path):
     for said, found in zip(expected, budgets, strict=True):
         assert said.quantity == found.quantity
         assert said.not_stated == found.not_stated
-        # The sensors' noise alone: hiss of the generator and the amplifier, which no rig states, comes on top.
+        # Hiss of generator and amplifier, which no rig states, comes on top of the sensors' noise.
         assert 0.5 < said.scatter / found.share(Cause.NOISE) < 1.2, said.quantity
 
 
