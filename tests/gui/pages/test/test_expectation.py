@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.plan import Dwell, Measurement, Until
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_preview as preview
 from vibench.gui.pages.test.test_page import TestPage as Page, summary_text
@@ -27,6 +27,13 @@ def test_the_expected_uncertainty_stands_under_the_prediction(page):
     assert "Response I: not known beforehand" in page.expectation.toolTip()
     page._prediction_failed(ValueError("no"))
     assert page.expectation.text() == ""
+
+
+def test_the_predicted_time_of_a_test_with_until_stands_before_it(page):
+    plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
+    test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
+    page._predicted(preview.predict_test(preview.TestPreview(test, RIG)))
+    assert page.expectation.text().startswith("Will record for about 2 s, until known. Will be known: ")
 
 
 def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_page_says_why(page):

@@ -470,7 +470,10 @@ class TestPage(Page):
         )
         told = [each.sentence for each in prediction.expected]
         known = [each.sentence for each in prediction.expected if each.scatter is not None]
-        self.expectation.setText(f"Will be known: {known[0]} …" if known and told[1:] else "".join(told[:1]))
+        text = f"Will be known: {known[0]} …" if known and told[1:] else "".join(told[:1])
+        if prediction.recorded_s is not None:
+            text = f"Will record for about {prediction.recorded_s:.3g} s, until known. {text}"
+        self.expectation.setText(text)
         self.expectation.setToolTip("\n".join(told))
 
     def _prediction_failed(self, error: BaseException) -> None:

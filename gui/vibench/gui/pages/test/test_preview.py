@@ -31,6 +31,8 @@ class TestPrediction:
 
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
+    recorded_s: float | None
+    """Predicted time of recording with `until` [s]; None if it is not known, or without `until`."""
     refusal: str
     """Why feedback on the rig would not hold it; empty where nothing speaks against it."""
 
@@ -45,5 +47,6 @@ def predict_test(test: TestPreview) -> TestPrediction:
     return TestPrediction(
         vibench.analysis.predict_measurement(test.measurement, test.rig),
         vibench.analysis.expected_uncertainty(test.measurement, test.rig),
+        vibench.analysis.expected_recorded_s(test.measurement, test.rig),
         refusal,
     )
