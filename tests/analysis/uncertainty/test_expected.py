@@ -41,6 +41,14 @@ def test_noise_is_known_as_well_as_was_said_before(tmp_path):
         assert 0.5 < said.scatter / found.share(Cause.NOISE) < 1.2, said.quantity
 
 
+@pytest.mark.parametrize("damping_time_s", [1.2e-5, 2.05e-5, 2.9e-5])
+def test_lines_without_noise_in_them_are_fitted(damping_time_s):
+    """A mode tried in vain got a factor of exactly zero, and the fit raised LinAlgError."""
+    specimen = RIG.specimen.model_copy(update={"damping_time_s": damping_time_s})
+    rig = RIG.model_copy(update={"specimen": specimen})
+    assert len(expected_uncertainty(Measurement(name="weak", excitation=NOISE), rig)) == 9
+
+
 def test_four_times_the_time_halves_the_scatter_and_no_calibration():
     rig = RIG.model_copy(
         update={

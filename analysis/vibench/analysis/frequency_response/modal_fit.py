@@ -394,7 +394,8 @@ def modal_fit(
     follows = np.hstack((_rates(lambda moved: basis(moved) @ found, poles), basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
-    if freedom < 1 or np.linalg.cond(_normalise(curvature)) > _WORST_CONDITION:
+    # A mode with a factor of exactly zero leaves its pole free.
+    if freedom < 1 or not np.diag(curvature).all() or _condition(curvature) > _WORST_CONDITION:
         return None
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom
@@ -444,10 +445,10 @@ def modal_fit(
     return ModalFit(tuple(resonance(mode) for mode in range(poles.size // 2)), chi_square, freedom)
 
 
-def _normalise(curvature: Reals) -> Reals:
-    """Scale to ones on the diagonal: how well a matrix is conditioned is not a matter of units."""
+def _condition(curvature: Reals) -> float:
+    """Return the condition of a matrix scaled to ones on the diagonal, which does not depend on units."""
     size = np.sqrt(np.diag(curvature))
-    return np.asarray(curvature / np.outer(size, size))
+    return float(np.linalg.cond(curvature / np.outer(size, size)))
 
 
 def _rates(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
