@@ -1,13 +1,13 @@
 """The Qt window: a viewer and a remote control of the measurement.
 
-It keeps no truth of its own: what it shows of a run is what the engine's process said last.
-Rooms, each above those it uses: `window`; `pages` (independent of each other); `page`;
+It stores no state of its own: it shows what the engine process reported last.
+Inner packages, each above those it uses: `window`; `pages` (independent of each other); `page`;
 `engine_link`, `plots`; `background`, `forms`, `widgets`.
-Qt (PySide6, pyqtgraph) is imported here and in no other package; whatever takes longer than a
-frame is computed in a spawned process. Guide: docs/gui.md.
+No other package imports Qt (PySide6, pyqtgraph). Work that takes longer than a frame runs in a spawned
+process. Guide: docs/gui.md.
 
-    $ vibench-gui --bench BENCH.toml
-    $ python -m vibench.gui --screenshots DIR
+$ vibench-gui --bench BENCH.toml
+$ python -m vibench.gui --screenshots DIR
 """
 
 import lazy_loader

@@ -1,6 +1,6 @@
-"""`vibench-gui` and `python -m vibench.gui`: the window, from the command line to its end.
+"""The commands `vibench-gui` and `python -m vibench.gui`, which open the window.
 
-Qt is imported inside `main`: a process that is spawned for background work imports this module too.
+Qt is imported inside `main`, because spawned worker processes import this module too.
 """
 
 import argparse
@@ -22,9 +22,9 @@ NO_WINDOW = 2
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Open the window and stay until it is closed."""
+    """Open the window and return the exit code when it is closed."""
     options = _options(arguments)
-    # The same binding for all, and one thread for linear algebra: the matrices are small.
+    # Use PySide6 in pyqtgraph too, and one thread for linear algebra, because the matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     trouble = display_trouble()
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _sign_of_life() -> "QLabel":
-    """Say at once that the window is coming: what it is made of takes seconds to load on a busy computer."""
+    """Return a "starting" label, shown first because loading the window takes seconds on a busy computer."""
     from PySide6.QtCore import Qt  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication, QLabel  # noqa: PLC0415
 

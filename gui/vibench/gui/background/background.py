@@ -1,4 +1,4 @@
-"""Work that takes longer than a frame: done in other processes, and asked after by a timer."""
+"""Work that takes longer than a frame: spawned processes do it, and a timer polls for the answers."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -9,14 +9,14 @@ from vibench.sim.background import Job, Pool
 
 POLL_MS = 20
 LONGEST_S = 900.0
-"""Nothing that a page asks for takes so long; what does is given up."""
+"""Jobs that take longer are abandoned [s]."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
 
 class Background(Pool, QObject):
-    """Spawned processes without Qt; answers come in the thread of the window."""
+    """Spawned processes without Qt; their answers are delivered in the window's thread."""
 
     def __init__(self, workers: int, parent: QObject | None = None) -> None:
         QObject.__init__(self, parent)
@@ -25,26 +25,26 @@ class Background(Pool, QObject):
         self._timer.timeout.connect(self.poll)
 
     def prepare(self) -> None:
-        """Start the processes now, those of its children too: no frame of a run has time for that."""
+        """Start all worker processes now, because starting them during a run would delay frames."""
         super().prepare()
         for beside in self.findChildren(Background):
             beside.prepare()
 
     def begin(self, job: Job) -> Job:
-        """Do a job as soon as a process is free."""
+        """Run a job as soon as a process is free."""
         begun = super().begin(job)
         if self.is_busy:
             self._timer.start()
         return begun
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Hand over what has come."""
+        """Deliver the answers that have arrived."""
         super().poll(wait_s)
         if not self.is_busy:
             self._timer.stop()
 
     def close(self) -> None:
-        """End the processes, those of its children too; what has not been answered is dropped."""
+        """End all worker processes; unanswered jobs are dropped."""
         for beside in self.findChildren(Background):
             beside.close()
         self._timer.stop()
@@ -52,7 +52,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Asks when a question has stood for a moment; never more than one question is out."""
+    """Submits the newest question after a short pause; at most one question is being answered."""
 
     def __init__(
         self,
@@ -73,16 +73,16 @@ class LatestRequest(QObject, Generic[Question, Answer]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether an answer to the newest question is still to come."""
+        """Whether the newest question is still unanswered."""
         return self._wanted is not None or self._job is not None
 
     def ask(self, question: Question) -> None:
-        """Ask this, in place of whatever was asked before."""
+        """Replace the waiting question by this one."""
         self._wanted = question
         self._timer.start()
 
     def drop(self) -> None:
-        """Ask nothing; what is being worked out is not wanted any more."""
+        """Cancel the waiting question and drop the running one."""
         self._wanted = None
         self._timer.stop()
         if self._job is not None:

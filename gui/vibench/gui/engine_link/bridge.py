@@ -1,4 +1,4 @@
-"""The bridge between window and engine: what the engine says comes in, what a person wants goes out."""
+"""The bridge between window and engine: status and samples come in, commands go out."""
 
 import threading
 from collections.abc import Callable
@@ -41,12 +41,12 @@ from vibench.stop_files import SWITCH_OFF
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Looked at when the plan is not known: it was armed by somebody else."""
+"""Displayed band when the plan is unknown because another window armed it."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
 def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
-    """Begin to watch the run of the recording ``name``."""
+    """Return an empty live view for the run of the recording ``name``."""
     measurement = measurement_called(campaign, name)
     band_hz = WHOLE_BAND_HZ if measurement is None else measurement.excitation.band_hz
     channels = [
@@ -58,7 +58,7 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
 
 
 def warm_up() -> None:
-    """Watch a moment of silence and a sine, so that everything is loaded and every window is known."""
+    """Process a short test signal, so that libraries are loaded and window functions are computed."""
     roles = ("drive_voltage", "base_acceleration", "m0_velocity")
     channels = [LiveChannel(role, "V", 1.0, 1.0) for role in roles]
     view = LiveView(channels, WARM_RATE_HZ, band_hz=WHOLE_BAND_HZ)
@@ -72,7 +72,7 @@ def warm_up() -> None:
 
 
 def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Find the measurement that a recording is one of."""
+    """Return the campaign's measurement to which a recording belongs."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)
@@ -84,7 +84,7 @@ Listener = Callable[[Any], None]
 
 
 class Urgency(IntEnum):
-    """Whose turn it is when several wait."""
+    """Order in which waiting requests are sent."""
 
     STOP = 0
     ORDER = 1
@@ -103,9 +103,9 @@ class _Call:
 
 
 class EngineLine:
-    """Starts an engine and asks it, in a thread without Qt; answers wait until `drain` fetches them.
+    """Starts an engine and sends requests from a thread without Qt; `drain` delivers the answers.
 
-    Nothing is asked unless the window asks: a window that hangs falls silent, and the engine notices.
+    Requests are sent only when the window makes them, so the engine notices a frozen window.
     """
 
     def __init__(self, start: Starter = start_engine) -> None:
@@ -115,13 +115,13 @@ class EngineLine:
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
         self.attendant: Attendant | None = None
-        """Tells the engine that the window is alive; None before there is an engine."""
+        """Reports to the engine that the window is alive; None before an engine exists."""
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
     @property
     def pid(self) -> int | None:
-        """The engine's process, None before it runs."""
+        """Process id of the engine; None before it runs."""
         return None if self._engine is None else self._engine.pid
 
     def ask(
@@ -131,11 +131,11 @@ class EngineLine:
         on_answer: Listener,
         on_refusal: Callable[[AcquisitionError], None],
     ) -> None:
-        """Ask when it is its turn; one of the two listeners is called by `drain`."""
+        """Queue a request by urgency; `drain` later calls one of the two listeners."""
         self._calls.put(_Call(urgency, next(self._numbers), question, on_answer, on_refusal))
 
     def drain(self) -> None:
-        """Tell the answers that have come, in the thread that calls."""
+        """Call the listeners of all answers received so far, in the caller's thread."""
         while True:
             try:
                 tell = self._answers.get_nowait()
@@ -144,11 +144,11 @@ class EngineLine:
             tell()
 
     def leave(self, how: Urgency = Urgency.END) -> None:
-        """Let the engine ramp down and end, or go on alone; nobody waits for that."""
-        self._calls.put(_Call(how, next(self._numbers), _nothing, _nothing, _nothing))
+        """End the engine after a ramp-down, or leave it running, without waiting."""
+        self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:
-        """Let the engine ramp down and end, or go on alone, and wait for that."""
+        """End the engine after a ramp-down, or leave it running, and wait."""
         self.leave(how)
         self._thread.join()
 
@@ -177,51 +177,52 @@ class EngineLine:
             self._answers.put(lambda: call.on_answer(answer))
 
 
-def _nothing(_: object) -> None:
-    """Do nothing with an answer."""
+def _ignore(_: object) -> None:
+    """Ignore an answer; the next status shows what an order did."""
 
 
 CATCH_UP_S = 2.0
-"""Older samples than this are not asked for after a pause: the picture shows now, the file holds all."""
+"""Older samples are not fetched after a pause; they are in the file, and the display shows the present."""
 
 PIECE_S = 0.2
-"""Samples that are taken in at once; a frame of a real instrument's brings a quarter of that."""
+"""Duration of samples processed at once; a frame of a real instrument brings a quarter of that."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
 
 
 class Bridge(QObject):
-    """The one place where the window and the engine meet.
+    """The only connection between the window and the engine.
 
-    Everything known is what the engine said last. `tick`, called by the window's timer, fetches
-    answers and asks again: this is also how the engine knows that the window is alive.
+    All stored values are what the engine reported last. The window's timer calls `tick`, which fetches
+    answers and
+    sends new requests. The engine takes these requests as the sign that the window is alive.
     """
 
     noticed = Signal(object)
-    """A `Notice` from the engine, or about it."""
+    """A `Notice` from or about the engine."""
     armed = Signal(object)
-    """The `ArmedPlan` after `arm` was granted."""
+    """The `ArmedPlan` after a successful `arm`."""
     adopted = Signal(object)
-    """The `CampaignRequest` that an engine carries out which another window has left alone."""
+    """The `CampaignRequest` of a running engine that another window left."""
     advanced = Signal()
-    """What was wanted has come about: a bench is open, a plan armed, a run started."""
+    """A requested step is done: a bench is open, a plan armed, or a run started."""
     recording_ended = Signal(object)
-    """Path of a recording that has just come to its end."""
+    """Path of a recording that has just ended."""
 
     def __init__(self, start: Starter = start_engine, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._start = start
         self._line: EngineLine | None = None
         self.status: EngineStatus | None = None
-        """What the engine said last; None while there is none."""
+        """The newest status of the engine; None without an engine."""
         self.view: LiveView | None = None
-        """The newest samples of the run; None before the first one, and since another plan was armed."""
+        """The newest samples of the run; None before the first run and after another plan was armed."""
         self._view_run = 0
         self.rig: Rig | None = None
-        """The rig whose bench was opened last."""
+        """The rig of the newest open bench."""
         self.campaign: Campaign | None = None
-        """What was armed last."""
+        """The newest armed campaign."""
         self._last_message = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
@@ -230,12 +231,12 @@ class Bridge(QObject):
 
     @property
     def state(self) -> EngineState:
-        """Where the engine stands; closed while there is none."""
+        """State of the engine; closed without an engine."""
         return EngineState.CLOSED if self.status is None else self.status.state
 
     @property
     def is_ordering(self) -> bool:
-        """Whether an order is on its way: a campaign may take seconds to be checked against the limits."""
+        """Whether an order is being carried out; checking a campaign against the limits may take seconds."""
         return self._orders > 0
 
     @property
@@ -245,11 +246,11 @@ class Bridge(QObject):
 
     @property
     def engine_pid(self) -> int | None:
-        """The engine's process."""
+        """Process id of the engine."""
         return None if self._line is None else self._line.pid
 
     def tick(self) -> None:
-        """Fetch what has come, and ask again."""
+        """Deliver the answers received, then request status and samples again."""
         if self._line is None:
             return
         self.beat()
@@ -259,20 +260,20 @@ class Bridge(QObject):
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
 
     def beat(self) -> None:
-        """Note that the window's own thread is alive; a process of its own tells the engine."""
+        """Record that the window's thread is alive; a separate process reports it to the engine."""
         attendant = None if self._line is None else self._line.attendant
         if attendant is not None:
             attendant.live()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
-        """Open the bench of a rig, with an engine of its own if there is none yet."""
+        """Open the bench of a rig; start an engine if there is none."""
         if self._line is None:
             self._line = EngineLine(self._start)
         self.rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
     def adopt(self, announcement: Announcement) -> None:
-        """Take over an engine that was left alone, with what it carries out; `adopted` follows."""
+        """Take over an engine that another window left, with its campaign; `adopted` follows."""
         if self._line is not None:
             return
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
@@ -280,7 +281,7 @@ class Bridge(QObject):
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
             self.rig, request, self.status = found
             self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._tell(self.status)  # what happened before anybody looked again
+            self._tell(self.status)  # what happened before the next request
             self.adopted.emit(request)
 
         self._order(_taken_over, keep)
@@ -288,11 +289,11 @@ class Bridge(QObject):
     def order(
         self, verb: Callable[Concatenate[EngineClient, P], object], *args: P.args, **kwargs: P.kwargs
     ) -> None:
-        """Have the engine carry out a verb of its client, such as ``EngineClient.start``."""
+        """Call a method of the engine's client, such as ``EngineClient.start``, in the engine thread."""
         self._order(lambda client: verb(client, *args, **kwargs))
 
     def arm(self, request: CampaignRequest) -> None:
-        """Get ready to carry out a campaign; `armed` or a notice follows."""
+        """Arm a campaign; `armed` or a notice follows."""
 
         def keep(plan: ArmedPlan) -> None:
             self.campaign, self._attendance = request.campaign, plan.attendance
@@ -302,17 +303,17 @@ class Bridge(QObject):
         self._order(lambda client: client.arm_request(request), keep)
 
     def stop(self, level: StopLevel, reason: str) -> None:
-        """Hold or end what runs; goes before everything else that waits."""
+        """Pause or end the run; this request precedes all others that wait."""
         if self._line is not None:
-            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _done, self._refused)
+            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._refused)
 
     @property
     def may_leave(self) -> bool:
-        """Whether what runs was meant to be left alone."""
+        """Whether the run was armed to continue without a window."""
         return self.is_driving and self._attendance is Supervision.UNATTENDED
 
     def close(self, how: Urgency = Urgency.END) -> None:
-        """Let the engine ramp down and end; or leave it alone with what it carries out."""
+        """End the engine after a ramp-down, or leave it running with its campaign."""
         line, self._line = self._line, None
         if line is not None:
             line.close(how)
@@ -332,12 +333,12 @@ class Bridge(QObject):
         line = self._line
 
         def over() -> None:
-            if self._line is line:  # or it has been forgotten, with all its orders
+            if self._line is line:  # skipped when the engine has ended, because its orders are forgotten too
                 self._orders -= 1
 
         def answered(answer: Any) -> None:
             over()
-            (on_answer or _done)(answer)
+            (on_answer or _ignore)(answer)
 
         def refused(error: AcquisitionError) -> None:
             over()
@@ -377,7 +378,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Take in a piece: all that comes after a pause, or from a fast simulation, is too much at once."""
+        """Process one piece and schedule the rest; all samples after a pause would block the event loop."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:
@@ -409,12 +410,12 @@ class Bridge(QObject):
         self._refused(error)
 
     def _gone(self, error: EngineGone) -> None:
-        """Forget an engine that has ended: whatever is shown of it would be out of date."""
+        """Discard all values of an engine that has ended."""
         if self._line is None:
             return
         line, self._line = self._line, None
         self.status, self._last_message, self._ended = None, 0, frozenset()
-        self._orders = self._view_run = 0  # another engine counts its runs from 1 again
+        self._orders = self._view_run = 0  # a new engine counts its runs from 1
         line.leave()
         if isinstance(error, EngineSilent):
             self.noticed.emit(notice_of(error, "Then open the bench again on the Rig page."))
@@ -432,11 +433,11 @@ _ADVANCES = frozenset(
         (EngineState.ARMED, EngineState.RUNNING),
     }
 )
-"""Steps after which a complaint about what was before would be out of date."""
+"""Steps after which an earlier complaint is out of date."""
 
 
 def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:
-    """Open a bench, and meanwhile load what the first picture of a run needs: no frame has time for that."""
+    """Open a bench, and load the libraries that the first plot of a run needs."""
     client.open(rig, confirmations)
     warm_up()
 
@@ -444,10 +445,6 @@ def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> No
 def _taken_over(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
     warm_up()
     return client.open_rig(), client.carried_request(), client.status()
-
-
-def _done(_: object) -> None:
-    """Take note that an order was carried out: the status shows what it did."""
 
 
 def _notice(message: EngineMessage) -> Notice:

@@ -1,4 +1,4 @@
-"""One editor for every kind of value that a plan may hold."""
+"""Editors: one for every type of value that a plan may hold."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -18,29 +18,29 @@ from .quantity_edit import LineField, QuantityEdit, draw_edge, parsed_quantity, 
 
 
 class Editor(Protocol):
-    """A widget that holds one value of a plan, in the plain types of a file."""
+    """A widget that edits one value of a plan, in the plain types of a file."""
 
     @property
     def widget(self) -> QWidget:
-        """What is put into the form."""
+        """The widget in the form."""
 
     @property
     def complaint(self) -> str:
-        """What is wrong before the plan is even asked."""
+        """Why the text cannot be read; empty when it can."""
 
     def content(self) -> Any:
-        """Return what a file would say; None for nothing."""
+        """Return the value as a file would hold it; None for an empty field."""
 
     def show_content(self, content: Any) -> None:
-        """Show what a file says."""
+        """Show a value from a file."""
 
 
 _LEFT_OPEN = "left open"
-"""Stands in a field that may be empty, while it is."""
+"""Placeholder of an empty optional field."""
 
 
 class QuantityEditor:
-    """A number with its unit."""
+    """Editor of a number with its unit."""
 
     def __init__(
         self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
@@ -51,7 +51,7 @@ class QuantityEditor:
 
     @property
     def complaint(self) -> str:
-        """What is wrong with the text."""
+        """Why the text cannot be read; empty when it can."""
         return self._edit.complaint
 
     def content(self) -> float | int | None:
@@ -64,10 +64,10 @@ class QuantityEditor:
 
 
 class Choice(QComboBox):
-    """A choice that a turning wheel changes only while it has the focus, and that Space leaves alone.
+    """A combo box that the mouse wheel changes only with the focus, and that ignores the space bar.
 
-    Space belongs to the page: the Run page freezes its picture. F4 and Alt+Down open the list.
-    Its width does not follow its longest entry.
+    The space bar freezes the picture of the Run page. F4 and Alt+Down open the list.
+    The width does not depend on the longest entry.
     """
 
     LETTERS = 10
@@ -78,19 +78,19 @@ class Choice(QComboBox):
         self.setMinimumContentsLength(self.LETTERS)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Hand Space on."""
+        """Leave the space bar to the page."""
         if event.key() == Qt.Key.Key_Space:
             event.ignore()
         else:
             super().keyPressEvent(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the box, then its edge."""
+        """Draw the box, then its border."""
         super().paintEvent(event)
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Scrolling a form must change nothing."""
+        """Ignore the wheel without the focus, so that scrolling a form changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -98,19 +98,19 @@ class Choice(QComboBox):
 
 
 class _LineOnEach(QStyledItemDelegate):
-    """Writes the line on an entry beside it, where the list is open."""
+    """Shows a description beside each entry of the open list."""
 
     def initStyleOption(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> None:
-        """Add the line."""
+        """Add the description."""
         super().initStyleOption(option, index)
         line = index.data(Qt.ItemDataRole.ToolTipRole)
         option.text = f"    {option.text}:  {line}" if line else option.text
 
 
 class ChoiceEditor:
-    """One of a few values: nothing can be wrong."""
+    """Editor of a choice; it needs no validation."""
 
     complaint = ""
 
@@ -171,7 +171,7 @@ class TextEditor:
 
 
 class SuggestionEditor:
-    """A text that is chosen from a list, or typed; the plan itself judges it."""
+    """Editor of a text that is chosen from a list or typed; the plan validates it."""
 
     complaint = ""
 
@@ -205,9 +205,9 @@ class SuggestionEditor:
 
 
 class ListEditor:
-    """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``.
+    """Editor of a list as one line of text: ``95, 266, 500``.
 
-    Numbers with a unit that may be chosen are read as in a field of one.
+    Numbers are read like those of a quantity field if their unit can be chosen.
     """
 
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:
@@ -217,12 +217,12 @@ class ListEditor:
         self._line.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
-        """What was last shown, and its values with every digit."""
+        """The text shown last, and its values in full precision."""
         self.widget = self._line
 
     @property
     def complaint(self) -> str:
-        """What cannot be read."""
+        """Why the text cannot be read; empty when it can."""
         self.content()
         return self._complaint
 
@@ -256,7 +256,7 @@ class ListEditor:
 
 
 def unwrapped(annotation: Any) -> tuple[Any, bool]:
-    """Take ``Annotated`` and ``| None`` off a type; says whether None is allowed."""
+    """Return a type without ``Annotated`` and ``| None``, and whether None is allowed."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -267,7 +267,7 @@ def unwrapped(annotation: Any) -> tuple[Any, bool]:
 
 
 def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
-    """Choose the editor for a plain value."""
+    """Return the editor for a plain value."""
     plain, may_be_missing = unwrapped(annotation)
     if plain in (float, int):
         return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")

@@ -1,4 +1,4 @@
-"""What a form says of a field, taken from the plan model: label, unit, limits, explanation."""
+"""Label, unit, limits and explanation of a form field, taken from the plan model."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,31 +28,31 @@ _ENDINGS = (
     ("_a", "A"),
     ("_n", "N"),
 )
-"""Endings of names, longest first, and the unit they stand for."""
+"""Suffixes of field names, longest first, and their units."""
 
 
 @dataclass(frozen=True)
 class FieldFacts:
-    """A field as a person sees it."""
+    """Description of a field for the form."""
 
     name: str
     label: str
     unit: str
-    """SI, or a plain one."""
+    """SI unit, or a plain one."""
     allowed: str
-    """``"above 0, at most 60 s"``; empty when anything goes."""
+    """``"above 0, at most 60 s"``; empty without limits."""
     explanation: str
     examples: tuple[str, ...] = ()
-    """Texts to choose from; another one may be typed."""
+    """Suggested texts; other texts may be typed."""
 
     @property
     def shown_unit(self) -> str:
-        """That of a plain number in the field."""
+        """Unit of a plain number typed into the field."""
         return UNITS.in_field(self.unit)
 
     @property
     def limits(self) -> str:
-        """What is allowed, in the units that people chose."""
+        """Allowed values, in the chosen units."""
         return UNITS.told(self.allowed)
 
     @property
@@ -63,7 +63,7 @@ class FieldFacts:
 
     @property
     def named(self) -> str:
-        """Label and unit, as a complaint begins."""
+        """Label and unit, at the beginning of a complaint."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
@@ -73,7 +73,7 @@ class FieldFacts:
 
 
 def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
-    """Return what a form must know of a field."""
+    """Return the description of a field."""
     suffix, unit = next(((s, u) for s, u in _ENDINGS if name.endswith(s)), ("", ""))
     words = name.removesuffix(suffix).replace("_", " ")
     return FieldFacts(
@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Say each bound with its unit where that may be chosen, and otherwise once."""
+    """Return the bounds as text, with the unit once, or at each bound if the unit can be chosen."""
     each = f" {unit}" if unit in CHOICES else ""
     said = ", ".join(_limit_texts(field, each))
     return said if each or not said else f"{said} {unit}".strip()
@@ -111,7 +111,7 @@ def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:
 
 
 def _inner(annotation: Any) -> Iterator[object]:
-    """Constraints of what a tuple holds, or of what an optional value is."""
+    """Yield the constraints of the elements of a tuple, or of an optional value."""
     for part in get_args(annotation):
         yield from getattr(part, "__metadata__", ())
         yield from _inner(part)

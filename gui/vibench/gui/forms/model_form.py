@@ -1,4 +1,4 @@
-"""A form for a plan model: a row a field, groups for models inside, judged by the model at every change."""
+"""A form for a plan model: one row per field, groups for inner models, validated at every change."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ class _Row:
     label: QLabel | None
 
     def explain(self) -> None:
-        """Say what the field is and takes, in the units that are shown."""
+        """Show label, limits and explanation in the chosen units."""
         for each in (self.editor.widget, self.label):
             if each is not None:
                 each.setToolTip(self.facts.tooltip)
@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return what a model refuses, place by place, without what only follows from something else."""
+    """Return the model's complaints by field, without those that follow from another complaint."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -46,7 +46,7 @@ def complaints_of(error: ValidationError) -> dict[Loc, str]:
 
 
 class ModelForm(QWidget):
-    """Holds the content of a plan as a file would; the plan itself judges it."""
+    """Edits a plan in the plain types of a file; the plan model validates it."""
 
     changed = Signal()
 
@@ -56,7 +56,7 @@ class ModelForm(QWidget):
         self._fixed: dict[str, Any] = {}
         self._rows: dict[str, _Row] = {}
         self.edited = ""
-        """Label and unit of the field that was changed last."""
+        """Label and unit of the field changed last."""
         self._layout = QFormLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
@@ -73,11 +73,11 @@ class ModelForm(QWidget):
 
     @property
     def editors(self) -> dict[str, Editor]:
-        """The editor of every field, by its name."""
+        """Editors by field name."""
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Return what a file would say; what is not given is left out, or None where that has a meaning."""
+        """Return the content as a file would hold it, without empty fields unless None has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         said = {
             name: value
@@ -87,7 +87,7 @@ class ModelForm(QWidget):
         return {**self._fixed, **said}
 
     def show_content(self, content: Mapping[str, Any]) -> None:
-        """Show what a file says; what it does not say is shown as the plan's own default."""
+        """Show content from a file; missing fields show the plan's defaults."""
         blocked = self.blockSignals(True)
         for name, row in self._rows.items():
             row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
@@ -96,9 +96,9 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Put complaints at their fields, those of models inside further in; gives all, each with its field.
+        """Show complaints at their fields, also in inner models, and return all with their field names.
 
-        What belongs to no field, but to several together, is reported at the field that was changed last.
+        A complaint about several fields together is attributed to the field changed last.
         """
         said: list[str] = []
         for name, row in self._rows.items():
@@ -122,7 +122,7 @@ class ModelForm(QWidget):
 
     @property
     def is_read(self) -> bool:
-        """Whether everything that was typed can at least be read, in this form and those inside."""
+        """Whether all typed texts can be read, in this form and in inner ones."""
         return all(
             row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
             for row in self._rows.values()
@@ -146,7 +146,7 @@ class ModelForm(QWidget):
         self._rows[name].explain()
 
     def _explain(self) -> None:
-        """Write values and what is said of them in other units; what cannot be read stays as it was typed."""
+        """Rewrite values and explanations in the chosen units; unreadable text stays unchanged."""
         for row in self._rows.values():
             row.explain()
             if row.facts.unit in CHOICES and not row.editor.complaint:
@@ -161,7 +161,7 @@ class ModelForm(QWidget):
 
 
 class GroupEditor:
-    """A model inside a model; where it may be missing, a tick says whether it is there."""
+    """Editor of an inner model."""
 
     def __init__(
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
@@ -174,7 +174,7 @@ class GroupEditor:
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
         self._memories: dict[str, dict[str, Any]] = {}
-        """What each kind was left with."""
+        """Content of each kind when it was left."""
         self._usual: Mapping[str, Any] = {}
         self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
@@ -187,27 +187,27 @@ class GroupEditor:
 
     @property
     def kind_choice(self) -> Choice | None:
-        """Where the kind is chosen, when there are several."""
+        """The choice of the kind; None if there is only one."""
         return None if self._kind is None else self._kind.widget
 
     @property
     def complaint(self) -> str:
-        """Complaints stand at the fields."""
+        """Always empty, because complaints are shown at the fields."""
         return ""
 
     def content(self) -> Any:
-        """Return what a file would say."""
+        """Return the content as a file would hold it."""
         return self.form.content()
 
     def show_content(self, content: Any) -> None:
-        """Show what a file says, in the form of its kind."""
+        """Show content from a file, in the form of its kind."""
         values = _as_content(content) or {}
         if self._kind is not None and "kind" in values:
             self._kind.show_content(values["kind"])
         self.form.show_content(values)
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Hand complaints on."""
+        """Show complaints at the fields of the inner form."""
         return self.form.complain(complaints)
 
     def know(
@@ -216,17 +216,18 @@ class GroupEditor:
         fresh: Mapping[str, Mapping[str, Any]],
         lines: Mapping[str, tuple[str, str]],
     ) -> None:
-        """Give the fields of a new kind these values, by their names, where they would be empty.
+        """Set starting values for the fields of a new kind, and describe the kinds in the list.
 
-        Those that are fresh of a kind stand in place of what another kind was left with. The kinds are listed
-        below headings, each with a line on it.
+        ``usual`` fills empty fields of any kind. ``fresh`` replaces, for its kind, what was typed for another
+        kind.
+        ``lines`` holds the heading and the description of each kind.
         """
         self._usual, self._fresh = usual, fresh
         assert self._kind is not None
         self._kind.explain(lines)
 
     def _turn(self, *_: object) -> None:
-        """Change the kind; fields of the same name keep their values."""
+        """Change the kind; fields with the same name keep their values."""
         assert self._kind is not None
         left, chosen = self.form.content(), self._kind.content()
         if chosen is None:  # a heading
@@ -253,7 +254,7 @@ class GroupEditor:
 
 
 class OptionalGroupEditor(GroupEditor):
-    """A model that may be missing."""
+    """Editor of an inner model that may be absent; a check box switches it on."""
 
     def __init__(
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
@@ -262,29 +263,29 @@ class OptionalGroupEditor(GroupEditor):
         self._there = QCheckBox(f"Give {facts.label.lower()}")
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
-        # No wider than its words: a form may be wider than a small window.
+        # Left-aligned at its natural width, because a form may be wider than a small window.
         self._layout.insertWidget(0, self._there, alignment=Qt.AlignmentFlag.AlignLeft)
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
         self.form.hide()
 
     def content(self) -> Any:
-        """Return what a file would say, None when it is not there."""
+        """Return the content as a file would hold it; None when absent."""
         return super().content() if self._there.isChecked() else None
 
     def show_content(self, content: Any) -> None:
-        """Show it, or that it is missing."""
+        """Show content from a file; None unticks the box."""
         self._there.setChecked(content is not None)
         if content is not None:
             super().show_content(content)
 
 
 _DRAWN = frozenset({"excited_lines", "detection_lines"})
-"""Values that a plan fills in for itself; they do not outlive the values they were drawn from."""
+"""Values that the plan draws itself; they are drawn again when other values change."""
 
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
-    """Choose the editor of a field, models included."""
+    """Return the editor of a field, inner models included."""
     plain, may_be_missing = unwrapped(field.annotation)
     kinds = tuple(unwrapped(part)[0] for part in get_args(plain)) or (plain,)
     if all(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
@@ -298,7 +299,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether an empty field means something else than the default."""
+    """Return whether an empty field differs from the default."""
     return unwrapped(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
@@ -313,14 +314,14 @@ def _as_content(value: Any) -> Any:
 
 
 def _after_kind(editor: Editor, loc: Loc) -> Loc:
-    """Pydantic names the kind inside the place of an error; a form does not."""
+    """Drop the kind, which pydantic puts into the place of an error and a form does not."""
     if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
         return loc[1:]
     return loc
 
 
 def _sentence(text: str, facts: FieldFacts) -> str:
-    """Say a complaint of the model's in words of a form."""
+    """Reword a complaint of the model for the form."""
     unit = f" in {facts.shown_unit}" if facts.unit else ""
     if text == "Field required":
         return f"nothing is given; type a value{unit}"
@@ -332,7 +333,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class JudgedForm(QWidget, Generic[Model]):
-    """Fields, and below them what does not fit together."""
+    """A form with the complaints and warnings of its model below it."""
 
     changed = Signal()
 
@@ -345,7 +346,7 @@ class JudgedForm(QWidget, Generic[Model]):
         super().__init__()
         self._model = model
         self.value: Model | None = None
-        """What the form says; None while that is not allowed."""
+        """The validated model; None while the content is not allowed."""
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint")
         self._complaint.setAccessibleName(f"Complaint about the {name}")
@@ -358,16 +359,16 @@ class JudgedForm(QWidget, Generic[Model]):
 
     @property
     def complaint(self) -> str:
-        """What is not allowed, all of it."""
+        """All complaints, as one text."""
         return self._complaint.text()
 
     @property
     def warning(self) -> str:
-        """What is allowed, but may not be meant: springs that follow from another mass."""
+        """Warnings about allowed values that may be unintended, such as springs derived from another mass."""
         return self._warning.text()
 
     def show_value(self, value: Model) -> None:
-        """Show other content."""
+        """Show another value."""
         self.form.show_content(value.model_dump(mode="json"))
 
     def _take(self) -> None:
@@ -375,7 +376,6 @@ class JudgedForm(QWidget, Generic[Model]):
         self.changed.emit()
 
     def _judge(self) -> None:
-        """Say what is not allowed, in the units that are shown."""
         complaints: dict[Loc, str] = {}
         self.value = None
         with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:

@@ -1,4 +1,4 @@
-"""A field for one quantity as people type it: "12,5", "5 ms", "45 µm"; its limits stand in the tooltip."""
+"""A field for one quantity as people type it ("12,5", "5 ms", "45 µm"); the tooltip shows the limits."""
 
 import re
 from decimal import Decimal
@@ -16,7 +16,7 @@ _ROUND = 2.0
 
 
 def draw_edge(field: QWidget) -> None:
-    """Draw a line around a field, after the style has drawn the field itself."""
+    """Draw a border around a field, after the style has drawn the field itself."""
     role = QPalette.ColorRole.Highlight if field.hasFocus() else QPalette.ColorRole.Mid
     painter = QPainter(field)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -25,10 +25,10 @@ def draw_edge(field: QWidget) -> None:
 
 
 class LineField(QLineEdit):
-    """A line of text with an edge."""
+    """A line of text with a border."""
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the field, then its edge."""
+        """Draw the field, then its border."""
         super().paintEvent(event)
         draw_edge(self)
 
@@ -37,34 +37,33 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Write a value given in SI in the unit of its field, with every digit it has."""
+    """Return a value given in SI as text in the field's unit, in full precision."""
     shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
     if shown.per_si != 1.0:
-        # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45; parsing must give the same value back.
+        # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45, but parsing must return the same value.
         text = shown.text(value, 12)
         if parsed_quantity(text, unit, shown.name) == value:
             return text
         if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
-            # Never in the SI unit: a plain number typed over it would be metres.
+            # Never in the SI unit: a plain number typed over it would be read in metres.
             return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()
 
 
 def unit_of(text: str, unit: str) -> str:
-    """Return the unit that a text of a field shows; that of an empty field where it shows none."""
+    """Return the unit in the text of a field; without one, the unit of an empty field."""
     match = _NUMBER.match(text)
     return (match[2] if match else "") or UNITS.in_field(unit)
 
 
 def parsed_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
-    """Read a value in SI; a comma is a decimal point, a unit may carry a prefix.
+    """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
-    A plain number is in the unit ``shown``; without one, in that of an empty field.
-
-    Raises ConfigurationError when it is no number, or its unit is another one.
+    A plain number is in the unit ``shown``; without one, in the unit of an empty field.
+    Raises ConfigurationError when the text is no number or has another unit.
     """
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
     if match is None:
@@ -88,28 +87,28 @@ def _short(text: str) -> str:
 
 
 def _scaled(number: str, prefix: str) -> float:
-    """Move the decimal point in the text, so that 45 µm is the same number as 45e-6."""
+    """Shift the decimal point in the text, so that 45 µm equals 45e-6 exactly."""
     mantissa, _, exponent = number.lower().partition("e")
     return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
 
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""Larger ones are written without a prefix."""
+"""Larger values are written without a prefix."""
 _DIGITS = 6
-"""Digits of a value that is no short number in the unit that was chosen; the value itself keeps all."""
+"""Displayed digits of a long number; the stored value keeps all."""
 MOST_WHOLE = 1 << 53
-"""Larger whole numbers cannot be told from their neighbours."""
+"""Larger integers are not represented exactly."""
 MOST_TIMES = 1000.0
-"""A value this many times the old one, or such a part of it, is often a mistaken unit: it is asked about."""
+"""A change by more than this factor is often a wrong unit and needs confirmation."""
 STEP = 0.05
-"""Share by which one step changes a quantity: small beside what matters, and never past zero."""
+"""Relative change per step: a small change that never crosses zero."""
 
 
 class QuantityEdit(QAbstractSpinBox):
-    """Holds a number with every digit, or nothing where nothing is allowed.
+    """Edits a number in full precision; the field may be empty where that is allowed.
 
-    The value changes when the typing is finished, not at every key.
+    The value changes when typing ends, not at every key.
     """
 
     changed = Signal()
@@ -120,9 +119,9 @@ class QuantityEdit(QAbstractSpinBox):
         self._shown_unit = ""
         self._value: float | int | None = None
         self.complaint = ""
-        """What is wrong with the text; empty when it can be read."""
+        """Why the text cannot be read; empty when it can."""
         self._asked_about: float | int | None = None
-        """A value that waits for a second Return."""
+        """A value to be confirmed by a second Return."""
         self._is_confirmed = False
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -134,7 +133,7 @@ class QuantityEdit(QAbstractSpinBox):
         return self._value
 
     def set_value(self, value: float | int | None) -> None:
-        """Show a number."""
+        """Set the number."""
         self._value, self.complaint, self._asked_about = value, "", None
         text = "" if value is None else quantity_text(value, self._unit)
         self._shown_unit = unit_of(text, self._unit)
@@ -143,12 +142,12 @@ class QuantityEdit(QAbstractSpinBox):
         self.lineEdit().setText(text)
 
     def show_unit(self, unit: str) -> None:
-        """Hold another quantity from now on."""
+        """Change the unit of the quantity."""
         self._unit = unit
         self.set_value(None)
 
     def stepBy(self, steps: int) -> None:
-        """Change by five per cent a step, or by one where numbers are whole."""
+        """Change by five per cent per step, or by one for integers."""
         self._take()
         if self._value is None:
             return
@@ -159,34 +158,34 @@ class QuantityEdit(QAbstractSpinBox):
         self.changed.emit()
 
     def stepEnabled(self) -> QAbstractSpinBox.StepEnabledFlag:
-        """Both ways; the plan itself knows what is allowed."""
+        """Allow steps up and down; the plan checks the limits."""
         flag = QAbstractSpinBox.StepEnabledFlag
         return flag.StepUpEnabled | flag.StepDownEnabled
 
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
-        """Let everything be typed; it is read when the typing is finished."""
+        """Accept every key; the text is read when typing ends."""
         return QValidator.State.Acceptable, text, position
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the field, then its edge."""
+        """Draw the field, then its border."""
         super().paintEvent(event)
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Turn only in the field that has the focus: scrolling a form must change nothing."""
+        """Ignore the wheel without the focus, so that scrolling a form changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
             event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Take a second Return for a yes; to leave the field is none."""
+        """Accept a second Return as confirmation; leaving the field does not confirm."""
         self._is_confirmed = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         super().keyPressEvent(event)
         self._is_confirmed = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Select the number, to be typed over."""
+        """Select the number, so that typing replaces it."""
         super().focusInEvent(event)
         self.selectAll()
 
@@ -233,7 +232,7 @@ class QuantityEdit(QAbstractSpinBox):
             if value != int(value) or abs(value) > MOST_WHOLE:
                 raise ConfigurationError(f"{_short(text)} is not a whole number below 2^53; give one")
             return int(value)
-        # What is shown is what was typed: the same text must not change a value by rounding.
+        # Compare the texts, so that rounding of the displayed number does not change the value.
         return (
             self._value
             if self._value is not None and text == quantity_text(self._value, self._unit)

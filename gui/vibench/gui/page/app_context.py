@@ -1,4 +1,4 @@
-"""What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
+"""What all pages share: bridge, current selection, settings, background work, signals to the window."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -40,50 +40,50 @@ class Remembered(StrEnum):
 
 
 class Settings:
-    """An INI file that people may read and delete."""
+    """The settings file, an INI file that people may read and delete."""
 
     def __init__(self, path: Path) -> None:
         self._store = QSettings(str(path), QSettings.Format.IniFormat)
 
     def text(self, key: Remembered, otherwise: str = "") -> str:
-        """Text that was kept, or ``otherwise``."""
+        """Return a stored text, or ``otherwise``."""
         value = self._store.value(key.value)
         return value if isinstance(value, str) and value else otherwise
 
     def number(self, key: Remembered, otherwise: float, low: float, high: float) -> float:
-        """Return a number that was kept, between its bounds; ``otherwise`` where it is none."""
+        """Return a stored number, limited to its bounds; ``otherwise`` without a valid number."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:
             return otherwise
 
     def keep_text(self, key: Remembered, value: str) -> None:
-        """Keep a text."""
+        """Store a text."""
         self._store.setValue(key.value, value)
 
     def state(self, key: Remembered, name: str = "") -> QByteArray:
-        """Shape of a window or splitter that was kept, empty when there is none."""
+        """Return the stored layout of a window or splitter; empty without one."""
         value = self._store.value(f"{key.value}/{name}" if name else key.value)
         return value if isinstance(value, QByteArray) else QByteArray()
 
     def keep_state(self, key: Remembered, state: QByteArray, name: str = "") -> None:
-        """Keep the shape of a window or splitter."""
+        """Store the layout of a window or splitter."""
         self._store.setValue(f"{key.value}/{name}" if name else key.value, state)
 
     def forget_layout(self) -> None:
-        """Drop shapes, for a window that comes up as new."""
+        """Delete stored layouts, so that the window opens with its default layout."""
         for key in (Remembered.GEOMETRY, Remembered.SPLITTERS):
             self._store.remove(key.value)
 
 
 def default_settings_path() -> Path:
-    """Where the settings file lies for this user."""
+    """Return the path of this user's settings file."""
     folder = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.GenericConfigLocation)
     return Path(folder) / "vibench" / "window.ini"
 
 
 class Selection(QObject):
-    """Values that several pages work on; each is whole and valid, or None."""
+    """Values shared by several pages; each is complete and valid, or None."""
 
     rig_changed = Signal()
     measurement_changed = Signal()
@@ -92,32 +92,32 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.rig: Rig | None = None
-        """The rig that was chosen, open or not."""
+        """The selected rig, open or not."""
         self.measurement: Measurement | None = None
-        """The test on the Test page; None while something in it is not allowed."""
+        """The test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
         """The campaign on the Queue page."""
         self.prediction: MeasurementPrediction | None = None
-        """What the specimen is predicted to do under the test; None while nobody knows."""
+        """Predicted response of the specimen to the test; None until it is computed."""
 
     def choose_rig(self, rig: Rig | None) -> None:
-        """Mean another rig."""
+        """Select another rig."""
         if rig != self.rig:
             self.rig = rig
             self.rig_changed.emit()
 
     def choose_measurement(self, measurement: Measurement | None) -> None:
-        """Mean another test."""
+        """Select another test."""
         if measurement != self.measurement:
             self.measurement, self.prediction = measurement, None
             self.measurement_changed.emit()
 
     def keep_prediction(self, prediction: "MeasurementPrediction") -> None:
-        """Keep what is predicted of the test."""
+        """Store the prediction for the test."""
         self.prediction = prediction
 
     def choose_campaign(self, campaign: Campaign | None) -> None:
-        """Mean another campaign."""
+        """Select another campaign."""
         if campaign != self.campaign:
             self.campaign = campaign
             self.campaign_changed.emit()
@@ -126,30 +126,30 @@ class Selection(QObject):
 USUAL_PATIENCE_S = 2.0
 MOST_RECENT = 12
 WORKERS = 2
-"""For whatever takes long: predictions, analyses, overviews, exports."""
+"""Worker processes for long jobs: predictions, analyses, overviews, exports."""
 
 
 class AppContext(QObject):
-    """Handed to every page; pages know each other by name only."""
+    """The services of every page; pages know each other by name only."""
 
     folder_chosen = Signal(object)
-    """Recordings go to another folder."""
+    """Folder of new recordings, after a change."""
     noticed = Signal(object)
     """A `Notice` for the message strip."""
     page_wanted = Signal(str)
     """Name of a page to show."""
     recording_wanted = Signal(object)
-    """Path of a recording that somebody wants to look at; Files opens it."""
+    """Path of a recording to open on the Files page."""
     recording_made = Signal(object)
-    """Path of a recording that has just been finished."""
+    """Path of a recording that has just ended."""
     comparison_wanted = Signal(object)
-    """Paths of recordings to lay over one another; Compare takes them."""
+    """Paths of recordings to overlay on the Compare page."""
     prediction_made = Signal(object)
-    """Curves of a prediction to lay over recordings; Compare takes them."""
+    """Predicted curves to overlay on the Compare page."""
     scene_wanted = Signal(float, float)
-    """Drive frequency [Hz] and base amplitude [m] of a scene to simulate; Simulate takes them."""
+    """Drive frequency [Hz] and base amplitude [m] of a scene for the Simulate page."""
     theme_changed = Signal(object)
-    """The `Theme` from now on."""
+    """The new `Theme`."""
 
     def __init__(
         self, settings: Settings, start: Starter = start_engine, parent: QObject | None = None
@@ -157,58 +157,58 @@ class AppContext(QObject):
         super().__init__(parent)
         self.settings = settings
         self.first_bench: Path | None = None
-        """Named on the command line; remembered only when it can be used."""
+        """Configuration named on the command line; stored only after it could be used."""
         self.is_armed_read: Callable[[], bool] = lambda: True
-        """Whether somebody could read to the end what is armed; the page that shows it answers."""
+        """Whether the description of the armed test was displayed to its end; set by the Run page."""
         self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
-        """For what must come at once, whatever takes long beside it: previews."""
+        """Worker for short jobs that must not wait behind long ones: previews."""
         UNITS.choose(dict(zip(CHOICES, settings.text(Remembered.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
-        """Colours to draw in."""
+        """Current colours."""
 
     def choose_theme(self, theme: Theme) -> None:
-        """Draw in other colours from now on, and next time."""
+        """Change the colours and store the choice."""
         self.theme = theme
         self.settings.keep_text(Remembered.THEME, theme.name)
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
-        """Show quantities in these units from now on, and next time; by the SI unit of each."""
+        """Change the units of quantities, given by SI unit, and store the choice."""
         UNITS.choose(chosen)
         self.settings.keep_text(Remembered.UNITS, " ".join(UNITS.chosen.values()))
 
     @property
     def patience_s(self) -> float:
-        """How long a drive far from every limit may go on while the window does not answer [s]."""
+        """How long a run far from all limits may continue while the window does not answer [s]."""
         return self.settings.number(
             Remembered.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
         )
 
     @property
     def folder(self) -> Path:
-        """Where recordings go and are looked for."""
+        """Folder of recordings."""
         return Path(self.settings.text(Remembered.FOLDER, str(Path.home() / "vibench")))
 
     def choose_folder(self, folder: Path) -> None:
-        """Put recordings elsewhere from now on."""
+        """Change the folder of new recordings."""
         self.settings.keep_text(Remembered.FOLDER, str(folder))
         self.folder_chosen.emit(folder)
 
     @property
     def recent_files(self) -> tuple[Path, ...]:
-        """What was opened or saved last, the newest first."""
+        """Files opened or saved last, the newest first."""
         return tuple(Path(each) for each in self.settings.text(Remembered.RECENT).split("\n") if each)
 
     def note_file(self, path: Path) -> None:
-        """Remember a file that somebody opened or saved."""
+        """Add a file to the recent files."""
         known = [str(each) for each in self.recent_files if each != path]
         self.settings.keep_text(Remembered.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
 
     def say(self, notice: Notice) -> None:
-        """Put a message on the strip."""
+        """Show a message on the strip."""
         self.noticed.emit(notice)

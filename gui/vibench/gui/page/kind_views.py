@@ -1,4 +1,4 @@
-"""Which live pictures suit each kind of excitation."""
+"""Live pictures for each kind of excitation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ from vibench.acquisition.plan import Family, rows_by_kind
 
 
 class LivePicture(Enum):
-    """A picture of the Run page that grows while it is recorded."""
+    """A picture of the Run page that is updated during a run."""
 
     FREQUENCY_RESPONSE = auto()
     HISTORY = auto()
-    """Responses against the frequency really played."""
+    """Responses against the actual drive frequency."""
     ENVELOPE = auto()
     SPECTRUM = auto()
     PORTRAIT = auto()
@@ -20,7 +20,7 @@ class LivePicture(Enum):
 
 @dataclass(frozen=True)
 class KindView:
-    """What is in front when a run of a kind begins."""
+    """The two pictures shown when a run of a kind starts."""
 
     left: LivePicture
     right: LivePicture
@@ -37,4 +37,4 @@ KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
     },
     {},
 )
-"""By the word in a plan; a kind with pictures of its own has them in the second table."""
+"""By kind of excitation; the second table holds kinds that differ from their family."""

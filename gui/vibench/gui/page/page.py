@@ -1,4 +1,4 @@
-"""What a page of the window is: a widget that follows the engine and the theme, whole or in two parts."""
+"""Base class of the pages, the layout in two parts, and the undo history."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from .app_context import AppContext, Remembered
 
 
 class FileKind(Enum):
-    """What the window can open; each page says which of them it takes."""
+    """Kinds of files that the window can open; each page states which of them it opens."""
 
     FOLDER = auto()
     RECORDING = auto()
@@ -35,16 +35,16 @@ _TABLES = {
     "sweeps": FileKind.CAMPAIGN,
     "generator": FileKind.RIG,
 }
-"""Keys of a TOML file that tell what it is."""
+"""TOML keys by which a file's kind is recognised."""
 
 
 def file_kind(path: Path) -> FileKind:
-    """Look at a file, or a folder.
+    """Return the kind of a file or folder.
 
     Raises
     ------
     ConfigurationError
-        In one sentence, when it is nothing that the window opens.
+        If the window cannot open it.
     """
     if path.is_dir():
         return FileKind.FOLDER
@@ -52,12 +52,12 @@ def file_kind(path: Path) -> FileKind:
         try:
             open_recording(path).close()
         except RecordingError:
-            # Compare reads it, or says why it cannot.
+            # Accepted here; Compare reads the file or reports why it cannot.
             return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
         return FileKind.RECORDING
     allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
     if path.suffix != ".toml":
-        raise ConfigurationError(f"{path} is nothing that can be opened here; {allowed}")
+        raise ConfigurationError(f"{path} cannot be opened here; {allowed}")
     try:
         keys = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
@@ -70,10 +70,11 @@ def file_kind(path: Path) -> FileKind:
 
 @dataclass(frozen=True)
 class Shown:
-    """Numbers or a picture, and what they were computed from.
+    """A displayed result, and the inputs from which it was computed.
 
-    ``inputs`` are None while nothing is shown. While they are not ``wanted``, the widget is disabled: a stale
-    number must never look like a true one.
+    ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled, so
+    that
+    an outdated result is recognised.
     """
 
     widget: QWidget
@@ -82,20 +83,20 @@ class Shown:
 
     @property
     def is_true(self) -> bool:
-        """Whether it belongs to what is asked for now, or does not look as if it did."""
+        """Whether the result is current, absent, or marked as outdated."""
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
 
 @runtime_checkable
 class Themed(Protocol):
-    """A part of a page that draws with colours of the theme."""
+    """A part of a page that draws with the theme's colours."""
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Change the colours."""
 
 
 class Page(QWidget):
-    """One step of the job. It keeps no truth of its own: what is shown is asked for at every tick."""
+    """A page of the window. It stores no run state: every tick reads the bridge again."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__()
@@ -103,65 +104,65 @@ class Page(QWidget):
 
     @property
     def is_done(self) -> bool:
-        """Whether the rail ticks this page."""
+        """Whether the navigation bar ticks this page."""
         return False
 
     def refresh(self) -> None:
-        """Show what is true now; called some twenty times a second while the page is in sight."""
+        """Update the page; called about twenty times a second while it is visible."""
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """What this page does with files of which kind."""
+        """Functions that open files on this page, by kind."""
         return {}
 
     def undo(self) -> None:
-        """Take back the last edit of the plan; pages without one have none."""
+        """Undo the last edit of the plan; pages without a plan do nothing."""
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo the last undone edit."""
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """What the page shows that was computed, with what it was computed from."""
+        """Displayed results with their inputs."""
         return ()
 
     @property
     def styled(self) -> tuple[QWidget, ...]:
-        """Its parts, for a style sheet: one after the other, where the whole would hold the window up."""
+        """Parts to restyle one after another; restyling the whole page would block the event loop."""
         return (self,)
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours; widgets follow the palette by themselves, plots do not."""
+        """Change the colours of plots; other widgets follow the palette."""
         for part in self.findChildren(QWidget):
             if isinstance(part, Themed):
                 part.retheme(theme)
 
     def entered(self) -> None:
-        """Come into sight."""
+        """Prepare to be shown."""
 
     def left(self) -> None:
-        """Go out of sight, or end with the window: keep what was typed."""
+        """Store what was typed; called when another page is shown and when the window closes."""
 
 
 class SideAndPicture(QSplitter):
-    """A page in two parts, each of which scrolls by itself; keeps where the line between them was put.
+    """A page in two scrolling parts; the position of the divider is stored.
 
     Parameters
     ----------
     context
-        Of the page.
+        The page's services.
     page
-        Its name, which is the title of the left part.
+        Name of the page, used as the title of the left part.
     side
-        Scrolled below the title.
+        Left part, below the title.
     picture
-        The right part.
+        Right part.
     foot
-        What stays in sight below the left part: the buttons that act on it.
+        Buttons below the left part, which do not scroll.
     """
 
     WIDEST_SIDE = 0.55
-    """Part of the width that the left part may take by itself."""
+    """Largest default share of the width for the left part."""
 
     def __init__(
         self,
@@ -186,19 +187,19 @@ class SideAndPicture(QSplitter):
         self._was_moved = not kept.isEmpty() and self.restoreState(kept)
 
     def keep(self) -> None:
-        """Keep how the page is divided, for next time, where somebody has divided it."""
+        """Store the position of the divider if the user has moved it."""
         if self._was_moved:
             self._settings.keep_state(Remembered.SPLITTERS, self.saveState(), self._page)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the left part the width that it needs, unless somebody has chosen another."""
+        """Set the left part to its natural width, unless the user has moved the divider."""
         super().resizeEvent(event)
         self._divide()
 
     def event(self, event: QEvent) -> bool:
-        """Follow the font at once, also where it changed while the page was out of sight."""
+        """Follow a change of the font, also while the page is hidden."""
         if event.type() in (QEvent.Type.FontChange, QEvent.Type.Show):
-            # Afterwards: what is inside has not been told yet.
+            # Deferred, because the child widgets receive the change later.
             QTimer.singleShot(0, self, self._divide)
         return super().event(event)
 
@@ -216,25 +217,25 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """States of a plan in their order, and where in them it stands."""
+    """Undo history: the states of a plan and the current position."""
 
     def __init__(self) -> None:
         self._states: list[State] = []
         self._now = -1
 
     def note(self, state: State) -> None:
-        """Note a state that was made; what had been taken back before is forgotten."""
+        """Append a state and discard the undone ones."""
         if self._states and self._states[self._now] == state:
             return
         self._states = [*self._states[: self._now + 1], state][-MOST_KEPT:]
         self._now = len(self._states) - 1
 
     def undo(self) -> State | None:
-        """Go back; None where nothing was before."""
+        """Return the state before; None at the beginning."""
         return self._go(-1)
 
     def redo(self) -> State | None:
-        """Go on; None where nothing comes after."""
+        """Return the state after; None at the end."""
         return self._go(1)
 
     def _go(self, step: int) -> State | None:

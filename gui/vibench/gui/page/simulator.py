@@ -1,4 +1,4 @@
-"""Simulations for a page: asked of one process, shown as they grow, dropped when nobody wants them."""
+"""Simulations for a page: run in one process, shown while they grow, and cancelled by the page."""
 
 from collections.abc import Callable
 
@@ -12,9 +12,9 @@ from ..background.background import Background
 
 
 class Simulator(QObject):
-    """Computes the newest request of a page, in one process for as long as the page lives.
+    """Computes a page's newest request in one process, which lives as long as the page.
 
-    ``grown`` is called with pieces of the answer, ``ended`` after the last, ``died`` where it broke off.
+    ``grown`` receives pieces of the answer, ``ended`` follows the last one, and ``died`` reports a failure.
     """
 
     def __init__(
@@ -32,16 +32,16 @@ class Simulator(QObject):
 
     @property
     def is_busy(self) -> bool:
-        """Whether an answer is still to come."""
+        """Whether an answer is incomplete."""
         return self._job is not None and not self._job.is_over
 
     def begin(self, request: Asked) -> None:
-        """Ask; the answer to an earlier request is dropped."""
+        """Start a request; the answer to an earlier one is dropped."""
         self.cancel()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
 
     def cancel(self) -> None:
-        """Want no answer any more, from this moment on."""
+        """Cancel the request."""
         if self._job is not None:
             self._job.drop()
 
@@ -49,4 +49,4 @@ class Simulator(QObject):
         self._ended()
 
     def _die(self, error: BaseException) -> None:
-        self._died(f"The simulation broke off: {error}.")
+        self._died(f"The simulation failed: {error}.")

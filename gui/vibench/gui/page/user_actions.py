@@ -1,4 +1,4 @@
-"""What keys, menus and buttons ask for: each action once, wherever it comes from."""
+"""Commands of keys, menus and buttons; each is implemented once."""
 
 from pathlib import Path
 
@@ -18,14 +18,14 @@ LONGEST_NAME = 60
 
 
 class UserActions(QObject):
-    """Carries out what a person wants, or says why not."""
+    """Carries out the user's commands, or reports why a command is not possible."""
 
     def __init__(self, context: AppContext, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._context = context
 
     def check(self, *, new_reference: bool = False) -> None:
-        """Check the bench; as a new reference, where what has changed was meant."""
+        """Check the bench; with ``new_reference``, store the result as the reference of later checks."""
         if not self._may("check the bench", EngineState.READY):
             return
         folder = self._context.folder
@@ -33,7 +33,7 @@ class UserActions(QObject):
         self._context.bridge.order(EngineClient.check, folder, new_reference=new_reference)
 
     def arm_test(self) -> None:
-        """Arm the test of the Test page, under a name that is free."""
+        """Arm the test of the Test page, under an unused name."""
         measurement = self._context.selection.measurement
         if measurement is None:
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
@@ -55,10 +55,10 @@ class UserActions(QObject):
         existing: ExistingRecordings = ExistingRecordings.REFUSE,
         attendance: Supervision | None = None,
     ) -> None:
-        """Arm the campaign of the Queue page, in a folder of its name."""
+        """Arm the campaign of the Queue page, in a folder with its name."""
         campaign = self._context.selection.campaign
         if campaign is None:
-            self._warn("There is no campaign.", "Open or make one on the Queue page.")
+            self._warn("There is no campaign.", "Open or create one on the Queue page.")
             return
         if not self._may("arm", EngineState.READY, EngineState.ARMED):
             return
@@ -73,11 +73,11 @@ class UserActions(QObject):
         )
 
     def disarm(self) -> None:
-        """Take back what is armed."""
+        """Disarm."""
         self._context.bridge.order(EngineClient.disarm)
 
     def start(self) -> None:
-        """Start what is armed."""
+        """Start the armed plan."""
         if not self._may("start", EngineState.ARMED):
             return
         if self._context.is_armed_read():
@@ -90,23 +90,23 @@ class UserActions(QObject):
             self._context.page_wanted.emit(RUN)
 
     def stop(self) -> None:
-        """Ramp down as planned; asked again while ramping down: as fast as the shaker has."""
+        """Ramp down as planned; a second call during the ramp uses the fastest ramp of the shaker."""
         is_ramping = self._context.bridge.state is EngineState.RAMPING_DOWN
         self._context.bridge.stop(StopLevel.ABORT if is_ramping else StopLevel.RAMP, OPERATOR_STOP)
 
     def abort(self) -> None:
-        """Ramp down as fast as the shaker has."""
+        """Ramp down with the fastest ramp of the shaker."""
         self._context.bridge.stop(StopLevel.ABORT, ABORT_KEY)
 
     def hold_or_resume(self) -> None:
-        """Stay where the run is, drive included; or go on."""
+        """Hold the run with the drive on, or resume it."""
         if self._context.bridge.state is EngineState.HELD:
             self._context.bridge.order(EngineClient.resume)
         else:
             self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
 
     def _may(self, verb: str, *states: EngineState) -> bool:
-        """Return what stands in the way of an order, if anything does: the engine would refuse it in red."""
+        """Return whether an order is possible now; if not, warn before the engine refuses it as an error."""
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._warn(f"Cannot {verb} yet: {_BUSY}.", "Try again when the state above has changed.")
@@ -141,12 +141,12 @@ _NEXT = {
     EngineState.RUNNING: "Wait for its end, or stop it (STOP, Esc).",
     EngineState.HELD: "Go on (Run page), or stop it (STOP, Esc).",
     EngineState.RAMPING_DOWN: "Wait for READY.",
-    EngineState.FAULT: "Look at the cause in Details, and open the bench again on the Rig page (Ctrl+1).",
+    EngineState.FAULT: "See Details for the cause, then open the bench again on the Rig page (Ctrl+1).",
 }
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Return a test a number, so that nothing of that name lies in the folder: ``dwell_003``."""
+    """Return an unused file name for a test: ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
     while any(folder.glob(f"{stem}_{number:03}*")):

@@ -18,14 +18,14 @@ from ..widgets.units import CHOICES, UNITS, ShownUnit
 
 
 class Scale(Enum):
-    """How values are laid out along an axis."""
+    """Scale of an axis."""
 
     LINEAR = auto()
     LOGARITHMIC = auto()
 
 
 class Blankness(Enum):
-    """Whether numbers are written along an axis."""
+    """Whether an axis has numbers."""
 
     WRITTEN = auto()
     BLANK = auto()
@@ -33,20 +33,20 @@ class Blankness(Enum):
 
 @dataclass(frozen=True)
 class PlotAxis:
-    """What an axis shows."""
+    """Quantity, unit and scale of an axis."""
 
     label: str
     unit: str = ""
-    """Of what is plotted, in SI, where people choose what it is shown in; else as written on the label."""
+    """SI unit of the values if the user can choose the displayed unit; otherwise the text of the label."""
     factor: float = 1.0
-    """Shown value per plotted value, where there is no choice: 1e3 shows seconds as milliseconds."""
+    """Displayed value per plotted value for a fixed unit: 1e3 shows seconds as milliseconds."""
     scale: Scale = Scale.LINEAR
     short: str = ""
-    """What stands there, with the unit, where the label has no room."""
+    """Short label for little space, followed by the unit."""
 
     @property
     def shown(self) -> ShownUnit:
-        """The unit that is written, and how many of it one of the plotted values is."""
+        """The displayed unit, and its factor to the plotted values."""
         return UNITS.on_axis(self.unit) if self.unit in CHOICES else ShownUnit(self.unit, self.factor)
 
     @property
@@ -56,7 +56,7 @@ class PlotAxis:
 
     @property
     def short_text(self) -> str:
-        """Text for little room: a short label, or the unit alone."""
+        """Short label with unit, or the unit alone."""
         return self._with_unit(self.short) if self.short else self.shown.name
 
     def _with_unit(self, label: str) -> str:
@@ -68,76 +68,76 @@ FREQUENCY = PlotAxis("Frequency", "Hz")
 LOG_FREQUENCY = PlotAxis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
 TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
-"""From one label to that above it, in heights of the font."""
+"""Distance between labels on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Distance reported for ticks without a number."""
+"""Spacing reported to pyqtgraph for ticks without a number."""
 _WIDE = "2000"
-"""A label and the room beside it, on a logarithmic axis across."""
+"""Widest label on a logarithmic horizontal axis, with its margin."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
-    """An axis of a plot; in logarithmic mode positions are powers of ten."""
+    """An axis of a plot; in logarithmic mode, positions are powers of ten."""
 
     def __init__(self, orientation: str, axis: PlotAxis) -> None:
         super().__init__(orientation)
         self._blankness = Blankness.WRITTEN
         self.levels: tuple[list[float], ...] = ()
-        """Places of the ticks that were painted last, major ones first."""
+        """Positions of the ticks painted last, major ones first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._axis = axis
         UNITS.on_change(self._show_other_unit)
-        # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
+        # Cache the painted axis, because its text is the most expensive part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     @property
     def axis(self) -> PlotAxis:
-        """What it shows."""
+        """Quantity, unit and scale."""
         return self._axis
 
     def show_unit(self, axis: PlotAxis) -> None:
-        """Change what the axis shows."""
+        """Replace quantity, unit and scale."""
         self._axis = axis
         self._show_other_unit()
 
     def _show_other_unit(self) -> None:
-        # pyqtgraph takes the label of a closed plot away.
+        # pyqtgraph removes the label of a closed plot.
         if self.label is not None:
             self._fit_label()
             self.update()
 
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
-        """Write as much of the label as there is room for."""
-        # pyqtgraph calls this before the item is whole.
+        """Adapt the label to the available length."""
+        # pyqtgraph calls this before the item is initialised.
         if getattr(self, "_axis", None) is not None and self.label is not None:
             self._fit_label()
         super().resizeEvent(event)
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Draw at once: pyqtgraph's way, by a QPicture, looks for the font again with every label."""
+        """Paint directly; pyqtgraph paints through a QPicture, which looks up the font for every label."""
         self.levels = ()
         specs = self.generateDrawSpecs(painter)
         if specs is not None:
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Leave numbers and label to the axis of the plot below."""
+        """Hide numbers and label; the plot below shows them."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
     def blank(self, blankness: Blankness) -> None:
-        """Write no numbers while there is nothing that they could be about."""
+        """Hide or show the numbers, which have no meaning on an empty plot."""
         if blankness is not self._blankness:
             self._blankness = blankness
             self.update()
 
     def labelString(self) -> str:
-        """Show units of files as they are written: pyqtgraph takes the label as HTML."""
+        """Return the label with HTML escaped, because units come from files."""
         style = "; ".join(f"{name}: {value}" for name, value in self.labelStyle.items())
         return f"<span style='{style}'>{escape(printable(self.labelText))}</span>"
 
     def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own
-        """Show the label or not; to write another text, which shows it, does not count."""
+        """Show or hide the label; changing its text, which makes pyqtgraph show it, is ignored."""
         if not getattr(self, "_is_fitting", False):
             self._is_labelled = show
         super().showLabel(show and self._is_labelled)
@@ -157,7 +157,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return self.orientation in ("left", "right")
 
     def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
-        """Choose the places of ticks: major ones carry a label, minor ones do not."""
+        """Return the positions of ticks: major ones have a label, minor ones do not."""
         found = self._ticks(low, high, size)
         self.levels = tuple([each for each in places if low <= each <= high] for _, places in found)
         return found
@@ -165,7 +165,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self._axis.shown.per_si
-            # One labelled level alone: each line of a grid costs time in every frame.
+            # Draw one labelled level only, because each grid line costs time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             if self._is_upright:
@@ -178,7 +178,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return [(step, [value - shift for value in values]) for step, values in ticks]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
-        """Write the labels of ticks."""
+        """Return the labels of ticks."""
         if self._blankness is Blankness.BLANK or (self.logMode and spacing == _MINOR):
             return [""] * len(values)
         if not self.logMode:
@@ -188,16 +188,15 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return [number_text(10**value * factor) for value in values]
 
     def _most_labels(self, size: float) -> int:
-        """How many labels find room above or beside one another."""
         metrics = QFontMetricsF(self.font())
         each = _LINE_DISTANCE * metrics.height() if self._is_upright else metrics.horizontalAdvance(_WIDE)
         return max(2, int(size / each))
 
 
 def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Leave out ticks between multiples of a larger step, until no more than ``most`` are left.
+    """Remove ticks between multiples of a larger step, until at most ``most`` are left.
 
-    One number alone says no scale: the outermost two of the step before are kept then.
+    A single number defines no scale; in that case the outermost two of the previous step are kept.
     """
     wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):
@@ -211,7 +210,7 @@ def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, lis
 
 
 def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]]:
-    """Places of ticks between two powers of ten: 1-2-5 over decades, evenly spaced numbers within one."""
+    """Return ticks between two powers of ten: 1-2-5 over decades, evenly spaced numbers within one."""
     if high - low < 1.0:
         return [(0.1, _even(10**low, 10**high))]
     decades = range(floor(low), ceil(high) + 1)
@@ -228,17 +227,17 @@ def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]
 
 
 def _even(low: float, high: float) -> list[float]:
-    """Powers of round numbers at equal distances."""
+    """Return logarithms of evenly spaced round numbers."""
     rough = (high - low) / 6
     decade = 10 ** floor(log10(rough))
     step = next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough)
-    edge = 1e-9  # An end that is a round number except for rounding gets its tick.
+    edge = 1e-9  # Limits that are round numbers up to rounding errors get a tick.
     first, last = ceil(low / step - edge), floor(high / step + edge)
     return [log10(n * step) for n in range(first, last + 1) if n > 0]
 
 
 def number_text(value: float) -> str:
-    """Write a number for a tick: 10, 100, 1k, 20k; powers of ten where zeros would be counted."""
+    """Return the text of a tick: 10, 100, 1k, 20k; powers of ten where a number has many zeros."""
     smallest, thousand, million = 1e-3, 1e3, 1e6
     if value == 0 or smallest <= abs(value) < thousand:
         return f"{value:.6g}"
@@ -252,18 +251,17 @@ def number_text(value: float) -> str:
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _ABOVE = 100
-"""Over the curves: an area that they fill is read by it."""
+"""Drawing order above the curves, so that filled areas do not hide the grid."""
 _OPACITY = 0.25
-"""Opacity of the lines that are labelled; each level after them has a part of it."""
+"""Opacity of the labelled lines; each further level is fainter."""
 _APART = 20.0
-"""Pixels from line to line; lines that are closer are fainter."""
+"""Spacing of full-opacity lines [pixels]; denser lines are fainter."""
 
 
 class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
-    """Lines over the whole picture.
+    """Grid lines over the whole plot.
 
-    pyqtgraph lets the axes draw them. These keep a copy of what they paint, which would be as large
-    as the picture, twice, and be overlaid on it in every frame.
+    Grid lines of pyqtgraph's axes are cached as images of the size of the plot and blended in every frame.
     """
 
     def __init__(self, across: AxisItem, up: AxisItem) -> None:
@@ -273,12 +271,12 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         self.setZValue(_ABOVE)
 
     def dress(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Change the colours."""
         self._colour = QColor(theme.line)
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Draw the lines of the ticks that the axes have painted just before."""
+        """Draw lines at the ticks that the axes have just painted."""
         to_pixels = painter.transform()
         seen = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()

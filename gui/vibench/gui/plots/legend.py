@@ -1,4 +1,4 @@
-"""What the lines of a plot are: a line of text above the axes, where it covers no data."""
+"""Legend of a plot: a line of text above the axes, where it covers no data."""
 
 from dataclasses import dataclass
 from html import escape
@@ -10,21 +10,21 @@ from PySide6.QtWidgets import QLabel, QWidget
 from vibench.acquisition import printable
 
 _ROOM = 4
-"""Pixels above and below the text."""
+"""Margin above and below the text [pixels]."""
 
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """One curve: how it is drawn, in which colour, and its name."""
+    """A curve's name, with the colour and sign of its line."""
 
     sign: str
-    """A piece of the line in letters: ``━━``, ``╍╍``, ``●``."""
+    """The line style as text: ``━━``, ``╍╍``, ``●``."""
     colour: str
     name: str
 
 
 class LegendLine(QLabel):
-    """Entries side by side, in as many lines as the width asks for; an entry is never broken."""
+    """Entries side by side in as many lines as the width requires; entries are never broken."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -38,13 +38,13 @@ class LegendLine(QLabel):
         self.follow_font()
 
     def follow_font(self) -> None:
-        """Write a little smaller than the rest."""
+        """Use a slightly smaller font than the window."""
         font = QFont(self._of.font())
         font.setPointSizeF(0.85 * font.pointSizeF())
         self.setFont(font)
 
     def show_entries(self, entries: tuple[LegendEntry, ...]) -> None:
-        """Name these curves."""
+        """Show the names of these curves."""
         said = "&nbsp;&nbsp;&nbsp; ".join(
             f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
             f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
@@ -55,5 +55,5 @@ class LegendLine(QLabel):
             self.setAccessibleName("Legend: " + ", ".join(printable(each.name) for each in entries))
 
     def height_for(self, width: int) -> int:
-        """Height that the entries need; none without entries."""
+        """Return the height of the entries; zero without entries."""
         return self.heightForWidth(width) + 2 * _ROOM if self.text() else 0

@@ -1,4 +1,4 @@
-"""What lines, dots and areas of a plot are drawn with: told again at every change of theme."""
+"""Styles of lines, dots and areas, converted to pens and colours at every change of theme."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from ..widgets.theme import Colour, Theme
 
 
 class Dash(Enum):
-    """How a line is drawn."""
+    """Dash pattern of a line."""
 
     SOLID = Qt.PenStyle.SolidLine
     DASHED = Qt.PenStyle.DashLine
@@ -28,16 +28,16 @@ class Dash(Enum):
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Which colour of a theme, and which dash: told again at every change of theme."""
+    """Theme colour and dash pattern of a line, independent of the theme."""
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
     filled: float = 0.0
-    """Opacity of an area, 0 to 1."""
+    """Opacity of a filled area, 0 to 1."""
 
 
 def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
-    """Style of the curve with this number."""
+    """Return the style of the curve with this number."""
     return LineStyle(lambda theme: theme.traces[number % len(theme.traces)], dash)
 
 
@@ -53,11 +53,11 @@ SIGNS = {
     Dash.LONG: "━━ ━━",
 }
 _LONG = [9.0, 4.0]
-"""Dashes and gaps of `Dash.LONG`, in widths of the line."""
+"""Lengths of dashes and gaps of `Dash.LONG`, in line widths."""
 
 
 def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
-    """Return a pen of a colour and a width, with these dashes."""
+    """Return a pen with colour, width and dash pattern."""
     pen: QPen = pg.mkPen(colour, width=width, style=dash.value)
     if dash is Dash.LONG:
         pen.setDashPattern(_LONG)
@@ -65,14 +65,14 @@ def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a straight line, as wide as a pixel of the layout: this many of the screen."""
+    """Return the pen of a straight line; ``ratio`` is its width, in screen pixels per logical pixel."""
     return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
 def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a curve, one pixel of the screen wide; `LogicalLine` draws it wider.
+    """Return the pen of a curve, one screen pixel wide; `LogicalLine` draws it wider.
 
-    Its dashes are as long on a fine screen as on a coarse one.
+    Dashes have the same length on screens of every resolution.
     """
     pen = dashed_pen(line_style.colour(theme), 1, line_style.dash)
     if line_style.dash is not Dash.SOLID and ratio > 1.0:
@@ -88,13 +88,13 @@ def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
 
 
 class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
-    """Paints a line of one pixel of the screen once more beside and below itself, where pixels are small.
+    """On a fine screen, paints a line of one screen pixel again beside and below itself.
 
-    A pen of two pixels looks the same and takes three times as long: Qt draws such lines as areas.
+    A pen of two pixels looks the same and takes three times as long, because Qt draws such lines as areas.
     """
 
     def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None) -> None:
-        """Draw as many times as a pixel of the layout has pixels of the screen."""
+        """Draw once per screen pixel within a logical pixel."""
         super().paint(painter, option, widget)
         ratio = painter.device().devicePixelRatioF()
         place = painter.transform()
@@ -106,7 +106,7 @@ class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
 
 
 class LogicalLine(pg.PlotDataItem):  # type: ignore[misc] # untyped library
-    """pyqtgraph's own curve with another painter of its line."""
+    """pyqtgraph's curve with a faster line painter."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -119,16 +119,16 @@ _INSIDE = "enclosed"
 
 
 class Band:
-    """An area between a lower and an upper line: one outline, up and down, filled."""
+    """A filled area between a lower and an upper line."""
 
     def __init__(self, of: str) -> None:
         self.of = of
-        """Name of the curve whose bounds it shows."""
+        """Name of the curve with these bounds."""
         self._edges = np.empty((3, 0))
         self.item = pg.PlotDataItem(pen=None, fillLevel=_INSIDE)
 
     def set_data(self, across: ArrayLike, low: ArrayLike, high: ArrayLike) -> None:
-        """Draw the area; where an edge is not finite there is none."""
+        """Set the bounds; non-finite bounds leave a gap."""
         x, below, above = (np.asarray(values, dtype=np.float64) for values in (across, low, high))
         self._edges = np.stack((x, below, above))
         drawn = np.isfinite(below) & np.isfinite(above)
@@ -136,7 +136,7 @@ class Band:
         self.item.setData(np.concatenate((x[there], x[back])), np.concatenate((below[there], above[back])))
 
     def at(self, across: float) -> tuple[float, float] | None:
-        """Return the bounds at the place that is nearest; None where there are none."""
+        """Return the bounds at the nearest point; None without finite bounds."""
         x, below, above = self._edges
         if x.size == 0:
             return None
@@ -144,5 +144,5 @@ class Band:
         return (float(below[place]), float(above[place])) if np.isfinite(below[place]) else None
 
     def paint(self, shade: object) -> None:
-        """Fill it with a colour."""
+        """Set the colour of the area."""
         self.item.setFillBrush(shade)

@@ -1,4 +1,4 @@
-"""A plot as all pages draw it: labelled axes that follow the data without trembling, and a legend."""
+"""Base class of all plots: labelled axes that follow the data in steps, and a legend."""
 
 from collections.abc import Callable
 from math import isfinite, log10
@@ -21,29 +21,29 @@ from .reading import Reading
 from .upright_marks import Rules, Stripes
 
 ROOM = 0.15
-"""Empty share of the range at either end after a change."""
+"""Empty share at both ends after a change of the range."""
 LEAST_USED = 0.5
-"""Share of the range that the data must fill, or it is drawn larger."""
+"""Smallest share of the range that the data may fill before the range is reduced."""
 
 Range = tuple[float, float]
 
 
 def steady_range(shown: Range, data: Range) -> Range | None:
-    """Return the range to change to, or None while the data is inside and fills enough of what is shown."""
+    """Return a new range; None while the data lies inside and fills enough of the current range."""
     low, high = data
     size = high - low
     is_inside = shown[0] <= low and high <= shown[1]
     if is_inside and size >= LEAST_USED * (shown[1] - shown[0]):
         return None
     if size <= 0.0:
-        # A dead signal: some room around it, whatever its unit.
+        # A constant signal needs some range around it in any unit.
         half = 0.5 * abs(low) or 1e-3
         wanted = (low - half, high + half)
         return None if is_inside and shown[1] - shown[0] <= 8 * half else wanted
     return low - ROOM * size, high + ROOM * size
 
 
-# Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
+# Antialiasing halves the frame rate; OpenGL draws grey areas on machines without hardware support.
 pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
@@ -52,35 +52,34 @@ _VEIL = 0.5
 OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6
-"""Room for half of the last number across."""
+"""Right margin for half of the last number."""
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
-    """One pair of axes. Values are given as they are; logarithms are taken here.
+    """One pair of axes. Curves receive plain values; the plot takes logarithms.
 
-    Keys while it has the focus, and the context menu, are in `add_actions`. While it is disabled a veil says
-    that it belongs to earlier inputs.
+    `add_actions` defines keys and context menu. A disabled plot is veiled and marked as outdated.
     """
 
     up_em = 5.0
-    """Room for the upright axis: the same in all plots, so that those above one another are aligned."""
+    """Width of the vertical axis, equal in all plots, so that stacked plots are aligned."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
     ) -> None:
         self.across = AxisItem("bottom", across)
         self.up = AxisItem("left", up)
-        # Menus that nobody can open would take half of the time of making a plot.
+        # Creating pyqtgraph's own menus would take half of the plot's creation time.
         super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for unseen in ("top", "right"):
-            # They would write a label again, that nobody sees, at every change of the range.
+            # pyqtgraph's auto-range buttons would rewrite an invisible label at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
-            # Before the grid, which is drawn at their ticks.
+            # Add the axes before the grid, which uses their ticks.
             axis.setZValue(_FIRST)
-        # A number that does not fit below the upper end of its axis would be cut in two.
+        # Hide the last number of an axis where it would be cut off.
         self.up.setStyle(hideOverlappingLabels=True)
         self.follow_font()
         self.getPlotItem().hideButtons()
@@ -88,15 +87,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self.scales = [across.scale, up.scale]
-        """How values are laid out now, across and up."""
+        """Scales of the horizontal and the vertical axis."""
         self._inked: list[tuple[LineStyle, Callable[[Theme], None]]] = []
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
-        """Every line and set of points, with its name in the legend, if it has one."""
+        """All lines and sets of points, with their names in the legend; the name may be empty."""
         self.bands: list[Band] = []
         self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
-        """What else is to be read at a place of the picture."""
+        """Returns additional text for the reading at a point."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self.theme = theme
@@ -110,32 +109,32 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.retheme(theme)
 
     def follow_font(self) -> None:
-        """Give axes and margins the room that the font needs."""
+        """Fit axes and margins to the font."""
         em = self.fontMetrics().height()
         self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
-        # A width that followed the numbers would be known after painting, and everything painted again.
+        # A width that depends on the numbers is known only after painting, which would have to be repeated.
         self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
-        """Show names of the curves that have one, above the axes."""
+        """Show the named curves above the axes."""
         self._legend = LegendLine(self)
         self._relegend()
         return self
 
     def with_hint(self, text: str) -> "Plot":
-        """Say this while no curve has a point."""
+        """Show this text while no curve has a point."""
         self._hint = text
         self._look_for_points()
         return self
 
     def always_numbered(self) -> "Plot":
-        """Keep the numbers across where there is no curve: another plot, above, has the same axis."""
+        """Show numbers on the horizontal axis of an empty plot, because a plot above shares the axis."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
         return self
 
     def curve(self, line_style: LineStyle, name: str = "") -> pg.PlotDataItem:
-        """Add a line; ``setData(x, y)`` draws it."""
+        """Add a line; ``setData(x, y)`` sets its points."""
         item = LogicalLine()
         item.setSkipFiniteCheck(False)
         self._add(item, name)
@@ -158,7 +157,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return item
 
     def band(self, line_style: LineStyle, of: str = "") -> Band:
-        """Add an area between the bounds of the curve of a name; the axes follow the curve alone."""
+        """Add an area between the bounds of a named curve; it does not affect the range of the axes."""
         band = Band(of)
         self.bands.append(band)
         self.addItem(band.item, ignoreBounds=True)
@@ -166,14 +165,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return band
 
     def stripes(self, line_style: LineStyle) -> Stripes:
-        """Add upright stripes: where something happens, or is predicted to."""
+        """Add vertical stripes for frequency or time ranges."""
         item = Stripes(self._across)
         self.addItem(item, ignoreBounds=True)
         self._line_style(line_style, lambda theme: item.dress(shade_of(line_style, theme)))
         return item
 
     def rules(self, line_style: LineStyle) -> Rules:
-        """Add upright lines without labels."""
+        """Add vertical lines without labels."""
         item = Rules(self._across)
         self.addItem(item, ignoreBounds=True)
         self._line_style(
@@ -184,22 +183,22 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def upright(
         self, line_style: LineStyle, value: float, label: str = "", label_at: float = 0.92
     ) -> pg.InfiniteLine:
-        """Add an upright line at a value; its label stands at a share of the height."""
+        """Add a vertical line at a value; ``label_at`` is the height of its label."""
         return self._line(line_style, self._across(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
-        """Add a level line at a value; a logarithmic scale has no place for one of zero or below."""
+        """Add a horizontal line; a logarithmic axis does not show values of zero or below."""
         item = self._line(line_style, value, 0, label, 0.92)
         self.move_level(item, value)
         return item
 
     def move_level(self, item: pg.InfiniteLine, value: float) -> None:
-        """Put a level line at another value; NaN hides it."""
+        """Move a horizontal line; NaN hides it."""
         self._levels[item] = value
         self._place_levels()
 
     def wipe(self) -> None:
-        """Take every curve, band and line away, for others."""
+        """Remove all curves, bands and lines."""
         self.getPlotItem().clear()
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
@@ -212,7 +211,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._relegend()
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Change the colours."""
         self.theme = theme
         self.setBackground(theme.base)
         self._grid.dress(theme)
@@ -226,9 +225,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     @property
     def columns(self) -> int:
-        """How many columns of extremes fill the picture.
+        """Number of columns for the extremes of a signal.
 
-        A few more than it has pixels of the layout: with fewer, a pixel between two columns would stay empty.
+        Slightly more than the width in logical pixels, because a pixel between two columns would stay empty.
         """
         return int(1.02 * self.getViewBox().width()) + 2
 
@@ -237,7 +236,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().enableAutoRange()
 
     def turn_scale(self) -> None:
-        """Lay values out upright linearly, or logarithmically."""
+        """Toggle the vertical axis between linear and logarithmic."""
         is_linear = self.scales[1] is Scale.LINEAR
         self.scales[1] = Scale.LOGARITHMIC if is_linear else Scale.LINEAR
         self.getPlotItem().setLogMode(y=is_linear)
@@ -248,7 +247,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def keep_in_view(
         self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
     ) -> None:
-        """Let the axes follow these extremes, but only when they must: a quiet axis costs nothing to draw."""
+        """Change the ranges only when these extremes require it, because redrawing an axis is expensive."""
         if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
             return
         self._follows = True
@@ -259,22 +258,22 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.setYRange(*wanted, padding=0)
 
     def event(self, event: QEvent) -> bool:
-        """Come to a screen with other pixels: straight lines are given its width."""
+        """Redraw straight lines after a move to a screen of another resolution."""
         if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "theme", None) is not None:
             self.retheme(self.theme)
         return bool(super().event(event))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the legend the lines it needs for the new width."""
+        """Fit the legend to the new width."""
         super().resizeEvent(event)
-        # pyqtgraph calls this before the widget is whole, and when it is no more.
+        # pyqtgraph calls this before the widget is initialised and after it is closed.
         if getattr(self, "_legend", None) is not None and self.plotItem is not None:
             self._place_legend()
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
-        """Say the hint where there is nothing else to see."""
+        """Draw the hint on an empty plot, or the veil on a disabled one."""
         super().drawForeground(painter, rect)
-        # A curve that is cleared says nothing.
+        # Clearing a curve emits no signal, so check again.
         self._look_for_points()
         if self._is_empty or not self.isEnabled():
             painter.resetTransform()
@@ -288,7 +287,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             paint_hint(painter, inside, OUT_OF_DATE, self.theme.text)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Lay a veil over what belongs to other inputs, or take it away; follow the font."""
+        """Repaint after enabling or disabling; follow a change of the font."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.EnabledChange:
             self.viewport().update()
@@ -299,18 +298,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
                 self._place_legend()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave keys to the page: what it does with one it does while a plot has the focus too."""
+        """Leave all keys to the page."""
         event.ignore()
 
     def leaveEvent(self, event: QEvent) -> None:
-        """Read no more."""
+        """Hide the reading."""
         super().leaveEvent(event)
-        # The place at which the context menu was opened stays, for what is chosen there.
+        # The context menu still needs the place at which it was opened.
         if QApplication.activePopupWidget() is None:
             self.reading.hide()
 
     def _let_be(self, *_: object) -> None:
-        """Follow the data no more: somebody looks at a part of the picture."""
+        """Stop following the data after the user has zoomed or moved the view."""
         self._follows = False
 
     def _place_levels(self) -> None:
@@ -327,7 +326,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
     ) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
-        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph takes it as a format
+        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph uses the text as a format
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 
@@ -357,27 +356,25 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     @property
     def _holds_something(self) -> bool:
-        """Whether there is a curve, or a picture made of pixels."""
         items = self.getPlotItem().items
         return self._holds_points or any(getattr(each, "image", None) is not None for each in items)
 
     def _look_for_points(self, *_: object) -> None:
-        """Write the hint, and no numbers, where there is nothing that they could be about.
+        """Show the hint and hide the numbers while the plot is empty.
 
-        Best known before anything is painted: what is found out in painting has to be painted again.
+        Called before painting, because a change during painting causes a second one.
         """
         self._is_empty = bool(self._hint) and not self._holds_points
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _tell_anew(self) -> None:
-        """Tell names and readings in other units, unless the plot is closed."""
+        """Rewrite names and readings in other units, unless the plot is closed."""
         if self.plotItem is not None:
             self._relegend()
             self.reading.again()
 
     def _relegend(self) -> None:
-        """Write the legend again: its colours follow the theme."""
         if self._legend is None:
             return
         self._legend.show_entries(
@@ -389,7 +386,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._place_legend()
 
     def _place_legend(self) -> None:
-        """Put the legend into the row above the axes, which pyqtgraph keeps for a title."""
+        """Move the legend into the row that pyqtgraph reserves for a title."""
         if self._legend is None:
             return
         left = self.fontMetrics().height()

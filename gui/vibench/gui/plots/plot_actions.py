@@ -1,4 +1,4 @@
-"""What can be done with a plot: by a key while it has the focus, and by its context menu; how it is saved."""
+"""Actions of a plot by key and context menu, and saving as image or numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
 def add_actions(plot: "Plot") -> None:
-    """Offer everything; the page keeps its own keys, which a plot hands on."""
+    """Add all actions; the plot passes other keys to its page."""
     clipboard = QGuiApplication.clipboard()
     for text, key, act in (
         ("Show everything", "A", plot.show_everything),
@@ -40,7 +40,7 @@ def add_actions(plot: "Plot") -> None:
 
 
 def save_plot(plot: "Plot") -> None:
-    """Ask where to, and write picture or numbers there."""
+    """Ask for a path and save the image or the numbers."""
     wish = Path(f"{plot.accessibleName().lower().replace(' ', '_')}.png")
     path = new_path(plot, "Save picture or numbers", wish, FILTERS)
     if path is None:
@@ -53,13 +53,13 @@ def save_plot(plot: "Plot") -> None:
 
 
 def write_plot(plot: "Plot", path: Path) -> None:
-    """Write picture or numbers, as the ending says; nothing is overwritten.
+    """Write the image or the numbers in the format of the suffix.
 
-    Raises OSError when something of that name is there, or the file cannot be written.
+    Raises OSError when the file exists or cannot be written.
     """
     if path.exists():
         raise FileExistsError(0, "it exists already")
-    memory = QBuffer()  # Qt does not report every error of a disk
+    memory = QBuffer()  # Qt does not report every disk error
     match path.suffix.lower():
         case ".csv":
             memory.setData(numbers_of(plot, ",").encode())
@@ -68,7 +68,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
             generator.setOutputDevice(memory)
             generator.setSize(plot.size())
             generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
-            # With the usual resolution axes and curves would be shifted against each other.
+            # Other resolutions would shift the axes against the curves.
             generator.setResolution(plot.logicalDpiX())
             painter = QPainter(generator)
             plot.render(painter)
@@ -81,7 +81,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
 
 
 def numbers_of(plot: "Plot", separator: str) -> str:
-    """Return what is drawn as rows of curve, place across and value, in the units of the axes."""
+    """Return the curves as rows of name, x and y, in the displayed units."""
     across, up = plot.across.axis, plot.up.axis
     rows = [separator.join(("Curve", across.text, up.text))]
     for number, (name, item) in enumerate(plot.named_curves):

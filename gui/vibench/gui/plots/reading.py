@@ -1,4 +1,4 @@
-"""Reading a plot: what stands under the pointer, and how far it is from a place that was marked."""
+"""Cursor reading of a plot: values at the pointer, and differences from a mark."""
 
 from math import isfinite, log10
 from typing import TYPE_CHECKING
@@ -20,36 +20,35 @@ if TYPE_CHECKING:
 
 
 class Reading:
-    """Two crossed lines at the pointer, and a line of text with the place and the curve that is nearest.
+    """Crosshair at the pointer, with the place and the nearest curve in words.
 
-    A place that was marked stays; differences are shown from there, and as a ratio in dB where the upright
-    axis is logarithmic.
+    With a mark set, differences from it are shown too, as a ratio in dB on a logarithmic vertical axis.
     """
 
     def __init__(self, plot: "Plot") -> None:
         self._plot = plot
         self._lines: tuple[pg.InfiniteLine, ...] = ()
-        """At the pointer, then at the mark; made when they are first needed."""
+        """Crosshair lines, then lines of the mark; created at first use."""
         self._label: QLabel | None = None
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None
         self.place: tuple[float, float] | None = None
-        """Where the lines cross, in values; None while nothing is read."""
+        """Values at the crosshair; None while it is hidden."""
 
     @property
     def text(self) -> str:
-        """The reading in words; empty while nothing is read."""
+        """The reading in words; empty while the crosshair is hidden."""
         return self._label.text() if self._label is not None and self.place is not None else ""
 
     def dress(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Change the colours."""
         for line in self._lines[:2]:
             line.setPen(pg.mkPen(theme.muted))
         for line in self._lines[2:]:
             line.setPen(pg.mkPen(theme.accent, style=Qt.PenStyle.DashLine))
 
     def follow(self, place: QPointF) -> None:
-        """Read under the pointer, given in the scene; not beside the axes, nor while something is dragged."""
+        """Read at a pointer position in the scene; hide the crosshair outside the axes and while dragging."""
         box = self._plot.getViewBox()
         is_pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
         if box.sceneBoundingRect().contains(place) and not is_pressed:
@@ -58,7 +57,7 @@ class Reading:
             self.hide()
 
     def show_at(self, point: QPointF) -> None:
-        """Read at a point of the picture, in the coordinates that are drawn."""
+        """Read at a point in view coordinates."""
         self._at = point
         drawn, scales = (point.x(), point.y()), self._plot.scales
         for line, at in zip(self._made()[:2], drawn, strict=True):
@@ -85,31 +84,31 @@ class Reading:
         self._tell("   ".join(said))
 
     def again(self) -> None:
-        """Read again: the curves are others."""
+        """Read again after a change of the curves."""
         if self.place is not None:
             self.show_at(self._at)
 
     def on_or_off(self) -> None:
-        """Read in the middle of the picture, where no pointer is; or no more."""
+        """Show the crosshair at the centre of the plot, or hide it."""
         if self.place is not None:
             self.hide()
         else:
             self.show_at(self._plot.getViewBox().viewRect().center())
 
     def mark_or_unmark(self) -> None:
-        """Tell differences from this place on; asked again at the same place, no more."""
+        """Mark the current place; a second call at the same place removes the mark."""
         if self.place is None:
             self.on_or_off()
         self._marked = None if self._marked == self.place else self.place
         self._place_marks()
 
     def rescale(self) -> None:
-        """Let the mark stay at its values when a scale turns."""
+        """Move the mark to the same values after a change of scale."""
         self.hide()
         self._place_marks()
 
     def hide(self) -> None:
-        """Read no more; what was marked stays."""
+        """Hide the crosshair; the mark stays."""
         if self._label is not None:
             self.place = None
             self._label.hide()
@@ -117,7 +116,7 @@ class Reading:
                 line.hide()
 
     def forget(self) -> None:
-        """Let go of lines that the plot has thrown away."""
+        """Drop lines that the plot has deleted."""
         self.hide()
         self._lines, self._marked = (), None
 
@@ -154,7 +153,7 @@ class Reading:
         self._label.show()
 
     def _nearest(self, point: QPointF) -> tuple[str, float] | None:
-        """Find the curve that is nearest, upright, at this place across."""
+        """Return name and height of the vertically nearest curve."""
         found: list[tuple[float, str, float]] = []
         for name, item in self._plot.named_curves:
             drawn_x, drawn_y = item.getData()

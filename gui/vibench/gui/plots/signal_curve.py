@@ -1,4 +1,4 @@
-"""A long signal in a plot: the smallest and largest sample of every column of pixels, at any zoom."""
+"""A long signal in a plot, drawn as the smallest and largest sample of every pixel column."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ MOST_COLUMNS = 3000
 
 
 class SignalCurve:
-    """Draws what of a signal is in sight, from its samples: an impact of three samples is never lost."""
+    """Draws the visible part of a signal; an impact of three samples stays visible at any zoom."""
 
     def __init__(self, plot: Plot, line_style: LineStyle, name: str = "") -> None:
         self._plot = plot
@@ -26,7 +26,7 @@ class SignalCurve:
         plot.getViewBox().sigXRangeChanged.connect(self._redraw)
 
     def set_samples(self, samples: NDArray[np.floating], sample_rate_hz: float, start_s: float = 0.0) -> None:
-        """Show another signal, shape (samples,)."""
+        """Set the signal, shape (samples,)."""
         self._samples = np.asarray(samples)
         self._rate_hz, self._start_s = sample_rate_hz, start_s
         self._drawn = None
@@ -38,7 +38,7 @@ class SignalCurve:
         last = int(np.ceil((high_s - self._start_s) * self._rate_hz)) + 2
         count = len(self._samples)
         if self._plot.getViewBox().autoRangeEnabled()[0]:
-            # What is in sight is being chosen from what is drawn: draw all of it.
+            # The axes are about to follow the data, so draw the whole signal.
             first, last = 0, count
         self._draw(min(max(first, 0), count), min(max(last, 0), count))
 
@@ -59,7 +59,7 @@ class SignalCurve:
 
 
 SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
-"""Where an item keeps its share, 0 to 1 and more."""
+"""Item role of the bar's share, 0 to 1 or more."""
 OVER = "#b3261e"
 NEAR = "#a06a00"
 WELL = "#00694d"
@@ -67,12 +67,12 @@ NEAR_SHARE = 0.8
 
 
 class BarDelegate(QStyledItemDelegate):
-    """Paints the bar; above 1 it is full and red, and the text says so as well."""
+    """Paints a bar in a table cell; above 1 it is full and red, and the text says so too."""
 
     def paint(
         self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> None:
-        """Paint the bar under the text."""
+        """Paint the bar below the text."""
         share = index.data(SHARE_ROLE)
         if isinstance(share, float):
             area = QRectF(option.rect).adjusted(2, 3, -2, -3)

@@ -1,4 +1,4 @@
-"""Upright stripes and lines of a plot, however many: each kind is one item, painted by columns of pixels."""
+"""Vertical stripes and lines of a plot; each kind is one item, painted by pixel columns."""
 
 from collections.abc import Callable, Iterable
 
@@ -9,22 +9,22 @@ from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QPainter, QPen
 
 _BEHIND = -10
-"""Marks lie below the curves."""
+"""Drawing order below the curves."""
 _LEAST_APART = 5
-"""Pixels between lines: closer ones would be a grey wall, and are seen when somebody looks closer."""
+"""Smallest distance between drawn lines [pixels]; closer lines would merge into a grey area."""
 
 
 class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
-    """As high as the picture; an item for every mark would cost each of them its part of every frame."""
+    """Base class; one item per mark would cost time in every frame."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__()
         self._across = across
-        """From a value to its place on the axis, which may be logarithmic."""
+        """Converts a value to its axis position, which may be logarithmic."""
         self.setZValue(_BEHIND)
 
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
-        """Paint in pixels from here on: what is in sight, and how values become columns."""
+        """Start painting in pixels; return the visible rectangle and the scale from values to columns."""
         to_pixels = painter.transform()
         seen = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
@@ -32,7 +32,7 @@ class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
 
 
 class Stripes(_UprightMarks):
-    """Bands across a plot, none thinner than a pixel, so that none is overlooked."""
+    """Stripes across a plot, at least one pixel wide, so that none is invisible."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)
@@ -40,18 +40,18 @@ class Stripes(_UprightMarks):
         self._bands: NDArray[np.float64] = np.empty((0, 2))
 
     def show_bands(self, bands: Iterable[tuple[float, float]]) -> None:
-        """Show these, from low to high each."""
+        """Show these stripes, each from low to high."""
         places = [(self._across(low), self._across(high)) for low, high in bands]
         self._bands = np.array(places, dtype=np.float64).reshape(-1, 2)
         self.update()
 
     def dress(self, shade: object) -> None:
-        """Fill them with a colour."""
+        """Set the colour."""
         self._shade = shade
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Fill every column of pixels that a band touches, once."""
+        """Fill every pixel column that a stripe touches, once."""
         seen, scale, shift = self._begin(painter)
         width = max(1, round(seen.width()))
         edges = np.clip(np.floor(self._bands * scale + shift - seen.left()), -1, width).astype(int)
@@ -67,7 +67,7 @@ class Stripes(_UprightMarks):
 
 
 class Rules(_UprightMarks):
-    """Lines across a plot, in one pen; where they crowd, none is drawn."""
+    """Lines across a plot; lines that are too close together are not drawn."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)
@@ -75,17 +75,17 @@ class Rules(_UprightMarks):
         self._places: NDArray[np.float64] = np.empty(0)
 
     def show_at(self, values: Iterable[float]) -> None:
-        """Show a line at each of these values."""
+        """Show a line at each value."""
         self._places = np.array([self._across(value) for value in values], dtype=np.float64)
         self.update()
 
     def dress(self, pen: QPen) -> None:
-        """Draw them with a pen."""
+        """Set the pen."""
         self._pen = pen
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Draw those in sight."""
+        """Draw the visible lines."""
         seen, scale, shift = self._begin(painter)
         columns = np.unique(np.round(self._places * scale + shift))
         columns = columns[(columns >= seen.left()) & (columns <= seen.right())]

@@ -1,4 +1,4 @@
-"""Boxes of a layout, filled in one expression: parts below or beside one another."""
+"""Box layouts in one expression, and common widgets: scroll areas, buttons, labels, progress bars."""
 
 from collections.abc import Callable
 from html import escape
@@ -31,11 +31,11 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""A widget or a layout; with its share of the room that is left; or a share that stays empty."""
+"""A widget or layout, optionally with its share of the remaining space; a number is an empty share."""
 
 
 def filled(box: Box, *parts: Part, margin: int | None = None) -> Box:
-    """Put parts into a box, in their order; ``margin`` [pixels] is the style's own where none is given."""
+    """Add parts to a box in order; ``margin`` [pixels] is by default that of the style."""
     if margin is not None:
         box.setContentsMargins(margin, margin, margin, margin)
     for part in parts:
@@ -54,40 +54,40 @@ def filled(box: Box, *parts: Part, margin: int | None = None) -> Box:
 
 
 def row(*parts: Part) -> QHBoxLayout:
-    """Put parts beside one another, within another layout."""
+    """Return a layout of parts side by side."""
     return filled(QHBoxLayout(), *parts)
 
 
 def column(*parts: Part) -> QWidget:
-    """Put parts below one another, in a widget of their own without a margin."""
+    """Return a widget with parts below one another and no margin."""
     whole = QWidget()
     filled(QVBoxLayout(whole), *parts, margin=0)
     return whole
 
 
 def boxed(title: str, *parts: Part) -> QGroupBox:
-    """Put parts below one another, in a frame with a title."""
+    """Return a titled frame with parts below one another."""
     frame = QGroupBox(title)
     filled(QVBoxLayout(frame), *parts)
     return frame
 
 
 def title_of(page: str) -> QLabel:
-    """Return the title of a page."""
+    """Return the title label of a page."""
     title = QLabel(page)
     title.setProperty("rank", "title")
     return title
 
 
 class Scrolled(QScrollArea):
-    """A part of a page that scrolls where it finds too little room, so that it never widens the window.
+    """A scrolling part of a page, which never widens the window.
 
     Parameters
     ----------
     name
-        For screen readers.
+        Name for screen readers.
     content
-        What is scrolled.
+        Scrolled widget.
     """
 
     LEAST_EM = 7, 3
@@ -101,19 +101,19 @@ class Scrolled(QScrollArea):
         self._content = content
 
     def minimumSizeHint(self) -> QSize:
-        """Small, whatever is inside."""
+        """Return a small size, whatever the content."""
         em = self.fontMetrics().height()
         return QSize(self.LEAST_EM[0] * em, self.LEAST_EM[1] * em)
 
     def sizeHint(self) -> QSize:
-        """As wide as the content needs with a scroll bar beside it."""
+        """Return the width of the content plus a scroll bar."""
         bar = self.verticalScrollBar().sizeHint().width() + self.fontMetrics().height() // 2
         least = self._content.minimumSizeHint()
         return QSize(least.width() + bar, least.height())
 
 
 def push_button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
-    """Make one; ``act`` is called without what Qt tells of it."""
+    """Return a button; ``act`` is called without Qt's arguments."""
     button = QPushButton(text)
     button.setToolTip(tip)
     button.setAccessibleName(text.replace("&", "").rstrip("…"))
@@ -122,7 +122,7 @@ def push_button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
 
 
 def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
-    """Ask for the path of a new file, with the ending of the chosen filter where none is typed."""
+    """Ask for the path of a new file; a missing suffix is taken from the selected filter."""
     options = QFileDialog.Option.DontConfirmOverwrite
     given, kind = QFileDialog.getSaveFileName(parent, title, str(wish), filters, options=options)
     if not given:
@@ -132,11 +132,11 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 
 _WIDEST = 0.8
-"""Part of the area that the words may take."""
+"""Largest share of the width for the hint."""
 
 
 def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) -> None:
-    """Write words into the middle of an area."""
+    """Draw a hint in the middle of an area."""
     margin = round(0.5 * (1 - _WIDEST) * area.width())
     painter.setPen(QColor(colour))
     flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
@@ -144,18 +144,18 @@ def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) 
 
 
 def plain_lines(text: str) -> str:
-    """Write every line of a text without control characters."""
+    """Return the text without control characters, line by line."""
     return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 def plain_tip(text: str) -> str:
-    """Write a tooltip whose markup is shown, and not obeyed."""
+    """Return a tooltip with its markup escaped."""
     lines = plain_lines(text)
     return f"<p style='white-space:pre-wrap'>{escape(lines)}</p>" if "<" in lines else lines
 
 
 class ElidedLabel(QLabel):
-    """A line that asks for little width: what finds no room ends in dots, and is whole in the tooltip."""
+    """A label of one line that is shortened with dots if space is missing; its tooltip has the whole text."""
 
     LETTERS = 3
 
@@ -165,21 +165,21 @@ class ElidedLabel(QLabel):
         self.setText(text)
 
     def setText(self, text: str) -> None:
-        """Show a text as one line."""
+        """Show a text on one line."""
         super().setText(printable(text))
 
     def setToolTip(self, text: str) -> None:
-        """Say more under the pointer."""
+        """Set the text of the tooltip."""
         super().setToolTip(plain_tip(text))
 
     def minimumSizeHint(self) -> QSize:
-        """Room for some letters: a long text must not widen the window."""
+        """Return room for a few letters, so that a long text does not widen the window."""
         hint = super().minimumSizeHint()
         least = self.LETTERS * self.fontMetrics().averageCharWidth()
         return QSize(min(hint.width(), least), hint.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the text whole where it fits, and shortened elsewhere."""
+        """Draw the text, shortened if necessary."""
         room = self.contentsRect()
         if self.sizeHint().width() <= self.width() or room.width() <= 0:
             super().paintEvent(event)
@@ -195,14 +195,14 @@ class ElidedLabel(QLabel):
 
 
 LEAST_S = 1.0
-"""Before this much of it is done nobody can say how long the rest takes [s]."""
+"""Elapsed time from which the remaining time is estimated [s]."""
 
 
 class ProgressBar(QProgressBar):
-    """A bar whose words end in dots where they find no room; the tooltip says them whole."""
+    """A progress bar whose text is shortened with dots; its tooltip has the whole text."""
 
     def text(self) -> str:
-        """Return as many of the words as fit."""
+        """Return as much of the text as fits."""
         whole = super().text()
         room = self.width() - self.fontMetrics().averageCharWidth()
         shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)
@@ -211,7 +211,7 @@ class ProgressBar(QProgressBar):
 
 
 class TimedBar(ProgressBar):
-    """Counts pieces of work; the time left follows from those that are done."""
+    """A progress bar that estimates the remaining time from the finished pieces."""
 
     def __init__(self, name: str, pieces: str) -> None:
         super().__init__()
@@ -222,11 +222,11 @@ class TimedBar(ProgressBar):
         self.show_done(0, 0)
 
     def begin(self) -> None:
-        """Count the time from now on."""
+        """Restart the clock."""
         self._begun_s = monotonic()
 
     def show_done(self, done: int, asked: int) -> None:
-        """Show how many pieces are done; 0 asked: nothing was started."""
+        """Show the number of finished pieces; ``asked`` is 0 when nothing was started."""
         if asked and not self._asked:
             self.begin()
         self._asked = asked

@@ -1,4 +1,4 @@
-"""What the window tells a person: what happened, what was done about it, what to do next."""
+"""Messages to the user: what happened, what was done about it, what to do next."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -8,7 +8,7 @@ from vibench.acquisition import printable
 
 
 class NoticeKind(StrEnum):
-    """How much it matters."""
+    """Severity of a message."""
 
     INFO = "info"
     WARNING = "warning"
@@ -17,7 +17,7 @@ class NoticeKind(StrEnum):
 
 @dataclass(frozen=True)
 class Notice:
-    """One message; parts that say nothing are left empty."""
+    """A message; empty parts are not shown."""
 
     kind: NoticeKind
     what: str
@@ -27,19 +27,19 @@ class Notice:
     next_step: str = ""
     """What to do."""
     code: str = ""
-    """A word to search for."""
+    """Error class, to search for in the documentation."""
     details: str = ""
 
     @property
     def text(self) -> str:
-        """Everything, for the clipboard and for a log."""
+        """The whole message, for the clipboard and for a log."""
         code = f"[{self.code}] " if self.code else ""
         parts = (f"{self.kind.value.upper()}: {code}{self.what}", self.done, self.next_step, self.details)
         return "\n".join(part for part in parts if part)
 
 
 def notice_of(error: BaseException, next_step: str = "") -> Notice:
-    """Say an error whose own sentence holds what happened, what was done and what to do."""
+    """Return the notice of an error, whose sentence contains all parts."""
     return Notice(
         NoticeKind.FAULT,
         printable(str(error)) or type(error).__name__,
@@ -50,14 +50,14 @@ def notice_of(error: BaseException, next_step: str = "") -> Notice:
 
 
 def clock(seconds: float) -> str:
-    """Write a time as people read it on a clock."""
+    """Return a duration as on a clock: ``"3:20"``."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"
 
 
 def moment_text(utc: str) -> str:
-    """Write when a recording began, by this machine's clock: ``"2026-03-01 13:00:05"``."""
+    """Return the start of a recording in local time: ``"2026-03-01 13:00:05"``."""
     try:
         return datetime.fromisoformat(utc).astimezone().strftime("%Y-%m-%d %H:%M:%S")
     except ValueError:
@@ -65,7 +65,7 @@ def moment_text(utc: str) -> str:
 
 
 def outcome_text(state: str, reason: str) -> str:
-    """Join state and reason: ``"stopped by the operator"``, ``"failed: the laser was lost"``."""
+    """Return state and reason as text: ``"stopped by the operator"``, ``"failed: the laser was lost"``."""
     return reason if reason.startswith(state) else f"{state}: {reason}" if reason else state
 
 

@@ -13,7 +13,7 @@ Cell = QModelIndex | QPersistentModelIndex
 
 
 def offer_copies(table: QTableView) -> None:
-    """Let a table's cells be copied: those that are chosen, or all of them below their headings."""
+    """Add actions to copy the selected cells, or the whole table with its headings."""
     chosen = _offered(table, "Copy", lambda: chosen_text(table))
     chosen.setShortcut(QKeySequence.StandardKey.Copy)
     chosen.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -22,12 +22,12 @@ def offer_copies(table: QTableView) -> None:
 
 
 def chosen_text(table: QTableView) -> str:
-    """Return the chosen cells, rows by lines; everything while nothing is chosen."""
+    """Return the selected cells as lines; without a selection, the whole table."""
     return _lines(table.selectionModel().selectedIndexes()) or whole_text(table.model())
 
 
 def whole_text(model: QAbstractItemModel) -> str:
-    """Return the headings and all cells."""
+    """Return the headings and all cells as text."""
     rows, columns = range(model.rowCount()), range(model.columnCount())
     headings = (str(model.headerData(column, Qt.Orientation.Horizontal) or "") for column in columns)
     return "\t".join(headings) + "\n" + _lines(model.index(row, column) for row in rows for column in columns)
@@ -48,26 +48,26 @@ def _offered(table: QTableView, text: str, said: Callable[[], str]) -> QAction:
 
 
 _WIDEST_LETTERS = 36
-"""Widest letters of a column that takes the room it needs; longer text is wrapped."""
+"""Widest column of natural width, in letters; longer text is wrapped."""
 _LEAST_LETTERS = 14
-"""Of the column that takes what is left; in a narrower table it is scrolled to."""
+"""Smallest width of the wide column, in letters; narrower tables scroll."""
 _ROW_ROOM = 8
-"""Pixels more for a row of several lines, or they would touch the next one's."""
+"""Extra height of rows with several lines [pixels], so that neighbouring rows do not touch."""
 
 
 class ReadTable(QTableWidget):
-    """Rows of text. One column takes what is left and wraps its text, so that no row runs out of sight.
+    """A read-only table. One column takes the remaining width and wraps its text.
 
     Parameters
     ----------
     name
-        For screen readers.
+        Name for screen readers.
     columns
         Headings.
     hint
-        What stands there while there is no row.
+        Text of an empty table.
     wide
-        The column that takes what is left; the last one if absent.
+        The column with the remaining width; by default the last one.
     """
 
     def __init__(
@@ -96,12 +96,12 @@ class ReadTable(QTableWidget):
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)
-        # A change of width comes with many steps: rows are measured once, after them.
+        # A width changes in many steps; measure the rows once, after the last one.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit)
 
     def show_rows(self, rows: Sequence[Sequence[str]], tips: Sequence[str] = ()) -> None:
-        """Show rows, with a tip for each or none; nothing is touched while nothing changes."""
+        """Show rows, each with an optional tooltip; unchanged rows are not rewritten."""
         wanted = tuple(tuple(row) for row in rows), tuple(tips)
         if wanted == self._shown:
             return
@@ -113,7 +113,6 @@ class ReadTable(QTableWidget):
         self._write()
 
     def _write(self) -> None:
-        """Write every cell in the chosen units."""
         rows, tips = self._shown
         for number, row in enumerate(rows):
             for column, text in enumerate(row):
@@ -124,12 +123,12 @@ class ReadTable(QTableWidget):
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Wrap again for another width."""
+        """Measure the rows again for the new width."""
         super().resizeEvent(event)
         self._later.start()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Say the hint where there is no row."""
+        """Draw the hint in an empty table."""
         super().paintEvent(event)
         if self._hint and self.rowCount() == 0:
             paint_hint(

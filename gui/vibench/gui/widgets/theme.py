@@ -1,4 +1,4 @@
-"""Light and dark: the colours of the window, of its states and of its traces."""
+"""Light and dark theme: colours of the window, of states and of curves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication
 
 _TITLE = 1.4
-"""Height of a title, in heights of the other letters."""
+"""Font size of titles, relative to other text."""
 Colour = str
 """``"#rrggbb"``."""
 
 
 class Tone(StrEnum):
-    """How much something matters; every tone comes with a word or a symbol, never alone."""
+    """Importance of a state; always shown with a word or a symbol too."""
 
     CALM = "calm"
     GOOD = "good"
@@ -25,7 +25,7 @@ class Tone(StrEnum):
 
 @dataclass(frozen=True)
 class Paint:
-    """Letters on a ground, with a contrast of at least 4.5."""
+    """Text and background colours with a contrast of at least 4.5."""
 
     ground: Colour
     letters: Colour
@@ -33,26 +33,26 @@ class Paint:
 
 @dataclass(frozen=True)
 class Theme:
-    """All colours of one appearance."""
+    """All colours of a theme."""
 
     name: str
     window: Colour
     base: Colour
     raised: Colour
-    """Ground of buttons and headers."""
+    """Background of buttons and headers."""
     line: Colour
     """Borders of groups and grids."""
     edge: Colour
-    """Borders of fields, which tell where something can be typed: a contrast of at least 3."""
+    """Borders of input fields: a contrast of at least 3."""
     text: Colour
     muted: Colour
-    """Text of second rank."""
+    """Secondary text."""
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]
-    """Okabe and Ito's colours that show on this ground, in the order of use."""
+    """Okabe and Ito's colours that are visible on this background, in order of use."""
     predicted: Colour
-    """Colour of everything simulated, which is dashed as well."""
+    """Colour of simulated curves, which are also dashed."""
 
 
 LIGHT = Theme(
@@ -99,7 +99,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Colours of Qt's own widgets; a palette works everywhere, a colour scheme only on some desktops."""
+    """Return the palette of Qt's widgets; colour schemes work only on some desktops."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (
@@ -125,9 +125,9 @@ def palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Return what the palette cannot: panels, rail, banner; sizes follow the font.
+    """Return style rules beyond the palette: panels, navigation bar, banner; sizes follow the font.
 
-    A table shows its focus by its frame: the style's own veil over a cell would dim the letters in it.
+    A table shows its focus by its frame, because the style's veil over a cell would dim the text.
     """
     tones = "".join(
         f'*[tone="{tone.value}"] {{ background: {paint.ground}; color: {paint.letters}; }}\n'
@@ -165,5 +165,5 @@ QHeaderView::section {{ background: {theme.raised}; color: {theme.text}; border:
 
 
 def complaint_colour(theme: Theme) -> Colour:
-    """Letters of a complaint on the window's ground."""
+    """Return the text colour of a complaint."""
     return "#a11d16" if theme is LIGHT else "#ff9d94"

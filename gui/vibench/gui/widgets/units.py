@@ -1,7 +1,8 @@
-"""The units that people read: one choice for each quantity, for axes, fields, tables and sentences.
+"""Displayed units: one choice per quantity for axes, fields, tables and sentences.
 
-Values come in SI, sentences of other packages in the units of the paper (µm, m/s²). Here alone they are given
-the units that somebody has chosen; files and reports keep those of their own.
+Values are SI, and sentences of other packages use the paper's units (µm, m/s²). Only this module converts to
+the
+chosen units; files and reports are not affected.
 """
 
 import re
@@ -19,21 +20,21 @@ from shiboken6 import isValid
 from .boxes import plain_lines, plain_tip
 
 STANDARD_GRAVITY = 9.80665
-"""Of g [m/s²]; ISO 80000-3."""
+"""Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
-"""Displacements as they were written: µm on axes, with a prefix that suits their size elsewhere."""
+"""Displacements in µm on axes, and elsewhere with a prefix that suits the value."""
 CHOICES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"m": (AUTOMATIC, "µm", "mm", "m"), "m/s": ("mm/s", "m/s"), "m/s²": ("m/s²", "g")}
 )
-"""By the SI unit of a quantity, what it may be shown in; the first if nothing is chosen."""
+"""Units to choose from, by SI unit; the first is the default."""
 POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}
-"""Of ten, by prefix; three letters are written for millionths."""
+"""Powers of ten by prefix; three characters are in use for micro."""
 _FITTED = ("p", "n", "µ", "m", "", "k", "M")
 PREFIXED = frozenset({"m", "V", "Vpp", "s", "A", "N", "Hz", "W"})
-"""Units that are given a prefix where the number would be small or large."""
+"""Units that receive a prefix for small and large values."""
 _PLAIN_FROM, _PLAIN_TO = 0.1, 1e5
 _SPELLED = {"m s-1": "m/s", "m s-2": "m/s²", "m/s2": "m/s²", "um": "µm"}
-"""Units as files and headless sentences spell them."""
+"""Other spellings of units in files and sentences."""
 _SI_OF = {"m": "m", "mm": "m", "µm": "m", "m/s": "m/s", "mm/s": "m/s", "m/s²": "m/s²"}
 _NUMBER = r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
 _QUANTITY = re.compile(
@@ -43,32 +44,32 @@ _QUANTITY = re.compile(
 _LEAST_DIGITS = 3
 _LONG_WORD = re.compile(r"[^\s\u200b]{25,}")
 _BREAK = "\u200b"
-"""A place where a word may be broken, without a sign."""
+"""Zero-width space, at which Qt may break a long word."""
 _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 
 @dataclass(frozen=True)
 class ShownUnit:
-    """A unit as it is written, and how many of it one SI unit is."""
+    """A displayed unit and its number per SI unit."""
 
     name: str
     per_si: float = 1.0
 
     def text(self, value: float, digits: int = 3) -> str:
-        """Write a value given in SI."""
+        """Return an SI value in this unit as text."""
         shown = value * self.per_si
-        # A count is written whole: 8192 points are not 8190.
+        # Counts are exact: 8192 points, not 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
         return f"{_written(Decimal(number))} {self.name}".strip()
 
 
 def plain_unit(unit: str) -> str:
-    """Write a unit of a file as people do."""
+    """Return the usual spelling of a unit from a file."""
     return _SPELLED.get(unit, unit)
 
 
 def fitted_unit(unit: str, value: float) -> ShownUnit:
-    """Give a unit of a file the prefix that suits a value, whatever was chosen: for sentences to be told."""
+    """Return a unit with the prefix that suits the value, regardless of the user's choice."""
     si = plain_unit(unit)
     is_plain = si not in PREFIXED or value == 0.0 or _PLAIN_FROM <= abs(value) < _PLAIN_TO
     place = 0 if is_plain else floor(log10(abs(value)) / 3)
@@ -77,15 +78,15 @@ def fitted_unit(unit: str, value: float) -> ShownUnit:
 
 
 class DisplayUnits:
-    """What was chosen for each quantity; whatever shows a quantity listens, as it does to Qt's own font."""
+    """The chosen unit of each quantity; widgets register to be called after a change."""
 
     def __init__(self) -> None:
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
-        # Not a signal of Qt: this object outlives every window, and nothing of a closed one may be called.
+        # Not a Qt signal: this object outlives every window, and a closed widget must not be called.
         self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
 
     def on_change(self, listener: Callable[[], None]) -> None:
-        """Call a method of a widget whenever other units are chosen, as long as there is the widget."""
+        """Call a widget's method after every change of units, until the widget is deleted."""
         self._listeners[WeakMethod(listener, self._forget)] = None
 
     def _forget(self, listener: WeakMethod[Callable[[], None]]) -> None:
@@ -93,11 +94,11 @@ class DisplayUnits:
 
     @property
     def chosen(self) -> Mapping[str, str]:
-        """The choice for each quantity, by its SI unit."""
+        """The chosen units by SI unit."""
         return MappingProxyType(self._chosen)
 
     def choose(self, chosen: Mapping[str, str]) -> None:
-        """Show quantities in these units from now on; where one is missing or unknown, in the first."""
+        """Set the units; a missing or unknown choice selects the default."""
         names = {si: chosen.get(si, "") for si in CHOICES}
         wanted = {si: name if name in CHOICES[si] else CHOICES[si][0] for si, name in names.items()}
         if wanted != self._chosen:
@@ -108,22 +109,22 @@ class DisplayUnits:
                     listener()
 
     def on_axis(self, unit: str) -> ShownUnit:
-        """Return the unit of an axis, or of a column: one for small values and large ones."""
+        """Return the unit of an axis or a column, independent of the value."""
         si = plain_unit(unit)
         name = self._chosen.get(si, si)
         return _shown(si, "µm" if name == AUTOMATIC else name)
 
     def of(self, unit: str, value: float) -> ShownUnit:
-        """Return the unit in which a field writes a value of this size."""
+        """Return the unit in which a field displays this value."""
         name = self._chosen.get(unit, AUTOMATIC)
         return fitted_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Return the unit of a plain number that is typed into an empty field of this SI unit."""
+        """Return the unit of a plain number in an empty field of this SI unit."""
         return self.on_axis(unit).name
 
     def told(self, sentence: str) -> str:
-        """Write a sentence with its displacements, velocities and accelerations in the chosen units."""
+        """Return a sentence with displacements, velocities and accelerations in the chosen units."""
         return _QUANTITY.sub(self._retold, sentence)
 
     def _retold(self, found: re.Match[str]) -> str:
@@ -142,7 +143,7 @@ def _shown(si: str, name: str) -> ShownUnit:
 
 
 def _rewritten(number: str, factor: float) -> str:
-    """Scale a number as it is written; a power of ten moves the point and keeps every digit."""
+    """Scale a number in a text; a power of ten shifts the decimal point and keeps every digit."""
     power = round(log10(factor))
     if factor == 1.0:
         return number
@@ -153,7 +154,7 @@ def _rewritten(number: str, factor: float) -> str:
 
 
 def _written(number: Decimal) -> str:
-    """Write every digit, with a power of ten where zeros would have to be counted."""
+    """Return all digits; very small or large numbers have a power of ten."""
     if number == 0 or not number.is_finite() or _LONG_FROM <= abs(number) < _LONG_TO:
         return f"{number:f}"
     return f"{float(number):g}"
@@ -164,11 +165,11 @@ def _with_breaks(word: re.Match[str]) -> str:
 
 
 UNITS = DisplayUnits()
-"""Units of the whole program, as its font and its palette are: a person reads one unit on all pages."""
+"""Units of the whole program, because users expect one unit on all pages."""
 
 
 class SentenceLabel(QLabel):
-    """A wrapped text whose quantities stand in the chosen units, and turn when others are chosen."""
+    """A wrapped text that shows its quantities in the chosen units."""
 
     def __init__(self, text: str = "", rank: str = "") -> None:
         super().__init__()
@@ -181,20 +182,20 @@ class SentenceLabel(QLabel):
         UNITS.on_change(self._tell)
 
     def setText(self, text: str) -> None:
-        """Show a text as it was made: the units are seen to here."""
+        """Set the text; its quantities are converted for display."""
         self.sentence = text
         self._tell()
 
     def setToolTip(self, text: str) -> None:
-        """Say more under the pointer, in the same units."""
+        """Set the tooltip, converted in the same way."""
         self._tip = text
         self._tell()
 
     def text(self) -> str:
-        """Return what is shown."""
+        """Return the displayed text."""
         return super().text().replace(_BREAK, "")
 
     def _tell(self) -> None:
-        # A path is one word to Qt: unbroken it would be as wide as a window, or cut.
+        # Allow breaks in long words, because Qt would not wrap or would cut off a path.
         super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(plain_lines(self.sentence))))
         super().setToolTip(plain_tip(UNITS.told(self._tip)))

@@ -1,6 +1,7 @@
 """The window itself: frame, banner with STOP, messages, list of pages, menus, status line.
 
-It makes the pages from the page catalogue, asks the engine link at every tick, and shows the
-state of the rig on every page. Esc and Pause abort from anywhere. The lateness of the event loop
-is measured all the time. `make_screenshots` pictures every page during a measurement.
+It creates the pages of the page catalogue, calls the engine link at every tick, and shows the state of the
+rig
+above every page. Esc and Pause abort from anywhere. A monitor measures delays of the event loop.
+`make_screenshots` saves pictures of every page during a measurement.
 """

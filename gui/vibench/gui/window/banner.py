@@ -1,4 +1,4 @@
-"""The state of the rig, by symbol, word and colour, with STOP beside it: on every page, always."""
+"""State of the rig by symbol, word and colour, with the STOP button; visible on every page."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from ..widgets.units import SentenceLabel
 
 
 class StatusField(StrEnum):
-    """What has a place on the line, from left to right."""
+    """Fields of the status line, from left to right."""
 
     RIG = "rig"
     OVERRUNS = "overruns"
@@ -29,7 +29,7 @@ class StatusField(StrEnum):
 
 
 class StatusLine(QFrame):
-    """A place for each field; a field that is not well is marked by symbol and colour."""
+    """The status line; fields that need attention have a symbol and a colour."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,38 +48,38 @@ class StatusLine(QFrame):
         frames = self._labels[StatusField.FRAMES]
         frames.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self._fit()
-        # The file takes what is left, and gives way first.
+        # The file field takes the remaining width and shrinks first.
         self._labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         layout.setStretchFactor(self._labels[StatusField.FILE], 1)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow the font at once."""
+        """Apply a change of the font at once."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self._labels:
             self._fit()
 
     def _fit(self) -> None:
-        """Keep the last field as wide as it ever gets: numbers that change all the time move nothing."""
+        """Give the last field its largest width, so that changing numbers do not move other fields."""
         frames = self._labels[StatusField.FRAMES]
         frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
 
     def text_of(self, field: str) -> str:
-        """Return what a field shows."""
+        """Return the text of a field."""
         return self._labels[StatusField(field)].text()
 
     def tip_of(self, field: str) -> str:
-        """Return what is said more of it."""
+        """Return the tooltip of a field."""
         return self._labels[StatusField(field)].toolTip()
 
     def explain(self, field: StatusField, text: str) -> None:
-        """Say more of a field where somebody points at it."""
+        """Set the tooltip of a field."""
         if self._labels[field].toolTip() != text:
             self._labels[field].setToolTip(text)
 
     def show_fields(
         self, texts: Mapping[StatusField, str], marked: frozenset[StatusField] = frozenset()
     ) -> None:
-        """Show texts; ``marked`` fields ask for a look."""
+        """Show texts; ``marked`` fields need attention."""
         for field, label in self._labels.items():
             text = texts.get(field, "")
             tone = Tone.CAUTION.value if field in marked else ""
@@ -95,15 +95,15 @@ class StatusLine(QFrame):
 
 @dataclass(frozen=True)
 class StateIndicator:
-    """What the banner shows of a state."""
+    """What the banner shows for a state."""
 
     symbol: str
     word: str
     tone: Tone
     detail: str = ""
-    """What changes while the state stays: a clock, a level."""
+    """Changing text of the state: a clock, a level."""
     is_ramping: bool = False
-    """The drive goes down already: STOP can only make it faster."""
+    """Whether the drive is ramping down, so that STOP can only make the ramp faster."""
 
 
 STOP_TEXT, AT_ONCE_TEXT = "■ STOP: ramp down   (Esc: abort)", "■ STOP: at once   (Esc: abort)"
@@ -111,17 +111,17 @@ CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page"
 
 
 class Banner(QFrame):
-    """One indicator at a time; a change of its word is announced to screen readers."""
+    """Shows one state; a change of its word is announced to screen readers."""
 
     stop_wanted = Signal()
-    """Ramp down smoothly, as the plan says; pressed a second time: at once."""
+    """Ramp down as planned; a second press uses the fastest ramp."""
 
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("banner")
         self.setAccessibleName("State of the rig")
         self.indicator = CLOSED
-        """What is shown."""
+        """Displayed state."""
         self._label = QLabel()
         self._label.setObjectName("engine_state")
         self._detail = ElidedLabel()
@@ -131,7 +131,7 @@ class Banner(QFrame):
         self._stop.setObjectName("stop")
         self._stop.setAccessibleName("Stop")
         self._stop.setToolTip(
-            "A click ramps the drive down as the plan says; Esc, as fast as the shaker bears.\n"
+            "A click ramps the drive down as planned; Esc uses the fastest ramp of the shaker.\n"
             "This is not an emergency stop: in an emergency, switch the amplifier off."
         )
         self._stop.setFocusPolicy(Qt.FocusPolicy.TabFocus)
@@ -142,13 +142,13 @@ class Banner(QFrame):
         self._paint()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow font and style sheet at once."""
+        """Apply a change of font or style sheet at once."""
         super().changeEvent(event)
         if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange):
             self._fit()
 
     def _fit(self) -> None:
-        """Keep STOP as wide as it ever gets: it must not move under the hand."""
+        """Give STOP its largest width, so that it does not move under the pointer."""
         shown, widths = self._stop.text(), []
         for text in (STOP_TEXT, AT_ONCE_TEXT):
             self._stop.setText(text)
@@ -157,7 +157,7 @@ class Banner(QFrame):
         self._stop.setMinimumWidth(max(widths))
 
     def show_indicator(self, indicator: StateIndicator) -> None:
-        """Show a state; nothing is repainted while nothing changes."""
+        """Show a state; an unchanged state is not repainted."""
         if indicator == self.indicator:
             return
         announced = indicator.word != self.indicator.word
@@ -206,11 +206,11 @@ _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0
 
 
-ORDERED = "The last order is being carried out: limits, folder and instruments are looked at"
+ORDERED = "The last order is being carried out: limits, folder and instruments are being checked"
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact
-    """Return the state a symbol, a word and what changes in it."""
+    """Return symbol, word and changing text of the engine's state."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
@@ -219,7 +219,6 @@ def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicat
 
 
 def _detail(status: EngineStatus) -> str:
-    """Return what changes while the state stays."""
     match status.state:
         case EngineState.READY if status.bench is not None:
             return (
@@ -236,7 +235,7 @@ def _detail(status: EngineStatus) -> str:
 
 
 def run_text(run: RunStatus | None) -> str:
-    """Return where a run stands."""
+    """Return the progress of a run as text."""
     if run is None:
         return "Beginning"
     parts = [f"{run.name} ({run.number} of {run.count})" if run.count > 1 else run.name]
@@ -251,7 +250,7 @@ def run_text(run: RunStatus | None) -> str:
 def status_fields(
     status: EngineStatus | None, frames_per_s: float, longest_wait_s: float
 ) -> tuple[dict[StatusField, str], frozenset[StatusField]]:
-    """Fill the status line, and say which fields ask for a look."""
+    """Return the texts of the status line, and the fields that need attention."""
     frames = f"{frames_per_s:.0f} fps, latency {1e3 * longest_wait_s:.0f} ms"
     if status is None or status.bench is None:
         return {StatusField.RIG: "no bench", StatusField.FRAMES: frames}, frozenset()
@@ -286,10 +285,11 @@ _DETAIL_LINES = 14
 
 
 class MessageStrip(QFrame):
-    """The newest message: what happened, what was done, what to do; Details holds the earlier ones too.
+    """The newest message: what happened, what was done, what to do; Details lists the earlier ones.
 
-    It is as high without a message as with one, so that nothing below it ever moves; then it says what can be
-    done next. Details lie over the page.
+    Its height is constant, so that nothing below moves. Without a message it shows the next step. Details
+    overlap
+    the page.
     """
 
     def __init__(self) -> None:
@@ -297,7 +297,7 @@ class MessageStrip(QFrame):
         self.setAccessibleName("Messages")
         self._notices: list[Notice] = []
         self.is_said = False
-        """Whether a message stands there."""
+        """Whether a message is shown."""
         self._hint = ""
         self._text = SentenceLabel()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -327,11 +327,11 @@ class MessageStrip(QFrame):
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Every message so far, the newest last."""
+        """All messages, the newest last."""
         return tuple(self._notices)
 
     def say(self, notice: Notice) -> None:
-        """Show a message above the earlier ones."""
+        """Show a message; earlier ones stay in Details."""
         self._notices = [*self._notices, notice][-MOST_KEPT:]
         sentences = "  ▸ ".join(part for part in (notice.what, notice.done, notice.next_step) if part)
         self._details.setPlainText("\n\n".join(each.text for each in reversed(self._notices)))
@@ -341,18 +341,18 @@ class MessageStrip(QFrame):
         self._text.setToolTip(notice.text)
 
     def hint(self, text: str) -> None:
-        """Say what can be done next, while there is no message."""
+        """Set the next step, shown without a message."""
         if text != self._hint:
             self._hint = text
             if not self.is_said:
                 self._text.setText(text)
 
     def give_way(self) -> None:
-        """Take away what is about before: what was wanted has come about since; it stays in Details."""
+        """Remove a message that a completed step made obsolete; it stays in Details."""
         self.dismiss()
 
     def dismiss(self) -> None:
-        """Take the message away; all messages stay in Details."""
+        """Remove the message; it stays in Details."""
         self.is_said = False
         self._more.setChecked(False)
         self._show(self._hint, "")
@@ -360,7 +360,7 @@ class MessageStrip(QFrame):
         self._text.setToolTip("")
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow the font at once."""
+        """Apply a change of the font at once."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange:
             self._fit()
@@ -370,7 +370,7 @@ class MessageStrip(QFrame):
         self.setFixedHeight(room + 6)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep Details as wide as the strip."""
+        """Give Details the width of the strip."""
         super().resizeEvent(event)
         self._show_details()
 

@@ -1,4 +1,4 @@
-"""How long the window keeps people waiting: the lateness of its own event loop, measured all the time."""
+"""Monitor of the event loop: measures continuously how long the window does not respond."""
 
 import os
 from collections import deque
@@ -13,33 +13,33 @@ from vibench.sim.operating_system.this import read_at
 
 EVERY_MS = 20
 BOUND_S = 0.1
-"""A wait of this length is felt: longer ones are noted with their moment."""
+"""Longer delays are noticeable and logged [s]."""
 SPAN_S = 10.0
-"""The longest wait that is shown is that of this many seconds."""
+"""Time range of the longest delay [s]."""
 MOST_NOTED = 20
 _DELAYS = "/proc/thread-self/schedstat"
-"""Linux: for how long this thread could have run, and another one had the processor [ns]."""
+"""Linux: time that this thread waited for a processor [ns]."""
 
 
 @dataclass(frozen=True)
 class Wait:
-    """One time that the loop was busy with something else."""
+    """One delay of the event loop."""
 
     own_s: float
-    """Without the time in which other programs had the processor, where the system tells."""
+    """Delay without the time in which other programs had the processor, where the system reports it [s]."""
     busy_s: float
-    """What this thread worked meanwhile: the same on an idle machine and on a busy one."""
+    """Processor time of this thread during the delay, which does not depend on other load [s]."""
     at: datetime
     about: str
-    """What was in sight."""
+    """The visible page."""
 
 
 class EventLoopMonitor(QObject):
-    """A timer that notes how late it comes.
+    """A timer that measures its own delays.
 
-    Whatever keeps the thread keeps the timer: work, a file, a lock, another thread of Python.
-    What other programs take of the processor is distinguished, so that a busy machine is not
-    blamed on the window.
+    Work, file access, locks and other Python threads delay the timer. Waiting for a processor is subtracted,
+    so that
+    load by other programs does not count.
     """
 
     def __init__(self, about: Callable[[], str], parent: QObject | None = None) -> None:
@@ -55,41 +55,41 @@ class EventLoopMonitor(QObject):
 
     @property
     def longest_s(self) -> float:
-        """The longest own wait of the newest seconds."""
+        """The longest own delay in the last seconds [s]."""
         self._forget()
         return max((own_s for _, own_s, _ in self._waits), default=0.0)
 
     @property
     def busiest_s(self) -> float:
-        """The longest stretch of work of the newest seconds [s of processor time]."""
+        """The longest processor time between two timer events in the last seconds [s]."""
         self._forget()
         return max((busy_s for _, _, busy_s in self._waits), default=0.0)
 
     @property
     def rounds(self) -> int:
-        """How often the loop was looked at in the newest seconds."""
+        """Number of timer events in the last seconds."""
         self._forget()
         return len(self._waits)
 
     @property
     def noted(self) -> tuple[Wait, ...]:
-        """Waits over the bound, the newest last."""
+        """Delays above the bound, the newest last."""
         return tuple(self._noted)
 
     def begin(self) -> None:
-        """Forget what was: from here on it counts."""
+        """Restart the measurement."""
         self._waits.clear()
         self._noted.clear()
         self._before = self._clocks()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop the measurement."""
         self._timer.stop()
         self._delays.close()
 
     @property
     def text(self) -> str:
-        """Return what was noted, the newest first."""
+        """Return the logged delays, the newest first."""
         said = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
         said += [
             f"{each.at:%H:%M:%S}  {each.about}: {1e3 * each.own_s:.0f} ms" for each in reversed(self._noted)
@@ -106,7 +106,7 @@ class EventLoopMonitor(QObject):
             self._noted.append(Wait(own_s, busy_s, datetime.now().astimezone(), self._about()))
 
     def _clocks(self) -> tuple[float, float, float]:
-        """Time, this thread's work, and for how long it had to wait for a processor [s]."""
+        """Return time, this thread's processor time, and its waiting time for a processor [s]."""
         return monotonic(), thread_time(), self._delays.read_s()
 
     def _forget(self) -> None:
@@ -116,7 +116,7 @@ class EventLoopMonitor(QObject):
 
 
 class _Delays:
-    """Reads for how long this thread waited for a processor; always zero where nobody tells."""
+    """Reads how long this thread waited for a processor; zero where the system does not report it."""
 
     def __init__(self) -> None:
         try:
@@ -125,13 +125,13 @@ class _Delays:
             self._file = -1
 
     def read_s(self) -> float:
-        """Since the thread began [s]."""
+        """Return the waiting time since the start of the thread [s]."""
         if self._file < 0:
             return 0.0
         return 1e-9 * int(read_at(self._file, 100, 0).split()[1])
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

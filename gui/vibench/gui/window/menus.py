@@ -1,4 +1,4 @@
-"""The menus, and the keys as F1 lists them; Esc and Pause abort from dialogs and open menus too."""
+"""The menus, the list of keys (F1), settings and information dialogs, and the abort key."""
 
 import subprocess
 import sys
@@ -38,33 +38,33 @@ from ..widgets.units import UNITS
 
 
 def whole_path(folder: str) -> str:
-    """Take a path that means the same wherever the window was started."""
+    """Return an absolute path, which does not depend on the working directory."""
     if not Path(folder).expanduser().is_absolute():
         raise ValueError(f"{folder!r} is no whole path; give one such as {Path.home() / 'vibench'}")
     return folder
 
 
 class Preferences(FrozenModel):
-    """What somebody wants to have otherwise."""
+    """The user's settings."""
 
     theme: Literal["light", "dark"]
-    """Colours of the window; figures of exports are light."""
+    """Colours of the window; exported figures are always light."""
     font_pt: Annotated[int, Field(ge=7, le=24)]
-    """Height of the letters."""
+    """Font size."""
     displacements_in: Literal["automatic", "µm", "mm", "m"]
-    """On axes, in fields, tables and sentences; files and reports keep their own. A field takes any unit."""
+    """Unit of displacements in the window; files and reports keep theirs. Fields accept any unit."""
     velocities_in: Literal["mm/s", "m/s"]
-    """On axes, in tables and sentences."""
+    """Unit of velocities on axes, in tables and sentences."""
     accelerations_in: Literal["m/s²", "g"]
-    """g is 9.80665 m/s²."""
+    """Unit of accelerations; g is 9.80665 m/s²."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
-    """How long a test far from every limit may go on while the window does not answer."""
+    """How long a test far from every limit may continue while the window does not answer."""
     recordings_folder: Annotated[str, AfterValidator(whole_path)]
-    """Where new recordings go."""
+    """Folder of new recordings."""
 
 
 class SettingsDialog(QDialog):
-    """Takes the settings over when they are allowed; Cancel leaves them."""
+    """Applies the settings if they are valid; Cancel discards them."""
 
     def __init__(self, context: AppContext, parent: QWidget) -> None:
         super().__init__(parent)
@@ -92,7 +92,7 @@ class SettingsDialog(QDialog):
         )
 
     def accept(self) -> None:
-        """Take the settings over, and keep them."""
+        """Apply and store the settings."""
         wanted = self.form.value
         if wanted is None:
             return
@@ -116,11 +116,11 @@ class SettingsDialog(QDialog):
 
 
 LONGEST_S = 60
-"""That the versions may take to be found."""
+"""Longest time to collect the versions [s]."""
 
 
 class Reader(QDialog):
-    """A text beside the window, which goes on meanwhile; what is chosen in it is copied with Ctrl+C."""
+    """A text in a separate window, which does not block the main window; Ctrl+C copies the selection."""
 
     def __init__(self, title: str, parent: QWidget) -> None:
         super().__init__(parent)
@@ -138,7 +138,7 @@ class Reader(QDialog):
         self.resize(50 * em, 38 * em)
 
     def _fit(self, *_: object) -> None:
-        """Break lines of code too: a manual is not read sideways."""
+        """Wrap lines of code too, so that the manual needs no horizontal scrolling."""
         block = self.browser.document().begin()
         while block.isValid():
             wrapped = block.blockFormat()
@@ -148,21 +148,21 @@ class Reader(QDialog):
 
 
 def show_manual(parent: QWidget) -> Reader:
-    """Open the page on the window; its links lead to the other pages."""
+    """Show the manual page on the window; its links lead to other pages."""
     reader = Reader("Manual", parent)
     try:
         page = shipped_folder("docs") / "gui.md"
         reader.browser.setSource(QUrl.fromLocalFile(str(page)), QTextDocument.ResourceType.MarkdownResource)
     except ConfigurationError as error:
         reader.browser.setPlainText(str(error))
-    back = push_button("&Back", "To the page before", reader.browser.backward)
+    back = push_button("&Back", "Back to the previous page", reader.browser.backward)
     reader.buttons.addButton(back, QDialogButtonBox.ButtonRole.ActionRole)
     reader.show()
     return reader
 
 
 def installation_text() -> str:
-    """Return what `vibench doctor` says."""
+    """Return the output of `vibench doctor`."""
     asked = [sys.executable, "-m", "vibench.cli", "doctor"]
     told = subprocess.run(  # noqa: S603 - this interpreter, and our own package
         asked, capture_output=True, text=True, check=False, timeout=LONGEST_S
@@ -171,9 +171,9 @@ def installation_text() -> str:
 
 
 def show_about(parent: QWidget, context: AppContext) -> Reader:
-    """Return what this installation consists of, for a question to others."""
+    """Show the versions of this installation, to be copied into a report."""
     reader = Reader("About vibench", parent)
-    reader.browser.setPlainText("looking at this installation…")
+    reader.browser.setPlainText("collecting the versions…")
 
     def copy() -> None:
         reader.browser.selectAll()
@@ -195,9 +195,10 @@ ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
 
 
 class AbortKey(QObject):
-    """Receives every key press of the application before any widget does.
+    """Receives every key press of the application before any widget.
 
-    A shortcut does not act while a modal dialog is open; a filter on the application does. The key goes
+    A shortcut does not act while a modal dialog is open; an event filter of the application does. The key is
+    passed
     on to the focused widget, so that Esc still closes a dialog.
     """
 
@@ -209,7 +210,7 @@ class AbortKey(QObject):
         application.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Watch for the keys, and let everything pass."""
+        """Emit `pressed` for an abort key; block no event."""
         kind = event.type()
         if kind is QEvent.Type.KeyRelease:
             self._last_seen = None
@@ -220,7 +221,7 @@ class AbortKey(QObject):
         return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
-        """One press comes by several times: as an override, at the window, and at its widget."""
+        """Return whether this is a new key press; Qt delivers one press several times."""
         seen = (event.timestamp(), event.key())
         is_new = seen != self._last_seen
         self._last_seen = seen
@@ -229,7 +230,7 @@ class AbortKey(QObject):
 
 @dataclass(frozen=True)
 class MenuAction:
-    """A row of the table of actions: where it stands, its key, and what F1 says of it."""
+    """A menu entry: its menu, its key, and its description in the list of keys."""
 
     menu: str
     text: str
@@ -239,41 +240,41 @@ class MenuAction:
 
 
 class MenuTarget(Protocol):
-    """What the window does for its menus."""
+    """Functions of the window that menus call."""
 
     def close(self) -> bool:
-        """End."""
+        """Close the window."""
 
     def reset_layout(self) -> None:
-        """Come up as new."""
+        """Restore the default layout."""
 
     def undo(self) -> None:
-        """Take back the last edit of the plan in sight."""
+        """Undo the last edit of the plan on the visible page."""
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo the last undone edit."""
 
     def open_path(self, path: Path) -> None:
-        """Open whatever lies there."""
+        """Open a file or folder."""
 
 
 OTHER_KEYS: tuple[tuple[str, str], ...] = (
-    ("Esc, Pause", "abort: ramp down as fast as the shaker bears, from anywhere"),
+    ("Esc, Pause", "abort with the fastest ramp of the shaker, from anywhere"),
     ("Space", "freeze the picture (Run page); the recording goes on"),
     ("PgDn, PgUp", "scroll the description of the test (Run page)"),
     ("M", "mark an event in the recording (Run page)"),
     ("A, L", "in a plot: show everything, logarithmic axis"),
-    ("G, D", "in a plot: read values, tell differences from there"),
+    ("G, D", "in a plot: read values, mark a place to read differences"),
     ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
-    ("Menu key", "what can be done with the plot or table that has the focus"),
+    ("Menu key", "context menu of the focused plot or table"),
     ("F4, Alt+Down", "open the list of a choice"),
 )
-"""Keys that no menu holds. No bare letter ever starts an output."""
+"""Keys without a menu entry. No single letter starts an output."""
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 
 
 def key_text(actions: tuple[MenuAction, ...]) -> str:
-    """Lay the keys out as rows of a table, for rich text."""
+    """Return the keys as rows of a table in rich text."""
     keys = (
         *OTHER_KEYS,
         *((each.key, each.about or each.text.replace("&", "")) for each in actions if each.key),
@@ -285,7 +286,7 @@ def key_text(actions: tuple[MenuAction, ...]) -> str:
 def menu_actions(
     window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
 ) -> tuple[MenuAction, ...]:
-    """Return every action, menu by menu."""
+    """Return all actions, menu by menu."""
     return (
         MenuAction("&File", "&Open…", lambda: _open(window, target, context), "Ctrl+O", "open any file"),
         MenuAction("&File", "Recordings &folder…", lambda: choose_folder(window, context)),
@@ -318,7 +319,7 @@ def menu_actions(
 def build_menus(
     window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
 ) -> None:
-    """Put the menus on a window."""
+    """Add the menus to a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
     table = menu_actions(window, target, context, actions, pages)
@@ -354,14 +355,14 @@ def _open(window: QMainWindow, target: MenuTarget, context: AppContext) -> None:
 
 
 def choose_folder(window: QMainWindow, context: AppContext) -> None:
-    """Ask where recordings go from now on."""
+    """Ask for the folder of new recordings."""
     chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(context.folder))
     if chosen:
         context.choose_folder(Path(chosen))
 
 
 def show_keys(window: QMainWindow, actions: tuple[MenuAction, ...]) -> None:
-    """List the keys beside the window, which goes on meanwhile."""
+    """Show the list of keys in a separate window, which does not block the main one."""
     text = f"{key_text(actions)}<p>{EMERGENCY}</p>"
     box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=window)
     box.setModal(False)

@@ -1,4 +1,4 @@
-"""From nothing to a window on the screen, and from its end to the end of the process."""
+"""Creates the application and the window, and explains why no window can be shown."""
 
 import ctypes
 import gc
@@ -23,7 +23,7 @@ SMALLEST_POINTS, LARGEST_POINTS = 7, 24
 
 
 def application(arguments: list[str]) -> QApplication:
-    """Make the one application of this process: Fusion, and the same font on every machine."""
+    """Return the application, with the same style and font on every machine."""
     existing = QCoreApplication.instance()
     if existing is None:
         QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
@@ -36,7 +36,7 @@ def application(arguments: list[str]) -> QApplication:
 
 
 def _font() -> QFont:
-    """DejaVu Sans, which has every sign that we write; matplotlib brings its file along."""
+    """Return DejaVu Sans, which has all characters used and is installed with matplotlib."""
     folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
     for name in FONT_FILES:
         QFontDatabase.addApplicationFont(str(folder / name))
@@ -44,7 +44,7 @@ def _font() -> QFont:
 
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
-    """Show the window, in place of what says that it is starting, until it is closed; gives the exit code."""
+    """Show the window until it is closed and return the exit code; ``starting`` is the label to close."""
     app = application(["vibench"])
     kept = Settings(settings or default_settings_path())
     context = AppContext(kept)
@@ -53,7 +53,7 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     font.setPointSize(int(kept.number(Remembered.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
     app.setFont(font)
     window = Window(context, PAGES)
-    # None of all this ever is garbage: a collector that looked through it would hold the window up.
+    # Exclude existing objects from garbage collection, which would block the event loop.
     gc.freeze()
     window.show()
     if starting is not None:
@@ -65,13 +65,13 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
 
 
 def load_ahead() -> None:
-    """Load what the first prediction and the first curves are made of; the window has been painted by now."""
+    """Import what the first prediction and the first curves need, after the window was painted."""
     import_module("scipy.signal")
     getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009
 
 
 LINKED = "libglib2.0-0 libgl1 libegl1 libxkbcommon0 libdbus-1-3 libfontconfig1"
-"""Debian's packages that Qt is linked to, without a display too."""
+"""Debian packages that Qt needs, even without a display."""
 PACKAGES = {
     "libxcb-cursor": "libxcb-cursor0",
     "libxcb-icccm": "libxcb-icccm4",
@@ -83,18 +83,18 @@ PACKAGES = {
     "libxcb-xkb": "libxcb-xkb1",
     "libxkbcommon-x11": "libxkbcommon-x11-0",
 }
-"""Debian's packages for a window of the X window system, by the library that is missed first."""
+"""Debian packages for an X11 window, by the library that is missing first."""
 ON_X11 = " ".join(sorted(PACKAGES.values()))
 ELSEWHERE = "or run it without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
-    """Say in one sentence why no window can be shown here, and what to do; empty where it can."""
+    """Return in one sentence why no window can be shown, and what to do; empty if one can."""
     try:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - whether it loads is the question
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # As a variable: a checker of types for another system would find the rest unreachable.
+    # Held in a variable, because type checkers for another system would find the rest unreachable.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""
@@ -109,7 +109,7 @@ def display_trouble() -> str:
 
 
 def _plugin_trouble() -> str:
-    """Load Qt's plugin for X11 as Qt will; it knows only that it failed, the loader knows of what."""
+    """Load Qt's X11 plugin to find out which library is missing; Qt reports only the failure."""
     found = find_spec("PySide6")
     folders = [] if found is None else list(found.submodule_search_locations or [])
     for plugin in (Path(folder, "Qt", "plugins", "platforms", "libqxcb.so") for folder in folders):
@@ -124,7 +124,7 @@ def _plugin_trouble() -> str:
 
 
 def _server_trouble() -> str:
-    """Ask the X server itself: Qt would end the process where it does not answer."""
+    """Connect to the X server first, because Qt would end the process if it does not answer."""
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError:
@@ -135,4 +135,4 @@ def _server_trouble() -> str:
     failed = xcb.xcb_connection_has_error(connection)
     xcb.xcb_disconnect(connection)
     display = os.environ.get("DISPLAY")
-    return f"the display {display} does not answer; look at DISPLAY, {ELSEWHERE}" if failed else ""
+    return f"the display {display} does not answer; check DISPLAY, {ELSEWHERE}" if failed else ""

@@ -1,4 +1,4 @@
-"""Pictures of every page, light and dark, in several sizes, made by the window while it measures."""
+"""Screenshots of every page, in both themes and several sizes, during a measurement."""
 
 import gc
 import sys
@@ -32,11 +32,11 @@ from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
-"""The smallest that everything must fit into, and a usual one; their pictures lie in folders of their own."""
+"""The smallest supported size and a common one; their pictures are in separate folders."""
 PATIENCE_S = 3600.0
-"""On a busy machine; a picture of something half done would stand in the manual."""
+"""Time allowed on a busy machine; incomplete pictures would end up in the manual [s]."""
 STILL_MS = 1200
-"""Until the status line shows what a page in sight costs, and no more what it cost to get there."""
+"""Waiting time until the status line shows the steady cost of a page [ms]."""
 _SMALLEST_FILE = 0
 SHOWN = Measurement(
     name="sweep",
@@ -59,22 +59,22 @@ MAP = {"columns": 61, "rows": 41}
 MOTION = (300.0, 20e-6)
 """Frequency [Hz] and amplitude [m] of the motion beside the map."""
 BRANCHES = {"start": 88.0, "stop": 101.0, "places": 3}
-"""Around the first resonance."""
+"""Frequency range of the branches, around the first resonance."""
 CHAIN = {"start_hz": 200.0, "stop_hz": 220.0, "step_hz": 10.0, "duration_s": 1.0, "settle_s": 1.0}
 
 
 def make_screenshots(bench: Path | None, folder: Path) -> int:
-    """Measure with a window, and picture its pages; gives the exit code of the process."""
+    """Run a measurement, save pictures of the pages, and return the exit code."""
     application(["vibench"])
     with TemporaryDirectory(prefix="vibench_") as scratch:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(Remembered.BENCH, str(bench.resolve()))
-        # Unattended: to change the theme and to write pictures takes longer than an attended run waits.
+        # Unattended, because changing the theme and saving pictures takes longer than an attended run allows.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
-        # As in `vibench.gui.window`: pictures are to show what a person would see.
+        # The same settings as in `vibench.gui.window`, so that pictures match the real window.
         gc.freeze()
         window.resize(*SIZE)
         window.show()
@@ -107,7 +107,7 @@ def _open_and_check(window: Window) -> None:
 
 
 def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
-    """Arm and start; ``during`` happens when so much of the run is over that the masses collide."""
+    """Arm and start a measurement; call ``during`` when the masses collide."""
     bridge, test = window.context.bridge, window.pages[TEST]
     assert isinstance(test, TestPage)
     test.form.show_value(measurement)
@@ -127,13 +127,13 @@ def _elapsed_s(window: Window) -> float:
 
 
 def _fill(window: Window) -> None:
-    """Simulate and map what the forms say at first, lay it over what was measured, take over a campaign."""
+    """Simulate and map the default scenes, overlay them on the measurement, and load a campaign."""
     compare, simulation, queue, maps = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE, MAPS))
     assert isinstance(compare, ComparePage)
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
-    # One after another: what each of them says of its time is to be its own.
+    # One after another, so that the displayed times are not affected by each other.
     for view, asked in (
         (simulation, {}),
         (maps, MAP),
@@ -154,7 +154,6 @@ def _fill(window: Window) -> None:
 
 
 def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
-    """Save each page in each theme."""
     first = window.context.theme
     for page in pages:
         window.show_page(page)
@@ -163,7 +162,6 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
 
 
 def _picture_tabs(window: Window, folder: Path) -> None:
-    """Save the tabs of the Simulate page that have pictures of their own."""
     simulation = window.pages[SIMULATE]
     assert isinstance(simulation, SimulatePage)
     window.show_page(SIMULATE)
@@ -174,7 +172,6 @@ def _picture_tabs(window: Window, folder: Path) -> None:
 
 
 def _picture_spectrogram(window: Window, folder: Path) -> None:
-    """Save the other picture of the Files page."""
     files = window.pages[FILES]
     assert isinstance(files, FilesPage)
     window.show_page(FILES)
@@ -196,7 +193,7 @@ def _save(window: Window, folder: Path, name: str) -> None:
 
 
 def _write(picture: QImage, path: Path) -> None:
-    """Write 32 shades of each colour: no eye sees it, and the file is half as large."""
+    """Save with 32 shades per colour, which halves the file without visible loss."""
     picture = picture.convertToFormat(QImage.Format.Format_RGB32)
     shades = np.frombuffer(picture.constBits(), np.uint8) & 0xF8
     small = QImage(
@@ -217,13 +214,12 @@ def _wait(is_so: Callable[[], bool]) -> None:
     while not is_so():
         if monotonic() > give_up_s:
             raise TimeoutError(
-                f"the window was not ready within {PATIENCE_S / 60:g} min; make them on a freer computer"
+                f"the window was not ready within {PATIENCE_S / 60:g} min; use a less busy computer"
             )
         QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
 
 
 def _pass_ms(duration_ms: int) -> None:
-    """Let the window live for a while."""
     loop = QEventLoop()
     QTimer.singleShot(duration_ms, loop.quit)
     loop.exec()

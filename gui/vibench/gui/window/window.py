@@ -1,4 +1,4 @@
-"""The frame: banner and STOP, messages, navigation, the status line."""
+"""The main window: banner with STOP, messages, navigation bar, pages, status line."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -64,14 +64,14 @@ PAGES: Mapping[str, Callable[[AppContext], Page]] = {
     QUEUE: QueuePage,
     MAPS: MapsPage,
 }
-"""The pages in the order of the navigation bar; Ctrl and its number shows one."""
+"""The pages in the order of the navigation bar; Ctrl and a number selects one."""
 
 
 DONE = "✔"
 
 
 class NavigationBar(QListWidget):
-    """Names of the pages; the chosen one is shown."""
+    """List of the pages; selecting one shows it."""
 
     chosen = Signal(str)
 
@@ -92,15 +92,15 @@ class NavigationBar(QListWidget):
 
     @property
     def chosen_name(self) -> str:
-        """The page that is marked."""
+        """The selected page."""
         return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
 
     def choose(self, name: str) -> None:
-        """Mark a page as the one that is shown."""
+        """Select the page that is shown."""
         self.setCurrentRow(self._names.index(name))
 
     def show_done(self, done: dict[str, bool]) -> None:
-        """Tick what is done."""
+        """Tick the finished pages."""
         if done == self._done and self.item(0).text():
             return
         self._done = done
@@ -112,13 +112,13 @@ class NavigationBar(QListWidget):
         self._fit()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow the font at once."""
+        """Apply a change of the font at once."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.count():
             self._fit()
 
     def _fit(self) -> None:
-        """As wide as its longest name in bold with a tick: bold is what the chosen one is."""
+        """Set the width of the longest name in bold with a tick, as for a selected page."""
         bold = self.font()
         bold.setBold(True)
         metrics = self.fontMetrics()
@@ -132,15 +132,15 @@ class NavigationBar(QListWidget):
 
 
 SPAN_S = 1.0
-"""Frames are counted over this many seconds."""
+"""Averaging time of the frame rate [s]."""
 MOST_DROPPED = 20
-"""Files that are opened at once."""
+"""Most files opened by one drop."""
 TICK_MS = 50
-"""Twenty pictures a second: more cost a core, fewer look jerky."""
+"""Interval between updates [ms]: a shorter one needs a whole core, a longer one looks jerky."""
 
 
 class Window(QMainWindow):
-    """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
+    """The main window; pages and banner show the engine's state at every tick."""
 
     def __init__(self, context: AppContext, pages: Mapping[str, Callable[[AppContext], Page]]) -> None:
         super().__init__()
@@ -167,18 +167,18 @@ class Window(QMainWindow):
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._drawn_s: deque[float] = deque()
-        """Moments of the newest frames."""
+        """Times of the newest frames."""
         self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
 
     @property
     def page(self) -> Page:
-        """The page in sight."""
+        """The visible page."""
         page = self._stack.currentWidget()
         assert isinstance(page, Page)
         return page
 
     def show_page(self, name: str) -> None:
-        """Bring a page into sight."""
+        """Show a page."""
         page = self.pages.get(name)
         if page is None or page is self._stack.currentWidget():
             return
@@ -190,7 +190,7 @@ class Window(QMainWindow):
         page.refresh()
 
     def tick(self) -> None:
-        """Show what is true now, and let the engine know that somebody looks."""
+        """Update the visible page, and report to the engine that the window is alive."""
         self.context.bridge.tick()
         status = self.context.bridge.status
         self.banner.show_indicator(indicator_of(status, self.context.bridge.is_ordering))
@@ -206,7 +206,7 @@ class Window(QMainWindow):
         self.navigation.show_done({name: page.is_done for name, page in self.pages.items()})
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask first while something runs; then let the engine end, and keep the shape of the window."""
+        """Ask before closing during a run; then end the engine and store the layout."""
         how = self._how_to_close()
         if how is None:
             event.ignore()
@@ -220,7 +220,7 @@ class Window(QMainWindow):
         super().closeEvent(event)
 
     def look_for_left_campaign(self) -> None:
-        """Take over an engine that another window has left alone with a campaign, if there is one."""
+        """Take over the engine of a campaign that another window left, if there is one."""
         self.context.background.ask(
             left_alone, self._take_over, lambda error: self.context.say(notice_of(error))
         )
@@ -230,13 +230,13 @@ class Window(QMainWindow):
             self.context.bridge.adopt(left)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
-        """Show a campaign that goes on, as if it had been armed here."""
+        """Show an adopted campaign as if it had been armed here."""
         self.context.selection.choose_rig(self.context.bridge.rig)
         self.context.selection.choose_campaign(request.campaign)
         self.context.say(
             Notice(
                 NoticeKind.INFO,
-                f"The campaign {request.campaign.name} had been left alone and goes on.",
+                f"The campaign {request.campaign.name} was left unattended and continues.",
                 "It is shown here.",
                 "STOP ramps down as planned; Esc aborts.",
             )
@@ -244,7 +244,7 @@ class Window(QMainWindow):
         self.show_page(RUN)
 
     def _how_to_close(self) -> Urgency | None:
-        """Ask what becomes of what runs; the drive goes on meanwhile, and Esc aborts it. None: stay."""
+        """Ask what to do with the run while it continues; Esc aborts it. None keeps the window open."""
         if not self.context.bridge.is_driving:
             return Urgency.END
         box = QMessageBox(QMessageBox.Icon.Question, "A measurement is running", "", parent=self)
@@ -252,9 +252,9 @@ class Window(QMainWindow):
         stop = box.addButton("Ramp down and close", QMessageBox.ButtonRole.AcceptRole)
         leave = None
         if self.context.bridge.may_leave:
-            leave = box.addButton("Let it go on and close", QMessageBox.ButtonRole.DestructiveRole)
+            leave = box.addButton("Continue it and close", QMessageBox.ButtonRole.DestructiveRole)
             box.setInformativeText(
-                "It was armed to be left alone: the next window shows it, as 'vibench watch' does; "
+                "It was armed to run unattended: the next window shows it, as 'vibench watch' does; "
                 "'vibench stop' ends it."
             )
         box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
@@ -300,7 +300,7 @@ class Window(QMainWindow):
             self._unthemed.pop(0)()
 
     def _retheme(self, theme: Theme) -> None:
-        """Put on other colours: the frame at once, then page by page, so that nobody has to wait."""
+        """Change the colours: first the frame, then page by page, so that the window stays responsive."""
         self._prepare_theme(theme)
         QTimer.singleShot(0, self, self._theme_next)
 
@@ -309,12 +309,12 @@ class Window(QMainWindow):
         assert isinstance(application, QApplication)
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
-        # A style sheet for the whole application would hold the window up for a third of a second.
+        # A style sheet for the whole application would block the event loop for a third of a second.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
         assert in_sight is not None
-        # Painted once, when it is done, and not after each step.
+        # Paint once at the end, not after each step.
         in_sight.setUpdatesEnabled(False)
         pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)
         self._unthemed = [
@@ -339,27 +339,27 @@ class Window(QMainWindow):
             QTimer.singleShot(0, self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Begin with the focus where the next step is, and not on STOP."""
+        """Focus the first page's next step, and not STOP."""
         super().showEvent(event)
         self.navigation.setFocus()
         self.page.entered()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow the font: parts with a style sheet take another one only with the sheet."""
+        """Apply a change of the font, which parts with a style sheet take over only with a new sheet."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)
 
     def undo(self) -> None:
-        """Take back the last edit of the plan in sight."""
+        """Undo the last edit of the plan on the visible page."""
         self.page.undo()
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo the last undone edit."""
         self.page.redo()
 
     def open_path(self, path: Path) -> None:
-        """Open whatever lies there, on the page that takes it."""
+        """Open a file or folder on the page for its kind."""
         try:
             kind = file_kind(path)
         except ConfigurationError as error:
@@ -371,19 +371,19 @@ class Window(QMainWindow):
         act(path)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Take files."""
+        """Accept files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped."""
+        """Open the dropped files."""
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         for path in paths[:MOST_DROPPED]:
             self.open_path(path)
         event.acceptProposedAction()
 
     def reset_layout(self) -> None:
-        """Come up as new."""
+        """Restore the default layout."""
         self.context.settings.forget_layout()
         self.showNormal()
         self.resize(1280, 800)

@@ -134,7 +134,7 @@ def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(p
     page._end()
     for _ in page.plots.plots:
         page.refresh()
-    assert "At 1 points the start is forgotten." in page._state.text()
+    assert "At 1 points the motion depends sensitively on the start." in page._state.text()
     dots = lines(page.plots.responses)[0]
     assert (list(dots[0]), list(dots[1])) == ([562.8], [2.15])
     assert page.motions.isVisible()

@@ -35,14 +35,14 @@ def exported_elsewhere(
     pair: tuple[Curve, Curve] | None,
     markers_hz: tuple[float, ...],
 ) -> Path:
-    """Write what the path's ending names, and give the path written, as `write_comparison` does."""
+    """Write the comparison in the format of the path's suffix, and return the path written."""
     from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
 
     return write_comparison(path, curves, recordings, pair, markers_hz)
 
 
 class AnalysisPanel(QGroupBox):
-    """The options, the button that applies them, and a bar while it is done."""
+    """The analysis options, the button that applies them, and the progress bar."""
 
     wanted = Signal()
     """Analyse all recordings again."""
@@ -58,11 +58,11 @@ class AnalysisPanel(QGroupBox):
         self._bar = TimedBar("Recordings analysed", "analysed")
         self._cancel = QPushButton("Cance&l")
         self._cancel.setAccessibleName("Cancel the analysis")
-        self._cancel.setToolTip("Forget what has not been analysed yet")
+        self._cancel.setToolTip("Cancel the remaining analyses")
         self._cancel.clicked.connect(lambda _checked=False: self.cancelled.emit())
         filled(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
         for widget in (self._bar, self._cancel):
-            # Their place is kept: what begins or ends must move nothing.
+            # Keep their space while hidden, so that nothing moves when an analysis starts or ends.
             policy = widget.sizePolicy()
             policy.setRetainSizeWhenHidden(True)
             widget.setSizePolicy(policy)
@@ -70,11 +70,11 @@ class AnalysisPanel(QGroupBox):
         self.show_progress(0, 0)
 
     def options(self) -> AnalysisOptions | None:
-        """Return the options; None while they are not allowed, which the form then says."""
+        """Return the options; None while they are not valid."""
         return self.form.value
 
     def show_progress(self, done: int, asked: int) -> None:
-        """Say how many recordings are analysed; the bar is there only while some are not."""
+        """Show how many recordings are analysed; the bar is hidden when all are."""
         self._bar.show_done(done, asked)
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < asked)
@@ -114,7 +114,7 @@ class ComparePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked once two curves are overlaid on one another."""
+        """Ticked when two curves are overlaid."""
         return len(self.curves.shown()) > 1
 
     @property
@@ -124,15 +124,15 @@ class ComparePage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Branches."""
+        """Files of branches."""
         return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
-        """Analyse recordings, elsewhere, and lay their curves over those that are there."""
+        """Analyse recordings in the background and overlay their curves."""
         options = self.panel.options()
         if options is None:
             return
@@ -152,17 +152,17 @@ class ComparePage(Page):
         self._say_progress()
 
     def add_prediction(self, curves: tuple[Curve, ...]) -> None:
-        """Lay a prediction over what is there."""
+        """Overlay a prediction."""
         for source in dict.fromkeys(each.source for each in curves):
             self.curves.replace_source(source, tuple(each for each in curves if each.source == source))
 
     def analyse_again(self) -> None:
-        """Analyse every recording with the options as they are now."""
+        """Analyse every recording with the current options."""
         self.cancel()
         self.add_recordings(tuple(self._recordings))
 
     def cancel(self) -> None:
-        """Want no analysis any more that has not ended."""
+        """Cancel unfinished analyses."""
         for job in self._jobs:
             job.drop()
         self._jobs.clear()
@@ -170,7 +170,7 @@ class ComparePage(Page):
         self._say_progress()
 
     def export_to(self, path: Path) -> None:
-        """Write the comparison as what the path's ending says, elsewhere."""
+        """Write the comparison in the background, in the format of the path's suffix."""
         shown = tuple(each for each, _ in self.curves.shown())
         recordings = tuple(each for each in self._recordings.values() if each is not None)
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
@@ -230,12 +230,12 @@ class ComparePage(Page):
 
     def _choose_branches(self) -> None:
         chosen, _ = QFileDialog.getOpenFileNames(
-            self, "Branches to lay over recordings", str(self.context.folder), "Branches (*.h5)"
+            self, "Branches to overlay on recordings", str(self.context.folder), "Branches (*.h5)"
         )
         self.add_branches(tuple(Path(each) for each in chosen))
 
     def add_branches(self, paths: tuple[Path, ...]) -> None:
-        """Read what `vibench branches` found, elsewhere, and lay it over the curves that are there."""
+        """Read results of `vibench branches` in the background and overlay them."""
         for path in paths:
             self.context.background.ask(branch_curves, self.add_prediction, self._refused, path)
 
@@ -259,7 +259,7 @@ class ComparePage(Page):
         branches = push_button(
             "&Branches…", "Choose files that vibench branches wrote", self._choose_branches
         )
-        remove = push_button("&Remove", "Take the chosen curves away", self._remove)
+        remove = push_button("&Remove", "Remove the selected curves", self._remove)
         self.curves.setMinimumHeight(6 * self.fontMetrics().height())
         return column(row(add, branches, remove), (self.curves, 1), self.pair_box, self.panel)
 

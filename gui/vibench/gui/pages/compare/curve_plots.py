@@ -1,4 +1,4 @@
-"""Two plots over one frequency axis: the curves with their bounds, and the difference of two of them."""
+"""Two plots with a common frequency axis: the curves with their bounds, and the difference of two curves."""
 
 from collections.abc import Callable
 from math import isfinite, log10
@@ -50,21 +50,20 @@ _OTHER_DOTS = 4
 
 
 class CurvePlots(QWidget):
-    """The picture of a comparison, with two markers that can be moved."""
+    """The plots of a comparison, with two movable markers."""
 
     markers_moved = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme).with_hint(
-            "Add recordings, or lay a prediction of the Simulate page over them: "
-            "their curves appear here, and their peaks below."
+            "Add recordings or a prediction of the Simulate page: the curves appear here, their peaks below."
         )
         self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
-            "Choose a curve and what it is compared with, at the left."
+            "Select a curve and its reference on the left."
         )
         self.differences.always_numbered().setXLink(self.magnitudes)
-        # One frequency axis for both: the lower one's.
+        # The lower plot labels the frequency axis of both.
         self.magnitudes.across.show_nothing()
         splitter = QSplitter(Qt.Orientation.Vertical)
         splitter.setAccessibleName("Curves and their difference")
@@ -78,13 +77,13 @@ class CurvePlots(QWidget):
 
     @property
     def markers_hz(self) -> tuple[float, ...]:
-        """Frequencies of the markers, none when they are hidden."""
+        """Frequencies of the markers; empty while they are hidden."""
         return tuple(sorted(self._marker_hz)) if self._are_marked else ()
 
     def show_curves(
         self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None
     ) -> None:
-        """Draw again."""
+        """Draw curves and, if given, their difference."""
         for plot in (self.magnitudes, self.differences):
             plot.wipe()
         for curve, line_style in curves:
@@ -96,7 +95,7 @@ class CurvePlots(QWidget):
         self._add_markers()
 
     def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
-        """Show or hide the markers; they come into what is in sight."""
+        """Show or hide the markers; they are moved into the visible range."""
         self._are_marked = are_shown
         low, high = self.magnitudes.getViewBox().viewRange()[0]
         if are_shown and not all(low <= log10(each) <= high for each in self._marker_hz):
@@ -160,7 +159,7 @@ PEAK_HEADINGS = (
 
 
 class NumberTable(ReadTable):
-    """A table to read and to copy, with other headings each time; names take the room that is left."""
+    """A table to read and copy, with variable columns; the first column takes the remaining width."""
 
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(name, PEAK_HEADINGS[:1], hint)
@@ -168,7 +167,7 @@ class NumberTable(ReadTable):
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
     def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-        """Show other numbers."""
+        """Show other columns and rows."""
         self.setColumnCount(len(headings))
         self.setHorizontalHeaderLabels(list(headings))
         self.show_rows(rows)
@@ -180,7 +179,7 @@ class NumberTable(ReadTable):
 
 
 def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
-    """Write the peaks of curves."""
+    """Return table rows with the peaks of curves."""
     return [
         (
             each.name,
@@ -196,13 +195,13 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
 
 
 def marker_headings(markers_hz: tuple[float, ...]) -> tuple[str, ...]:
-    """Write where the markers stand."""
+    """Return column headings with the marker frequencies."""
     at = tuple(f"|x / U| at {each:.2f} Hz" for each in markers_hz)
     return ("Curve", *at, *(("Second over first (dB)",) if len(at) == 2 else ()))
 
 
 def marker_rows(curves: tuple[Curve, ...], markers_hz: tuple[float, ...]) -> list[tuple[str, ...]]:
-    """Read curves at the markers."""
+    """Return table rows with the values of curves at the markers."""
     if not markers_hz:
         return []
     return [
@@ -222,14 +221,14 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Dashes of the transmission or Response I, and of Response II."""
+"""Dashes of the transmissibility or Response I, and of Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
+"""Curves ticked by default. The two responses of a sweep coincide without contact, so only the first is."""
 _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """Curves with a tick for those in the picture: a colour for each source, a dash for each kind."""
+    """Curves with a check box each; colours stand for sources, dashes for kinds."""
 
     changed = Signal()
 
@@ -245,11 +244,11 @@ class CurveList(QListWidget):
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """All of them."""
+        """All curves."""
         return tuple(self._curves)
 
     def shown(self) -> tuple[tuple[Curve, LineStyle], ...]:
-        """Those that are ticked, with the ink they are drawn in."""
+        """Return the ticked curves with their line styles."""
         return tuple(
             (each, self.line_style(each))
             for row, each in enumerate(self._curves)
@@ -257,21 +256,21 @@ class CurveList(QListWidget):
         )
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Say what will be here."""
+        """Draw a hint while the list is empty."""
         super().paintEvent(event)
         if not self._curves:
-            words = "No curves yet: add recordings, or simulate and lay over."
+            words = "No curves yet: add recordings, or overlay a simulation."
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
 
     def line_style(self, curve: Curve) -> LineStyle:
-        """Colour of its source, dash of its kind."""
+        """Return the line style of a curve: the colour of its source, the dash of its kind."""
         sources = list(dict.fromkeys(each.source for each in self._curves))
         first, second = _DASHES[curve.origin]
         dash = second if curve.response is CurveKind.RESPONSE_II else first
         return curve_style(sources.index(curve.source), dash)
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
-        """Put curves of a source in the place of those it had."""
+        """Replace the curves of a source."""
         ticked = {each.name for each, _ in self.shown()}
         known = {each.name for each in self._curves}
         others = [each for each in self._curves if not _is_of(each, source)]
@@ -281,7 +280,7 @@ class CurveList(QListWidget):
         self._list(lambda each: each.name in ticked or (each.name not in known and _is_first(each)))
 
     def remove_chosen(self) -> tuple[str, ...]:
-        """Take the chosen curves away; gives the sources that have none left."""
+        """Remove the selected curves; return the sources that have none left."""
         before = {each.source for each in self._curves}
         ticked = {each.name for each, _ in self.shown()}
         rows = {index.row() for index in self.selectedIndexes()}
@@ -296,7 +295,7 @@ class CurveList(QListWidget):
                 self.item(row).setCheckState(state)
 
     def retheme(self, theme: Theme) -> None:
-        """Draw the swatches in other colours."""
+        """Redraw the swatches in other colours."""
         self._theme = theme
         blocked = self.blockSignals(True)
         for row, each in enumerate(self._curves):
@@ -304,7 +303,6 @@ class CurveList(QListWidget):
         self.blockSignals(blocked)
 
     def _tell_anew(self) -> None:
-        """Name them in other units."""
         ticked = {each.name for each, _ in self.shown()}
         self._list(lambda each: each.name in ticked)
 
@@ -328,7 +326,7 @@ def _name(each: Curve) -> str:
 
 
 def _is_of(each: Curve, source: str) -> bool:
-    """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
+    """Return whether a curve belongs to a source; steps up and down of one recording are two sources."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
 
 
@@ -349,19 +347,19 @@ def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
 
 
 def _caution(curve: Curve, reference: Curve) -> str:
-    """Say that two curves may hold for two levels: of what collides, that alone is a difference."""
+    """Return a warning if the base levels differ, because contact makes the response depend on the level."""
     levels = (curve.level_m, reference.level_m)
     if levels[0] == levels[1]:
         return ""
     said = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
-    return f". ⚠ Levels of the base: {said[0]} and {said[1]}; what collides differs by that alone"
+    return f". ⚠ Levels of the base: {said[0]} and {said[1]}; with contact, the response depends on the level"
 
 
 _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """A curve and its reference; by default the second one shown over the first."""
+    """Selects a curve and its reference; by default the second curve shown and the first."""
 
     changed = Signal()
 
@@ -382,11 +380,11 @@ class PairBox(QGroupBox):
 
     @property
     def said(self) -> str:
-        """How far the two differ, or why that cannot be said."""
+        """The difference in words, or why there is none."""
         return self._said.text()
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
-        """Let these be chosen; what was chosen stays."""
+        """Offer these curves; the selection is kept where possible."""
         self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
@@ -401,12 +399,12 @@ class PairBox(QGroupBox):
             box.blockSignals(blocked)
 
     def pair(self) -> tuple[Curve, Curve] | None:
-        """Return the curve and its reference, if both are chosen and differ."""
+        """Return the curve and its reference; None unless two different curves are selected."""
         curve, reference = (self._curves.get(box.currentText()) for box in (self._curve, self._reference))
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Return how far they differ, and say it; None where nothing can be compared."""
+        """Return the difference and show it in words; None without a comparison."""
         pair = self.pair()
         self._said.setText("")
         if pair is None:

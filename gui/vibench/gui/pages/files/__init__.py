@@ -1,6 +1,5 @@
 """The Files page: recordings of a folder, listed and looked at.
 
 A table with state and thumbnail of each recording, its channels over time at any zoom, and a
-spectrogram. Folders and levels are read in another process; `_listing` is loaded there, without
-widgets.
+spectrogram. Folders and overviews are read in another process.
 """

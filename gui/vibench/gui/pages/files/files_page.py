@@ -1,4 +1,4 @@
-"""Files: recordings of a folder, listed with state and picture, and opened at any zoom."""
+"""Files: recordings of a folder, listed with state and thumbnail, and opened at any zoom."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -35,11 +35,11 @@ from .spectrogram_view import Pictures
 
 EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
-"""From one look for files that have gone to the next."""
+"""Interval between checks for deleted files [s]."""
 
 
 class FilesPage(Page):
-    """A browser above, the chosen recording below."""
+    """The table of recordings above, the selected recording below."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -50,7 +50,7 @@ class FilesPage(Page):
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
         self._pictured_path: Path | None = None
-        """Of the recording that the pictures show."""
+        """The recording in the pictures."""
         self._listing: Job | None = None
         self._making: Job | None = None
         self._wanted: Path | None = None
@@ -64,28 +64,28 @@ class FilesPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked once a recording is open."""
+        """Ticked when a recording is open."""
         return self._opened is not None
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """The pictures, of the recording that is named above them."""
+        """The pictures, with the recording named above them."""
         wanted = None if self._opened is None else self._opened.path
         inside = self.pictures.spectrogram.shown, self.pictures.hidden_motion.shown
         return Shown(self.pictures, self._pictured_path, wanted), *inside
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Recordings, and folders of them."""
+        """Recordings and their folders."""
         return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
     def entered(self) -> None:
-        """List the folder again, for files may have come; arrows choose among them."""
+        """List the folder again, because new files may exist, and focus the table."""
         self.list_folder()
         self.table.setFocus()
 
     def refresh(self) -> None:
-        """List again when a listed file has gone."""
+        """List the folder again after a listed file was deleted."""
         now_s = monotonic()
         if now_s - self._looked_s > LOOK_S:
             self._looked_s = now_s
@@ -93,11 +93,11 @@ class FilesPage(Page):
                 self.list_folder()
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
 
     def list_folder(self) -> None:
-        """Look at the files of the folder, elsewhere."""
+        """List the files of the folder, in the background."""
         folder = self._folder
         self._folder_line.setText(str(folder))
         elsewhere = folder != self.context.folder
@@ -108,16 +108,16 @@ class FilesPage(Page):
         self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
-        """Show a recording, whatever folder it lies in."""
+        """Show a recording from any folder."""
         self.context.page_wanted.emit(FILES)
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
-        # The page comes into sight first: both at once would hold the window up.
+        # Show the page first, because both steps together would block the event loop.
         QTimer.singleShot(0, self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording, again if it is open; where it is listed, to choose it opens it."""
+        """Open a recording, also if it is open already; if it is listed, selecting it opens it."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:
@@ -127,7 +127,7 @@ class FilesPage(Page):
         entries = found.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
-        # A list that comes late must not take back what somebody has chosen meanwhile.
+        # A late answer must not change a newer selection.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
         self.table.recordings.show_entries(entries)
@@ -137,7 +137,7 @@ class FilesPage(Page):
         if missing:
             self.context.background.ask(thumbnails, self._pictured, self._failed, missing)
         if chosen:
-            # What grew when it was chosen may have got its final name since.
+            # A recording that was still growing may have its final name now.
             self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
@@ -156,7 +156,7 @@ class FilesPage(Page):
             self._open(paths[0])
 
     def _open(self, path: Path) -> None:
-        """Open a recording; one without an overview is read elsewhere first."""
+        """Open a recording; if it has no overview, compute one in the background first."""
         if self._making is not None:
             self._making.drop()
             self._making = None
@@ -172,7 +172,7 @@ class FilesPage(Page):
         self._opened = recording
         self._title.setText(recording.path.name)
         if recording.path != path:
-            # It was finished since it was listed.
+            # The recording ended after it was listed.
             self._wanted = recording.path
             self.list_folder()
         if recording.samples == 0:
@@ -184,7 +184,7 @@ class FilesPage(Page):
             self._making = self.context.background.ask(made_levels, self._show, self._failed, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
-        """Take one channel's overview at a time: all of a long recording's would hold the window up."""
+        """Add one channel per event loop pass; all channels of a long recording would block the window."""
         if recording is not self._opened:
             return
         role = recording.roles[len(levels)]
@@ -230,7 +230,7 @@ class FilesPage(Page):
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
-        # Of os.path: those of pathlib raise on names that no system allows.
+        # Use os.path, because pathlib raises errors for names that no system allows.
         folder = Path(os.path.expanduser(self._folder_line.text()))  # noqa: PTH111
         if folder == self._folder:
             return
@@ -241,14 +241,14 @@ class FilesPage(Page):
                 Notice(
                     NoticeKind.WARNING,
                     f"{folder} is no folder.",
-                    "The list is as it was.",
-                    "Type another one, or choose it.",
+                    "The list is unchanged.",
+                    "Type or choose another folder.",
                 )
             )
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
-        """Look into a folder; where recordings go is the menu's business."""
+        """List another folder; the menu sets the folder of new recordings."""
         self._folder = folder
         self.table.recordings.show_entries(())
         self._count.setText("◌ reading…")
@@ -308,9 +308,9 @@ class FilesPage(Page):
         self._count = ElidedLabel()
         self._count.setProperty("rank", "second")
         self._compare = push_button(
-            "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
+            "Co&mpare", "Overlay the selected recordings on others", self._hand_to_compare
         )
-        self._export = push_button("E&xport…", "Write it for other programs", self._choose_export)
+        self._export = push_button("E&xport…", "Export it for other programs", self._choose_export)
         self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
         for button in (self._compare, self._export, self._note):
             button.setEnabled(False)

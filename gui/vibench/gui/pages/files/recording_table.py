@@ -1,4 +1,4 @@
-"""The list of recordings: one row a file, with its state in words and a small picture, by campaign."""
+"""The table of recordings: one row per file, with state, thumbnail and campaign."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,29 +40,29 @@ from ...widgets.theme import Theme
 Levels = dict[str, tuple[OverviewLevel, ...]]
 
 NOTE = "note"
-"""Name of a result that holds a note; further ones have numbers."""
+"""Name of a result that holds a note; later notes are numbered."""
 
 
 @dataclass(frozen=True)
 class ListedRecording:
-    """A row of the list."""
+    """A row of the table."""
 
     path: Path
     said: CatalogueEntry
 
     @property
     def name(self) -> str:
-        """Of the file below the folder, without its endings: attempts of one measurement differ in it."""
+        """Path below the folder without suffix, so that attempts of one measurement differ."""
         return self.said.path.removesuffix(".part").removesuffix(".h5")
 
     @property
     def is_readable(self) -> bool:
-        """Whether it can be opened."""
+        """Whether the recording can be opened."""
         return self.said.state != UNREADABLE
 
     @property
     def played(self) -> str:
-        """``"sine sweep 150 to 350 Hz"``."""
+        """Excitation and band: ``"sine sweep 150 to 350 Hz"``."""
         low, high = self.said.frequency_low_hz, self.said.frequency_high_hz
         band = "" if low is None else f"{low:g} Hz" if high in (None, low) else f"{low:g} to {high:g} Hz"
         return f"{self.said.kind.replace('_', ' ')} {band}".strip()
@@ -70,17 +70,17 @@ class ListedRecording:
 
 @dataclass(frozen=True)
 class ListedCampaign:
-    """A campaign as its journal knows it at the moment."""
+    """State of a campaign, from its journal."""
 
     name: str
     states: tuple[JournalPointState, ...]
-    """One a point."""
+    """One state per point."""
     files: frozenset[Path]
     """Recordings of the last attempts."""
 
     @property
     def text(self) -> str:
-        """``"✔ night: 40 of 40 done"``, ``"▲ night: 3 of 40 done, 2 failed, 35 queued"``."""
+        """Summary: ``"✔ night: 40 of 40 done"``, ``"▲ night: 3 of 40 done, 2 failed, 35 queued"``."""
         done = self.states.count(JournalPointState.DONE)
         others = [
             f"{self.states.count(state)} {state.value}"
@@ -93,14 +93,14 @@ class ListedCampaign:
 
 @dataclass(frozen=True)
 class Listing:
-    """What is in a folder."""
+    """Contents of a folder."""
 
     recordings: tuple[ListedRecording, ...] = ()
     campaigns: tuple[ListedCampaign, ...] = ()
 
 
 def listed(folder: Path) -> Listing:
-    """List a folder; one that is not there yet is empty."""
+    """Return the contents of a folder; a missing folder counts as empty."""
     if not folder.is_dir():
         return Listing()
     recordings = tuple(ListedRecording(folder / each.path, each) for each in list_recordings(folder))
@@ -112,7 +112,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         try:
             points = read_journal(path)
         except RecordingError:
-            # Another program's file of that name is no campaign.
+            # A file of this name from another program is no campaign.
             continue
         files = frozenset(path.parent / each.file for each in points if each.file)
         name = path.name.removesuffix(JOURNAL_SUFFIX)
@@ -120,7 +120,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
 
 
 def exported(path: Path, target: Path) -> tuple[Path, ...]:
-    """Write the samples of a recording as the ending of the target says; gives the files."""
+    """Export a recording in the format of the target's suffix; return the files written."""
     from vibench.analysis.exchange import Format, excerpt, export_samples  # noqa: PLC0415 - slow to load
 
     with open_recording(path) as recording:
@@ -128,14 +128,14 @@ def exported(path: Path, target: Path) -> tuple[Path, ...]:
 
 
 def noted(path: Path, text: str) -> Path:
-    """Keep a note in a recording, beside those that it has."""
+    """Add a note to a recording."""
     with open_recording(path) as recording:
         recording.save_results(NOTE, {}, {"text": text}, roles=())
     return path
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the notes of the plan and those that were added, the oldest first."""
+    """Return the notes of the plan and those added later, the oldest first."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     added = sorted(recording.results.values(), key=lambda each: each.saved_utc) if has_more else []
@@ -144,12 +144,12 @@ def notes_of(recording: Recording) -> tuple[str, ...]:
 
 
 def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:
-    """Draw recordings small."""
+    """Return thumbnails of recordings; None where a file cannot be read."""
     return {path: thumbnail(path) for path in paths}
 
 
 def made_levels(path: Path) -> Levels:
-    """Take the overview of a recording, or read all samples for it."""
+    """Return the stored overview of a recording, or compute it from all samples."""
     with open_recording(path) as recording:
         return overview_levels(recording)
 
@@ -164,7 +164,7 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 
 def state_text(state: str) -> str:
-    """Symbol and word: never a colour alone."""
+    """Return symbol and word of a state; colour alone is never used."""
     return f"{_symbol(state)} {state}"
 
 
@@ -173,7 +173,7 @@ def _symbol(state: str) -> str:
 
 
 def size_text(size: int) -> str:
-    """``"344 MB"``."""
+    """Return a file size: ``"344 MB"``."""
     step = 1000.0
     shown, units = float(size), ["B", "kB", "MB", "GB", "TB"]
     while shown >= step and len(units) > 1:
@@ -182,7 +182,7 @@ def size_text(size: int) -> str:
 
 
 def duration_text(duration_s: float) -> str:
-    """``"4.25 s"``, ``"3:20"``, ``"1:02:03"``."""
+    """Return a duration: ``"4.25 s"``, ``"3:20"``, ``"1:02:03"``."""
     minute = 60
     if duration_s < minute:
         return f"{duration_s:.3g} s"
@@ -192,12 +192,12 @@ def duration_text(duration_s: float) -> str:
 
 
 def role_text(role: str) -> str:
-    """``"m0 velocity"``."""
+    """Return the label of a channel: ``"m0 velocity"``."""
     return printable(role.replace("_", " "))
 
 
 def facts_text(recording: Recording) -> str:
-    """Say in a line what a recording is."""
+    """Return a one-line summary of a recording."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -221,10 +221,10 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """All recordings, or those of one campaign; hidden in a folder without campaigns."""
+    """Selects all recordings or those of one campaign; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
-    """Files of the campaign as a set, None for all."""
+    """Files of the selected campaign as a set; None for all recordings."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -236,7 +236,7 @@ class CampaignChoice(Choice):
         self.hide()
 
     def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
-        """Offer what was found; the one that was chosen stays so."""
+        """Offer the campaigns; the selection is kept."""
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
@@ -265,32 +265,30 @@ _WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
 _MEASURED_ROWS = 24
-"""Rows whose cells say how wide their columns are: more than a page shows, and few, for the loop waits."""
+"""Rows measured to size the columns: more than one screen, few enough not to block the event loop."""
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
 @dataclass(frozen=True)
 class _Row:
-    """What the cells of a row say, and what they are sorted by."""
-
     texts: tuple[str, ...]
     sorting: tuple[str | float, ...]
 
 
 class RecordingModel(QAbstractTableModel):
-    """Rows of what was found in a folder; pictures come later."""
+    """Table model of the recordings in a folder; thumbnails are added later."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self.entries: tuple[ListedRecording, ...] = ()
-        """In the order they were found."""
+        """Recordings in the order of the listing."""
         self._rows: tuple[_Row, ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """List other files; pictures of those that stay are kept. The same list again changes nothing."""
+        """Show another list; thumbnails of remaining files are kept. An identical list changes nothing."""
         if entries == self.entries:
             return
         self.beginResetModel()
@@ -302,39 +300,39 @@ class RecordingModel(QAbstractTableModel):
         self.endResetModel()
 
     def missing_pictures(self) -> tuple[Path, ...]:
-        """Files whose picture nobody has made yet."""
+        """Files without a thumbnail."""
         return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
-        """Put pictures into the rows."""
+        """Add thumbnails to the rows."""
         self._thumbnails |= found
         if self.entries:
             self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self.entries) - 1, PICTURE))
 
     def retheme(self, theme: Theme) -> None:
-        """Draw the pictures in other colours."""
+        """Redraw the thumbnails in other colours."""
         self._theme = theme
         self._pictures.clear()
         self.show_thumbnails({})
 
     def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """One for each file."""
+        """Return the number of files."""
         return 0 if parent.isValid() else len(self.entries)
 
     def columnCount(self, parent: Index = _NOWHERE) -> int:
-        """One for each heading."""
+        """Return the number of columns."""
         return 0 if parent.isValid() else len(HEADINGS)
 
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
-        """Headings above, nothing beside."""
+        """Return the column headings; rows have none."""
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             return HEADINGS[section]
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Text, picture, tooltip and sorting value of a cell."""
+        """Return text, thumbnail, tooltip or sorting value of a cell."""
         entry, row, column = self.entries[index.row()], self._rows[index.row()], index.column()
         content: Any = None
         match role:
@@ -356,7 +354,7 @@ class RecordingModel(QAbstractTableModel):
         return content
 
     def _picture(self, path: Path) -> QPixmap | None:
-        """Draw the picture of a row when it comes into sight: those of a whole night take a while."""
+        """Return the thumbnail of a visible row; drawing all those of a long campaign would take too long."""
         found = self._thumbnails.get(path)
         if found is not None and path not in self._pictures:
             self._pictures[path] = _drawn(found, self._theme)
@@ -364,31 +362,31 @@ class RecordingModel(QAbstractTableModel):
 
 
 class _ChosenRows(QSortFilterProxyModel):
-    """Rows that hold the words, and belong to the campaign that was chosen."""
+    """Filters rows by search text and campaign."""
 
     _only: frozenset[Path] | None = None
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Let rows of these files pass; of all when None."""
+        """Show only rows of these files; None shows all."""
         self.beginFilterChange()
         self._only = paths
         self.endFilterChange()
 
     def filterAcceptsRow(self, row: int, parent: Index) -> bool:
-        """Ask both."""
+        """Combine both filters."""
         if not super().filterAcceptsRow(row, parent):
             return False
         return self._only is None or self.sourceModel().index(row, NAME).data(PATH_ROLE) in self._only
 
 
 class RecordingTable(QTableView):
-    """The table itself: sorted by any column, several rows may be chosen."""
+    """The sortable table; several rows can be selected."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.setAccessibleName("Recordings")
         self.is_listing = False
-        """Whether somebody is still looking at what the folder holds."""
+        """Whether the folder is being read."""
         self.recordings = RecordingModel(theme)
         self._sorted = _ChosenRows(self)
         self._sorted.setSourceModel(self.recordings)
@@ -418,7 +416,7 @@ class RecordingTable(QTableView):
         self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Say how recordings come here."""
+        """Draw a hint while the table is empty."""
         super().paintEvent(event)
         if self._sorted.rowCount() == 0:
             words = (
@@ -432,29 +430,29 @@ class RecordingTable(QTableView):
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, colour)
 
     def retheme(self, theme: Theme) -> None:
-        """Draw the pictures in other colours."""
+        """Redraw the thumbnails in other colours."""
         self.recordings.retheme(theme)
 
     def search(self, text: str) -> None:
-        """Show rows that hold a text anywhere."""
+        """Show only rows that contain the text."""
         self._sorted.setFilterFixedString(text)
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show rows of these files; of all when None."""
+        """Show only rows of these files; None shows all."""
         self._sorted.show_only(paths)
 
     def chosen_paths(self) -> tuple[Path, ...]:
-        """Files of the chosen rows, from above."""
+        """Files of the selected rows, from top to bottom."""
         rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
         return tuple(index.data(PATH_ROLE) for index in rows)
 
     def choose(self, *paths: Path) -> None:
-        """Choose the rows of these files and no others; none of them there changes nothing."""
+        """Select exactly the rows of these files; without a match nothing changes."""
         indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
         wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
         if not wanted:
             return
-        # Not selectRow: that one adds the row to others while somebody holds Ctrl.
+        # Not selectRow, which extends the selection while Ctrl is held.
         self.selectionModel().setCurrentIndex(wanted[0], _THIS_ROW_ALONE)
         for index in wanted[1:]:
             self.selectionModel().select(index, _THIS_ROW_TOO)
@@ -492,7 +490,7 @@ def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
 
 
 def _drawn(found: Thumbnail, theme: Theme) -> QPixmap:
-    """Paint each column from its lowest to its highest value."""
+    """Return a thumbnail with a line from the lowest to the highest value of each column."""
     ratio = QGuiApplication.primaryScreen().devicePixelRatio()
     picture = QPixmap(THUMBNAIL_SIZE * ratio)
     picture.setDevicePixelRatio(ratio)

@@ -1,4 +1,4 @@
-"""The pictures of a recording: its channels over time, the spectrogram and the hidden motion in sight."""
+"""The pictures of a recording: time histories, spectrogram and hidden-state estimate of the visible range."""
 
 from math import log10, nan
 from pathlib import Path
@@ -34,14 +34,14 @@ from .recording_table import role_text
 from .time_histories import RecordingTimeHistories
 
 _MOTION_WAIT_MS = 250
-"""How long a view stands still before it is worked out."""
+"""Delay between the last change of the view and the computation [ms]."""
 _RELATIVE = PlotAxis("p = y - z", "m", short="p")
 _ANOTHER = "another file…"
 CHOOSE = "Choose a recording in the list above."
 
 
 class HiddenMotionView(QWidget):
-    """Tracked, and without a contact model, between the stops."""
+    """Motion of m1 between its stops: with a contact model, and without one."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
@@ -53,20 +53,22 @@ class HiddenMotionView(QWidget):
         self.said = SentenceLabel(rank="second")
         self.specimen = Choice()
         self.specimen.setAccessibleName("Specimen of the hidden motion")
-        self.specimen.setToolTip("Whose springs, masses and stops the motion is told with")
+        self.specimen.setToolTip("Specimen whose springs, masses and stops are used for the estimate")
         self.specimen.addItem("as the recording describes it", "")
         for name in shipped_specimens():
             self.specimen.addItem(name, name)
         self.specimen.addItem(_ANOTHER, "")
         self.specimen.activated.connect(self._choose_specimen)
         self.find_numbers = QCheckBox("Find its numbers")
-        self.find_numbers.setToolTip("Gaps, m1, springs, dampers and law from the collisions in sight")
+        self.find_numbers.setToolTip(
+            "Estimate gaps, m1, springs, dampers and contact law from the visible collisions"
+        )
         self.find_numbers.toggled.connect(self._ask_otherwise)
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
         self._asked: HiddenViewRequest | None = None
         self._of: HiddenViewRequest | None = None
-        """What the picture is of; None while there is none."""
+        """Inputs of the displayed picture; None without a picture."""
         self._latest_request = LatestRequest(
             background, hidden_view, self._show, self._fail, _MOTION_WAIT_MS, self
         )
@@ -76,27 +78,27 @@ class HiddenMotionView(QWidget):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a picture is still to come."""
+        """Whether a picture is being computed."""
         return self._latest_request.is_busy
 
     @property
     def shown(self) -> Shown:
-        """The picture, of the stretch in sight and what is chosen above it."""
+        """The picture, with visible range and options as inputs."""
         return Shown(self.plot, self._of, self._asked)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Picture another recording from now on, or none; until then the hint is shown."""
+        """Select another recording or none; the hint is shown until a picture exists."""
         self._recording = recording
         self._latest_request.drop()
         self._clear(hint)
 
     def show_view(self, low_s: float, high_s: float) -> None:
-        """Picture this stretch, when the picture is in sight."""
+        """Compute the visible range if this tab is visible."""
         self._view_s = (low_s, high_s)
         self._ask()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Work out what nobody wanted while it was out of sight."""
+        """Start a computation that was not needed while the tab was hidden."""
         super().showEvent(event)
         self._ask()
 
@@ -119,7 +121,7 @@ class HiddenMotionView(QWidget):
         self._ask()
 
     def _choose_specimen(self, place: int) -> None:
-        """Take another specimen; the last entry asks for a file, and becomes it."""
+        """Select another specimen; the last entry asks for a file and adds it."""
         if self.specimen.itemText(place) == _ANOTHER:
             given, _ = QFileDialog.getOpenFileName(self, "Specimen", "", "Specimens (*.toml)")
             if given:
@@ -154,22 +156,22 @@ class HiddenMotionView(QWidget):
 
 
 _WAIT_MS = 250
-"""How long a view stands still before it is worked out."""
+"""Delay between the last change of the view and the computation [ms]."""
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Widths of the spectrogram's lines; None lets the stretch in sight choose."""
+"""Widths of the spectral lines; None selects one from the visible range."""
 _BAR_EM = 4
-"""Room for the numbers and the label of the scale of colours."""
+"""Width of the colour scale with its label."""
 _SHOWN_DB = 80.0
-"""From the strongest line down: the range of colours."""
+"""Range of colours below the strongest line [dB]."""
 
 
 class SpectrogramView(QWidget):
-    """Frequency over time; colours are spectral densities in decibels."""
+    """Frequency over time; colours show the power spectral density in dB."""
 
     zoomed = Signal(float, float)
-    """The stretch that the wheel or the mouse has brought into sight [s]."""
+    """Time range after a zoom by wheel or mouse [s]."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
@@ -190,7 +192,7 @@ class SpectrogramView(QWidget):
         self._recording: Recording | None = None
         self._asked: SpectrogramRequest | None = None
         self._of: SpectrogramRequest | None = None
-        """What the picture is of; None while there is none."""
+        """Inputs of the displayed picture; None without a picture."""
         self._latest_request = LatestRequest(
             background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
         )
@@ -207,26 +209,26 @@ class SpectrogramView(QWidget):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a picture is still to come."""
+        """Whether a picture is being computed."""
         return self._latest_request.is_busy
 
     @property
     def plot(self) -> Plot:
-        """The axes in use."""
+        """Current axes."""
         return self._plots[self._spacing]
 
     @property
     def image(self) -> "_Image":
-        """The picture in use."""
+        """Current image."""
         return self._images[self._spacing]
 
     @property
     def shown(self) -> Shown:
-        """The picture, of what the choices above it say."""
+        """The picture, with the selected options as inputs."""
         return Shown(self.plot, self._of, self._asked)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Picture another recording from now on, or none; until then the hint is shown."""
+        """Select another recording or none; the hint is shown until a picture exists."""
         self._recording = recording
         self._latest_request.drop()
         self._asked = self._of = None
@@ -242,17 +244,17 @@ class SpectrogramView(QWidget):
             self.channel.blockSignals(blocked)
 
     def show_view(self, low_s: float, high_s: float) -> None:
-        """Picture this stretch, when the picture is in sight."""
+        """Compute the visible range."""
         self._view_s = (low_s, high_s)
         self._ask()
 
     def retheme(self, theme: Theme) -> None:
-        """Write the scales in other colours."""
+        """Change the colours of the scales."""
         for image in self._images.values():
             image.retheme(theme)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Work out what nobody wanted while it was out of sight."""
+        """Start a computation that was not needed while the tab was hidden."""
         super().showEvent(event)
         self._ask()
 
@@ -305,9 +307,9 @@ class SpectrogramView(QWidget):
         bar = QHBoxLayout()
         for text, choice, tip in (
             ("Channel", self.channel, "The channel whose frequencies are shown"),
-            ("Frequencies", self.spacing, "How the upright axis is laid out"),
-            ("up to", self.highest, "Where the upright axis ends"),
-            ("lines", self.line_width, "Width of a line: narrow ones tell tones apart, wide ones moments"),
+            ("Frequencies", self.spacing, "Scale of the vertical axis"),
+            ("up to", self.highest, "Upper end of the vertical axis"),
+            ("lines", self.line_width, "Line width: narrow lines resolve frequency, wide lines resolve time"),
         ):
             label = QLabel(text)
             label.setBuddy(choice)
@@ -320,7 +322,7 @@ class SpectrogramView(QWidget):
 
 
 class _Image:
-    """A picture in a plot, with its scale of colours beside it."""
+    """An image in a plot, with its colour scale."""
 
     def __init__(self, plot: Plot) -> None:
         self._plot = plot
@@ -334,14 +336,13 @@ class _Image:
         self.clear(CHOOSE)
 
     def clear(self, hint: str) -> None:
-        """Show nothing, and say why."""
+        """Clear the image and show a hint."""
         self.item.clear()
         self.bar.hide()
         self._plot.with_hint(hint)
         self._plot.viewport().update()
 
     def _level_at(self, across: float, up: float) -> str:
-        """Return the level of the pixel at a place, as it is drawn."""
         if self.item.image is None:
             return ""
         place = self.item.mapFromParent(QPointF(across, up))
@@ -352,7 +353,7 @@ class _Image:
         return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
 
     def show_picture(self, found: DensityPicture) -> None:
-        """Draw it, in colours from the strongest line down."""
+        """Draw a picture; colours range from the strongest line downwards."""
         low, high = found.frequency_hz
         is_log = found.request.spacing is RowSpacing.LOGARITHMIC
         bottom, top = (log10(low), log10(high)) if is_log else (low, high)
@@ -369,13 +370,13 @@ class _Image:
         self._plot.setYRange(max(bottom, 0.0), top, padding=0.0)
 
     def retheme(self, theme: Theme) -> None:
-        """Write the scale in other colours."""
+        """Change the colours of the scale."""
         self.bar.axis.setPen(pg.mkPen(theme.line))
         self.bar.axis.setTextPen(pg.mkPen(theme.text))
 
 
 class Pictures(QTabWidget):
-    """All show the same stretch of the same recording."""
+    """Tabs that show the same time range of the same recording."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
@@ -391,7 +392,7 @@ class Pictures(QTabWidget):
         self.spectrogram.zoomed.connect(self.time_histories.show_range)
 
     def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
-        """Show another recording, or none; the hint says what comes, or why nothing does."""
+        """Show another recording or none; the hint explains an empty picture."""
         recording = None if overview is None else overview.recording
         for picture in (self.spectrogram, self.hidden_motion):
             picture.show_recording(recording, hint)

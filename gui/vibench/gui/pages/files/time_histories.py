@@ -1,4 +1,4 @@
-"""A recording as time histories, one a channel: any zoom, drawn from what is in sight."""
+"""Time histories of a recording, one plot per channel; only the visible range is drawn."""
 
 from dataclasses import dataclass
 
@@ -19,17 +19,17 @@ from ...widgets.units import plain_unit
 from .recording_table import role_text
 
 LEAST_SAMPLES = 8
-"""The closest look."""
+"""Fewest visible samples."""
 _STEP, _ZOOM = 0.2, 0.6
 _TIME_AXIS_EM, _LEAST_EM = 3, 3
 MARKER = LineStyle(lambda theme: theme.accent)
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
-"""Plots: to make one takes as long as to draw ten."""
+"""Most plots kept for reuse; creating a plot takes as long as drawing it ten times."""
 _LABEL_AT = 0.1
-"""Names of segments stand at the foot of the first plot: above is the name of the channel."""
+"""Height of segment names, as a share of the plot: at the bottom, since the channel name is at the top."""
 _NAMED_SHARE = 0.08
-"""Part of the recording that a segment must fill for its name to find room."""
+"""Smallest share of the recording for which a segment's name is drawn."""
 
 
 @dataclass(eq=False)
@@ -41,7 +41,7 @@ class _TimeHistory:
 
 
 class RecordingTimeHistories(QWidget):
-    """Plots over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
+    """Plots over one time axis. Wheel and + - zoom, arrows move, Home shows all, dragging moves."""
 
     range_changed = Signal()
     markers_moved = Signal()
@@ -59,16 +59,16 @@ class RecordingTimeHistories(QWidget):
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(2)
-        # Several changes of the range come with one move: the picture is made once, after them.
+        # Several range changes may come with one move; draw once, after them.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 
     def prepare(self, channel: ChannelHeader) -> None:
-        """Have a plot for a channel ready: to make all plots at once would hold the window up."""
+        """Create the plot of a channel; creating all plots at once would block the event loop."""
         self._history_of(channel)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
-        """Show another recording whole, or none."""
+        """Show a whole recording, or none."""
         for history in self._histories:
             self._layout.removeWidget(history.plot)
             history.plot.hide()
@@ -91,7 +91,7 @@ class RecordingTimeHistories(QWidget):
 
     @property
     def view_s(self) -> tuple[float, float]:
-        """What is in sight, in seconds since the first sample."""
+        """Visible time range since the first sample [s]."""
         if not self._histories or self._overview is None:
             return (0.0, 0.0)
         low, high = self._histories[0].plot.getViewBox().viewRange()[0]
@@ -99,7 +99,7 @@ class RecordingTimeHistories(QWidget):
 
     @property
     def markers_s(self) -> tuple[float, float]:
-        """Moments of the two markers, the earlier first."""
+        """Times of the two markers, the earlier first [s]."""
         early, late = sorted(self._marker_s)
         return early, late
 
@@ -114,19 +114,19 @@ class RecordingTimeHistories(QWidget):
             self.show_range(0.0, self._overview.recording.duration_s)
 
     def show_range(self, low_s: float, high_s: float) -> None:
-        """Show a stretch."""
+        """Show a time range."""
         if self._histories:
             self._histories[0].plot.setXRange(low_s, high_s, padding=0.0)
 
     def zoom(self, factor: float) -> None:
-        """Show ``factor`` times as much, around the middle."""
+        """Scale the visible range by ``factor`` about its centre."""
         low_s, high_s = self.view_s
         half_s = 0.5 * factor * (high_s - low_s)
         middle_s = 0.5 * (low_s + high_s)
         self.show_range(middle_s - half_s, middle_s + half_s)
 
     def move(self, share: float) -> None:  # type: ignore[override] # a view moves in time
-        """Show what is a share of the view later."""
+        """Move the visible range later by this share of its width."""
         low_s, high_s = self.view_s
         step_s = share * (high_s - low_s)
         self.show_range(low_s + step_s, high_s + step_s)
@@ -144,17 +144,17 @@ class RecordingTimeHistories(QWidget):
         self.markers_moved.emit()
 
     def retheme(self, theme: Theme) -> None:
-        """Make further plots in other colours."""
+        """Use other colours for new plots."""
         self._theme = theme
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw for the new width."""
+        """Redraw for the new width."""
         super().resizeEvent(event)
         self._share_height()
         self._later.start()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move and zoom by keys."""
+        """Move and zoom with keys."""
         match event.key():
             case Qt.Key.Key_Left:
                 self.move(-_STEP)
@@ -172,7 +172,7 @@ class RecordingTimeHistories(QWidget):
         event.accept()
 
     def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
-        """Return the plot of a channel, as it was left by another recording, or a new one."""
+        """Return the plot of a channel, reused from another recording if possible."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             up = PlotAxis("", plain_unit(channel.unit))
@@ -190,7 +190,7 @@ class RecordingTimeHistories(QWidget):
         return self._kept[kind]
 
     def _begin(self, history: _TimeHistory, number: int, recording: Recording) -> None:
-        """Make a plot ready for a recording: its place, its limits, nothing drawn yet."""
+        """Set position and limits of a plot for a recording, without drawing."""
         plot, is_last = history.plot, number == len(recording.channels) - 1
         plot.wipe()
         history.curve = plot.curve(curve_style(number))
@@ -210,7 +210,7 @@ class RecordingTimeHistories(QWidget):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Let plots go that neither this recording nor, perhaps, the next one needs."""
+        """Delete plots that neither this recording nor probably the next one needs."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
@@ -235,7 +235,7 @@ class RecordingTimeHistories(QWidget):
         self.markers_moved.emit()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
-        """Draw a line where each segment begins; long ones are named in the first plot."""
+        """Draw a line where each segment starts; long segments are named in the first plot."""
         recording = overview.recording
         begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
         for history in self._histories:
@@ -255,12 +255,11 @@ class RecordingTimeHistories(QWidget):
             )
 
     def _share_height(self) -> None:
-        """Give all plots the same height; the last has the time axis on top of it."""
         axis = _TIME_AXIS_EM * self.fontMetrics().height()
         history = max(1, (self.height() - axis) // max(1, len(self._histories)))
         for place in range(len(self._histories)):
             self._layout.setStretch(place, history + (axis if place == len(self._histories) - 1 else 0))
-        # At once: a layout that comes after the first picture has everything painted twice.
+        # Activate the layout now, because a later change would repaint everything.
         self._layout.activate()
 
     def _ranged(self, view: pg.ViewBox, _range: object) -> None:
@@ -287,5 +286,5 @@ class RecordingTimeHistories(QWidget):
             if known[0].size:
                 bottom, top = float(known[0].min()), float(known[1].max())
                 height = (top - bottom) or 1e-9
-                # Room above for the plot's name, which must not lie on the signal.
+                # Leave room at the top for the channel name, which must not cover the signal.
                 history.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

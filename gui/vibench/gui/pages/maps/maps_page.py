@@ -1,4 +1,4 @@
-"""Maps: what is asked on the left; on the right the map as far as it has come, and the motion at a point."""
+"""Maps: the request on the left; on the right the map as it grows, and the motion at one point."""
 
 from collections.abc import Callable
 from functools import partial
@@ -40,18 +40,20 @@ from ...widgets.units import SentenceLabel
 
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
-"""Over the colours of a map, which are the same in every theme."""
-HINT = "What motions there are; drawn as it is computed. A click shows the motion there."
+"""Style of marks on a map, whose colours are the same in every theme."""
+HINT = (
+    "Kinds of motion over frequency and amplitude, drawn while computed. A click shows the motion at a point."
+)
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
-"""Quantile at either end beyond which colours are not spread."""
+"""Quantile at both ends at which the colour scale is cut."""
 
 
 class MapPlot(QWidget):
-    """Frequency across, amplitude up."""
+    """The map: frequency on the horizontal axis, amplitude on the vertical one."""
 
     picked = Signal(float, float)
-    """Frequency [Hz] and amplitude [m] of a point that somebody wants to see."""
+    """Frequency [Hz] and amplitude [m] of a clicked point."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -67,12 +69,12 @@ class MapPlot(QWidget):
 
     @property
     def in_sight(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Frequencies [Hz] and amplitudes [m] that the axes show."""
+        """Visible ranges of frequency [Hz] and amplitude [m]."""
         (left, right), (bottom, top) = self.plot.getViewBox().viewRange()
         return (left, right), (10.0**bottom, 10.0**top)
 
     def show_picture(self, picture: MapPicture, quantity: str) -> None:
-        """Draw a map as far as it has come; axes follow only when its edges are others."""
+        """Draw a map, complete or not; the axes change only when its limits change."""
         self.show_range(picture.frequency_hz, picture.amplitude_m)
         (left, right), (low, high) = picture.frequency_hz, picture.amplitude_m
         self.image.setImage(COLOURINGS[quantity](picture), autoLevels=False, levels=(0, 255))
@@ -80,7 +82,7 @@ class MapPlot(QWidget):
         self.plot.with_hint("")
 
     def show_range(self, frequency_hz: tuple[float, float], amplitude_m: tuple[float, float]) -> None:
-        """Let the axes show these frequencies and amplitudes; again the same, they stay where they are."""
+        """Set the visible ranges; repeated calls with the same ranges keep the user's zoom."""
         if self._range != (frequency_hz, amplitude_m):
             self._range = (frequency_hz, amplitude_m)
             low, high = amplitude_m
@@ -88,17 +90,17 @@ class MapPlot(QWidget):
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
-        """Show no map; the axes show the whole of the next one, wherever they were."""
+        """Remove the map; the axes will show the whole of the next one."""
         self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)
 
     def mark(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Show which point the motion is of."""
+        """Mark the point whose motion is shown."""
         self._mark.setData([frequency_hz], [amplitude_m])
 
     def show_level(self, level: RecordedLevel, number: int) -> None:
-        """Lay a recording's level over the map."""
+        """Draw the level of a recording over the map."""
         while len(self._levels) <= number:
             self._levels.append(self.plot.curve(ON_TOP))
         frequency_hz, amplitude_m = np.array(level.pairs).T
@@ -116,12 +118,12 @@ class MapPlot(QWidget):
 
 def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
     colours = [(*pg.mkColor(colour).getRgb()[:3], 255) for _, colour in MOTION_CLASSES]
-    # The last row is what -1 finds: nothing known yet.
+    # The last row is the colour of -1: not computed yet.
     return np.array([*colours, UNKNOWN], dtype=np.uint8)[picture.classes]
 
 
 def _spread(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Spread numbers over the colours, from a low quantile to a high one."""
+    """Return colour indices, scaled between a low and a high quantile."""
     known = values[np.isfinite(values)]
     low, high = np.quantile(known, [1.0 - SHARPEST, SHARPEST]) if known.size else (0.0, 1.0)
     share = np.clip((values - low) / max(float(high - low), 1e-12), 0.0, 1.0)
@@ -136,7 +138,7 @@ COLOURINGS: dict[str, Callable[[MapPicture], NDArray[np.uint8]]] = {
     "Response I": lambda picture: _spread(np.log10(picture.response_i)),
     "motions found": lambda picture: _spread(picture.motions),
 }
-"""What the colours of a map may say."""
+"""Quantities that the map's colours can show."""
 
 
 RELATIVE = PlotAxis("p = y - z", "m", short="p")
@@ -144,11 +146,11 @@ DISPLACEMENT = PlotAxis("m0 displacement", "m", short="x")
 LINE = PlotAxis("|x|", "m", scale=Scale.LOGARITHMIC)
 SHOWN_PERIODS = 12
 HIGHEST_MULTIPLE = 6.0
-"""Highest multiple of the drive frequency: the end of the spectrum."""
+"""Largest multiple of the drive frequency in the spectrum."""
 
 
 class MotionView(QWidget):
-    """Three plots side by side, and what they show in words."""
+    """Three plots of a motion side by side, with a summary in words."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -163,13 +165,13 @@ class MotionView(QWidget):
         filled(QVBoxLayout(self), self.said, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
-        """Show no motion, and say why."""
+        """Clear the plots and show the reason."""
         self.said.setText(why)
         for curve in self.curves:
             curve.clear()
 
     def show_motion(self, motion: SettledMotion) -> None:
-        """Draw another motion."""
+        """Draw a motion."""
         self.said.setText(motion.said)
         shown = motion.time_s <= SHOWN_PERIODS / motion.frequency_hz
         is_low = (motion.line_hz > 0.0) & (motion.line_hz < HIGHEST_MULTIPLE * motion.frequency_hz)
@@ -184,13 +186,13 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Share of 1000, of the height; the rest is for the motion at a point."""
+"""Share of the height for the map, of 1000; the motion takes the rest."""
 DIGITS = 5
-"""Digits of numbers that a zoom puts into the form."""
+"""Significant digits of the ranges that a zoom enters in the form."""
 
 
 class MapsPage(Page):
-    """One map at a time; what nobody wants any more is dropped."""
+    """Computes one map at a time; outdated requests are dropped."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -203,7 +205,7 @@ class MapsPage(Page):
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
         self._motion_of: MotionRequest | None = None
-        """What the motion that is shown was computed from."""
+        """Request of the displayed motion."""
         self._levels: list[RecordedLevel] = []
         self._is_stale = False
         self._build()
@@ -214,17 +216,17 @@ class MapsPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked once there is a whole map."""
+        """Ticked when a map is complete."""
         return self.picture is not None and not self.simulator.is_busy
 
     @property
     def said(self) -> str:
-        """What stands below the map."""
+        """Text below the map."""
         return self._state.text()
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """The map, of what was asked; the motion, of the point that was clicked."""
+        """The map and the motion, with their requests as inputs."""
         return (
             Shown(self.map, self._asked, self.form.value),
             Shown(self.motion, self._motion_of, self._motion_wanted),
@@ -244,17 +246,17 @@ class MapsPage(Page):
         )
 
     def refresh(self) -> None:
-        """Draw what has come since the last time."""
+        """Draw the results received since the last tick."""
         if self._is_stale and self.picture is not None:
             self._is_stale = False
             self.map.show_picture(self.picture, self.quantity.currentText())
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
 
     def begin(self) -> None:
-        """Compute what the form says."""
+        """Compute the map of the form."""
         request = self.form.value
         if request is None:
             return
@@ -262,10 +264,10 @@ class MapsPage(Page):
         self.map.clear()
         self._judge()
         self.simulator.begin(request)
-        self._say("Computing; the first picture waits for the program to be made ready…")
+        self._say("Computing; the program is being loaded for the first picture…")
 
     def begin_in_sight(self) -> None:
-        """Compute the part that the axes show, with as many points as the whole had."""
+        """Compute the visible part with as many points as the whole map."""
         asked = self.form.value
         if asked is None:
             return
@@ -276,9 +278,9 @@ class MapsPage(Page):
         self.begin()
 
     def cancel(self) -> None:
-        """Stop at once; what has been found stays."""
+        """Stop the computation; points found so far stay."""
         self.simulator.cancel()
-        self._say("Cancelled; what had been found is shown.")
+        self._say("Cancelled; the results so far are shown.")
 
     def pick(self, frequency_hz: float, amplitude_m: float) -> None:
         """Show the motion at a point of the map."""
@@ -298,7 +300,7 @@ class MapsPage(Page):
         )
 
     def add_recordings(self, paths: object) -> None:
-        """Lay the levels of recordings over the map, where they have one over frequency."""
+        """Draw the levels of recordings over the map, where they depend on frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
             self.context.background.ask(recorded_response, self._show_level, _let_pass, Path(path))
 
@@ -318,7 +320,7 @@ class MapsPage(Page):
 
     def _die(self, what: str) -> None:
         self.context.say(
-            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Compute again.", "SIMULATOR")
+            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Compute again.", "SIMULATOR")
         )
         self._say("It broke off.")
 
@@ -364,23 +366,23 @@ class MapsPage(Page):
         QVBoxLayout(self).addWidget(self._parts)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button("&Map", "Compute what the form says, in another process", self.begin)
+        self._begin = push_button("&Map", "Compute the request of the form in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
-        self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
+        self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
         self._cancel.setEnabled(False)
         return row((self._begin, 1), (self._finer, 1), (self._cancel, 1))
 
     def _answer(self) -> QWidget:
         self.quantity = Choice()
         self.quantity.addItems(list(COLOURINGS))
-        self.quantity.setAccessibleName("What the colours of the map say")
+        self.quantity.setAccessibleName("Quantity shown by the colours of the map")
         self.quantity.currentIndexChanged.connect(self._recolour)
         self._state = SentenceLabel("Nothing has been computed yet.")
-        self._state.setAccessibleName("How far the map is")
+        self._state.setAccessibleName("Progress of the map")
         self._open = push_button(
             "&Open in Simulate",
-            "Simulate the surroundings of this point, with errors",
+            "Simulate a frequency range around this point, with errors",
             self._open_in_simulate,
         )
         self._open.setEnabled(False)
@@ -398,10 +400,10 @@ class MapsPage(Page):
 
 
 def _legend_entry(name: str, colour: str) -> str:
-    """Return a framed square, for some colours are those of the page, and a name that is never broken."""
+    """Return a framed square and an unbroken name; some colours equal the page's background."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
 
 def _let_pass(_error: BaseException) -> None:
-    """Say nothing: noise and dwells have no level over frequency, and Compare tells what cannot be read."""
+    """Ignore the error: noise and dwells have no level over frequency; Compare reports unreadable files."""

@@ -1,4 +1,4 @@
-"""A campaign as it is being put together: each change gives a whole, valid campaign, or is refused."""
+"""Edits of a campaign; each edit gives a complete, valid campaign or is refused."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ USUAL_NAME = "queue"
 
 
 def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Campaign:
-    """Add a test at the end, under a name that is free."""
+    """Add a test at the end, under an unused name."""
     if campaign is None:
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
@@ -37,9 +37,11 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
 def with_sweep(
     campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range, rig: Rig | None
 ) -> Campaign:
-    """Add a sweep of a test along an axis; raises ConfigurationError when a point of it is not allowed.
+    """Add a sweep of a test along an axis.
 
-    What only a simulation foretells (loads of shaker and specimen) is checked when the campaign is armed.
+    Raises ConfigurationError when a point of it is not allowed. Limits that need a simulation (loads of
+    shaker and
+    specimen) are checked when the campaign is armed.
     """
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)
@@ -58,7 +60,7 @@ def with_sweep(
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
-    """Take away one entry; None when nothing is left."""
+    """Remove one entry; None when none is left."""
     measurements, sweeps = _dumped(campaign.measurements), _dumped(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -69,7 +71,7 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
 
 
 def moved_up(campaign: Campaign, number: int) -> Campaign:
-    """Let one entry change places with the one before it; tests stay before sweeps."""
+    """Move one entry up by one place; tests stay before sweeps."""
     measurements, sweeps = _dumped(campaign.measurements), _dumped(campaign.sweeps)
     kind, place = (
         (measurements, number) if number < len(measurements) else (sweeps, number - len(measurements))
@@ -122,7 +124,7 @@ SYMBOLS = {
 
 
 def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
-    """One row a test and a sweep: name, what, how many recordings, how long."""
+    """Return one row per test and sweep: name, excitation, number of recordings, duration."""
     rows = [
         (
             each.name,
@@ -144,7 +146,7 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
 def point_rows(
     seen: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
 ) -> list[tuple[str, str, str, str]]:
-    """How each recording stands: the engine's rows where it has them, else what its folder holds."""
+    """Return the state of each recording, from the engine's rows or from the files in the folder."""
     levels: Mapping[str, str] = {} if seen is None else seen.levels
     known = {row.name for row in rows}
     if state in DRIVING or state is EngineState.ARMED or (levels and set(levels) == known):
@@ -166,21 +168,21 @@ def point_rows(
 
 @dataclass(frozen=True)
 class CampaignPreview:
-    """What is shown of a campaign before it runs."""
+    """Preview of a campaign."""
 
     rows: tuple[tuple[str, str, str, str], ...]
-    """As `row_words.entry_rows` gives them."""
+    """Rows of `entry_rows`."""
     levels: Mapping[str, str]
-    """Of each recording, its level in words."""
+    """Level in words, by recording."""
     complete: frozenset[str]
-    """Recordings that its folder holds already."""
+    """Recordings that exist in the folder."""
     duration_s: float
     size_bytes: float | None
-    """None without a rig, which says how many samples a second there will be."""
+    """Size [bytes]; None without a rig, which defines the sample rate."""
 
 
 def preview_campaign(asked: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
-    """Look ahead, and into the folder where the recordings go."""
+    """Return duration, size and levels of a campaign, and the recordings that exist in its folder."""
     campaign, rig, folder = asked
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))
@@ -190,6 +192,6 @@ def preview_campaign(asked: tuple[Campaign, Rig | None, Path]) -> CampaignPrevie
     try:
         planned = planned_recordings(campaign, folder, ExistingRecordings.RESUME)
         complete = frozenset(each.name for each in planned if each.is_complete)
-    except AcquisitionError:  # made by another plan: arming it says so
+    except AcquisitionError:  # recorded with another plan; arming reports it
         complete = frozenset()
     return CampaignPreview(rows, levels, complete, campaign.duration_s, size)

@@ -1,4 +1,4 @@
-"""The Queue page: a campaign as a table, its estimated end, and how each of its recordings stands."""
+"""The Queue page: a campaign as a table, its estimated end, and the state of each recording."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -59,10 +59,10 @@ _AXES = {
 
 
 class SweepForm(QGroupBox):
-    """Asks for a sweep of the test on the Test page."""
+    """Form to add a sweep of the test on the Test page."""
 
     wanted = Signal(object, object)
-    """The `Axis` and its `Range`."""
+    """The `SweepAxis` and its `Range`."""
     refused = Signal(str)
 
     def __init__(self) -> None:
@@ -95,7 +95,7 @@ class SweepForm(QGroupBox):
         self._turn()
 
     def _turn(self, *_: object) -> None:
-        """Show the unit of the axis, and values that suit it."""
+        """Show the unit and typical values of the selected axis."""
         _word, unit, low, high = list(_AXES.values())[self.axis.currentIndex()]
         for edit, value in ((self.start, low), (self.stop, high)):
             edit.show_unit(unit)
@@ -130,11 +130,11 @@ class SweepForm(QGroupBox):
 
 
 LOOK_MS = 50
-"""How long a campaign stands unchanged before it is looked at."""
+"""Delay between the last edit of the campaign and its preview [ms]."""
 
 
 class QueuePage(Page):
-    """Edits the campaign that is armed here, and shows the one that runs."""
+    """Edits the next campaign and shows the running one."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -142,20 +142,20 @@ class QueuePage(Page):
         self._history: History[Campaign] = History()
         self._seen: CampaignPreview | None = None
         self._of: tuple[Campaign, Rig | None] | None = None
-        """Campaign and rig that the summary is of; None while it is none."""
+        """Campaign and rig of the displayed summary; None without one."""
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
             ("entry", "what", "recordings", "takes"),
-            "Take over a campaign above, or add the test of the Test page, once or as a sweep.",
+            "Load a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
-        # Else the column of excitations, which takes what is left, has room for a few letters only.
+        # Otherwise the excitation column, which takes the remaining width, would be only a few letters wide.
         self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
             ("", "recording", "level", "how it stands"),
-            "Each recording of the campaign is listed here, with how it stands.",
+            "Each recording of the campaign is listed here, with its state.",
         )
         self.sweep = SweepForm()
         self.summary = SentenceLabel()
@@ -164,22 +164,20 @@ class QueuePage(Page):
         self.progress.setAccessibleName("Progress of the campaign")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("not running")
-        self.arm_button = push_button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
+        self.arm_button = push_button("Arm the ca&mpaign…", "Describe in words what will happen", self._arm)
         self.arm_button.setProperty("rank", "first")
         self.resume_button = push_button(
             "Resume: arm what is missin&g…",
-            "Keep what is complete in its folder, make the rest",
+            "Keep complete recordings in the folder and record the rest",
             self._arm_missing,
         )
         self.left_alone = QCheckBox("Left alone")
         self.left_alone.setToolTip(
-            "Limits, ramps and recordings are the engine's. 'vibench watch' and 'vibench stop' reach it "
-            "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
+            "The engine controls limits, ramps and recordings. 'vibench watch' and 'vibench stop' reach it "
+            "from a terminal.\nUnticked, the drive ramps down when the window does not answer."
         )
         self.left_alone.setChecked(True)
-        self.hold_button = push_button(
-            "Hold (drive on)", "Stay where the run is; the drive stays on", self._hold
-        )
+        self.hold_button = push_button("Hold (drive on)", "Hold the run; the drive stays on", self._hold)
         self._looking = LatestRequest(
             context.looks, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
         )
@@ -189,13 +187,13 @@ class QueuePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Every recording of the campaign is there."""
+        """Ticked when every recording of the campaign exists."""
         status = self.context.bridge.status
         rows = () if status is None else status.rows
         return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
 
     def refresh(self) -> None:
-        """Show how the recordings stand."""
+        """Update the states of the recordings."""
         status = self.context.bridge.status
         state = self.context.bridge.state
         campaign = self.context.selection.campaign
@@ -205,7 +203,7 @@ class QueuePage(Page):
         self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold (drive on)")
         self.rows.show_rows(point_rows(self._seen, () if status is None else status.rows, state))
         if campaign is not None and self._seen is not None:
-            self._say_summary(campaign, self._seen)  # the clock goes on
+            self._say_summary(campaign, self._seen)  # update the estimated end
         self._show_progress(status)
 
     @property
@@ -214,11 +212,11 @@ class QueuePage(Page):
         return {FileKind.CAMPAIGN: self.open_file}
 
     def undo(self) -> None:
-        """Take back an edit of the campaign."""
+        """Undo an edit of the campaign."""
         self._show_again(self._history.undo())
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo an edit."""
         self._show_again(self._history.redo())
 
     def _show_again(self, campaign: Campaign | None) -> None:
@@ -227,18 +225,18 @@ class QueuePage(Page):
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """The summary and the rows, of the campaign that they name."""
+        """The summary and the rows, with their campaign as input."""
         wanted = (self.context.selection.campaign, self.context.selection.rig)
         return tuple(Shown(each, self._of, wanted) for each in (self.summary, self.entries))
 
     def left(self) -> None:
-        """Keep the campaign for next time, and how the page is divided."""
+        """Store the campaign and the position of the divider."""
         self._parts.keep()
         campaign = self.context.selection.campaign
         self.context.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
     def open_file(self, path: Path) -> None:
-        """Take over the campaign of a file."""
+        """Load the campaign of a file."""
         try:
             self.context.selection.choose_campaign(load_campaign(path))
             self.context.note_file(path)
@@ -318,7 +316,7 @@ class QueuePage(Page):
 
     @property
     def _chosen_entry(self) -> int:
-        """Number of the chosen row; -1 for none, and while the rows are those of an earlier campaign."""
+        """Number of the selected row; -1 without one, and while the rows belong to an earlier campaign."""
         return self.entries.currentRow() if self.entries.isEnabled() else -1
 
     def _remove(self) -> None:
@@ -375,7 +373,7 @@ class QueuePage(Page):
             try:
                 campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
             except (ConfigurationError, tomllib.TOMLDecodeError) as error:
-                self.context.say(notice_of(error, "It was left out; open or make another one."))
+                self.context.say(notice_of(error, "It was ignored; open or create another one."))
             else:
                 self.context.selection.choose_campaign(campaign)
         self._show_campaign()
@@ -395,7 +393,7 @@ class QueuePage(Page):
     def _lay_out(self) -> None:
         self.choice.setAccessibleName("Known campaigns")
         self.choice.setToolTip("Campaigns that come with vibench")
-        self.choice.addItem("take over a campaign…")
+        self.choice.addItem("load a campaign…")
         for path in all_shipped("campaigns"):
             self.choice.addItem(path.stem.replace("_", " "))
         files = QGridLayout()

@@ -1,5 +1,5 @@
 """The Rig page: which bench, is it there, is it well.
 
-The hardware configuration is chosen, knobs that no instrument reports are confirmed, the bench
-is opened and checked; findings are written with units and prefixes.
+Select the hardware configuration, confirm knobs that no instrument reports, open the bench and check it.
+Findings are shown with units and prefixes.
 """

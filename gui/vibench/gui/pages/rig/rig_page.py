@@ -1,4 +1,4 @@
-"""The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
+"""The Rig page: select a configuration, list the instruments, confirm the knobs, open, check."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -45,11 +45,11 @@ from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, fitted_unit
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
-"""How fast a simulated bench runs."""
+"""Pace of a simulated bench."""
 
 
 class RigChoice(QWidget):
-    """Names of configurations; what cannot be read is said and not chosen."""
+    """Selects a hardware configuration; an unreadable file is reported and not selected."""
 
     chosen = Signal()
     refused = Signal(object)
@@ -60,10 +60,10 @@ class RigChoice(QWidget):
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
-        """Why the chosen file cannot be used; empty where it can."""
+        """Why the selected file cannot be used, or should be checked; empty without a reason."""
         self._box = Choice()
         self._box.setAccessibleName("Hardware configuration")
-        self._box.setToolTip("What hangs on this computer; a simulated rig runs anywhere")
+        self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
         own = QPushButton("Own file…")
         own.setToolTip("Open a hardware configuration of your own")
         own.clicked.connect(self._ask)
@@ -89,20 +89,20 @@ class RigChoice(QWidget):
 
     @property
     def path(self) -> Path | None:
-        """The chosen file."""
+        """The selected file."""
         row = self._box.currentIndex()
         return self._paths[row] if 0 <= row < len(self._paths) else None
 
     @property
     def rig(self) -> Rig | None:
-        """The chosen rig, at the chosen pace."""
+        """The selected rig, at the selected pace."""
         if self._rig is None or self._rig.virtual is None:
             return self._rig
         pace = list(PACES)[self.pace.currentIndex()]
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
-        """Choose a file, listed or not."""
+        """Select a file, listed or not."""
         if path not in self._paths:
             self._add(path)
         row = self._paths.index(path)
@@ -138,7 +138,7 @@ class RigChoice(QWidget):
 
 
 class KnobSheetForm(QGroupBox):
-    """A tick for every knob, and who has looked."""
+    """A check box for every knob, and the name of the operator."""
 
     changed = Signal()
 
@@ -148,7 +148,7 @@ class KnobSheetForm(QGroupBox):
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
         self.operator_field = LineField()
-        """Where the name is typed."""
+        """Field of the operator's name."""
         self.operator_field.setAccessibleName("Who has looked")
         self.operator_field.setToolTip("Your name; it goes into every recording")
         self.operator_field.textChanged.connect(self.changed)
@@ -163,11 +163,11 @@ class KnobSheetForm(QGroupBox):
 
     @property
     def ticks(self) -> tuple[QCheckBox, ...]:
-        """A tick for every knob of the rig."""
+        """Check boxes of the knobs."""
         return tuple(self._ticks.values())
 
     def show_rig(self, rig: Rig | None) -> None:
-        """Ask about the knobs of another rig; nothing is confirmed yet."""
+        """Show the knobs of another rig, all unconfirmed."""
         for tick in self._ticks.values():
             self._layout.removeWidget(tick)
             tick.deleteLater()
@@ -176,7 +176,7 @@ class KnobSheetForm(QGroupBox):
         self.setVisible(bool(knobs))
 
     def sheet(self) -> KnobSheet | None:
-        """Return what was confirmed; None while a knob or the name is missing."""
+        """Return the confirmations; None while a knob or the name is missing."""
         operator = self.operator_field.text().strip()
         if not self._ticks or not operator or not all(tick.isChecked() for tick in self.ticks):
             return None
@@ -185,20 +185,20 @@ class KnobSheetForm(QGroupBox):
     def _tick(self, knob: Knob) -> QCheckBox:
         tick = QCheckBox(f"{knob.instrument}: {knob.setting} at {knob.value}")
         tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
-        tick.setToolTip("Ticked: somebody has seen that this knob stands there")
+        tick.setToolTip("Ticked: somebody has checked this setting")
         tick.toggled.connect(self.changed)
-        # Between the note and the name.
+        # Insert between the note and the name.
         self._layout.insertWidget(self._layout.count() - 1, tick)
         return tick
 
 
 def finding_name(finding: Finding) -> str:
-    """``"noise of drive voltage"``."""
+    """Return the name of a finding: ``"noise of drive voltage"``."""
     return finding.name.replace("_", " ")
 
 
 def measured_text(finding: Finding) -> str:
-    """``"20 µV"`` for 1.997e-05 V; everything else as the check says it."""
+    """Return the measured value with a prefix: ``"20 µV"`` for 1.997e-05 V."""
     number = finding.number
     if number is None or not isfinite(number):
         return finding.value
@@ -210,7 +210,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Return what was expected, and what to do where it was not found."""
+    """Return the expected value, and what to do after a deviation."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 
@@ -224,7 +224,7 @@ VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ f
 
 
 class RigPage(Page):
-    """The first step: from a file to a bench that is open and well."""
+    """The first step: select a configuration, open the bench and check it."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -248,12 +248,12 @@ class RigPage(Page):
         self.instruments = ReadTable(
             "Instruments",
             ("part", "what answered"),
-            "Who answers is listed here once a bench is open.",
+            "The instruments are listed here once a bench is open.",
         )
         self.findings = ReadTable(
             "Findings of the check",
             ("", "finding", "measured", "expected"),
-            "Noise, gains, clocks and the answer to a small sine, each beside what is expected of it.",
+            "Noise, gains, clocks and the response to a small sine, each with its expected value.",
         )
         self.verdict = SentenceLabel()
         self.first_steps = SentenceLabel(FIRST_STEPS, rank="second")
@@ -265,14 +265,14 @@ class RigPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """The bench is open, and no check has forbidden to use it."""
+        """Ticked when the bench is open and no check has failed."""
         status = self.context.bridge.status
         if status is None or status.bench is None:
             return False
         return status.check is None or status.check.verdict is not Verdict.FAIL
 
     def refresh(self) -> None:
-        """Show what is open and what the check has found."""
+        """Show the open instruments and the findings of the check."""
         status = self.context.bridge.status
         state = self.context.bridge.state
         may_open = state in (EngineState.CLOSED, EngineState.FAULT)
@@ -287,17 +287,17 @@ class RigPage(Page):
         self._show_check(status)
 
     def entered(self) -> None:
-        """Put the focus where the next step is."""
+        """Focus the widget of the next step."""
         if self.open_button.isEnabled():
             self.open_button.setFocus()
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Hardware configurations; while a bench is open, none."""
+        """Hardware configurations; none while a bench is open."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:
@@ -315,7 +315,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # not that of an engine that was taken over
+            self.context.selection.choose_rig(rig)  # an adopted engine may have another rig
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:
@@ -371,7 +371,7 @@ class RigPage(Page):
         rows = [("VISA", resource) for resource in found.visa_resources]
         rows += [("DAQ", f"{each.name}: {each.product}, serial {each.serial}") for each in found.daq_devices]
         rows += [("remark", remark) for remark in found.remarks]
-        self.instruments.show_rows(rows or [("none", "no instrument answers: look at cables and power")])
+        self.instruments.show_rows(rows or [("none", "no instrument answers: check cables and power")])
 
     def _not_found(self, error: BaseException) -> None:
         self.find_button.setEnabled(True)

@@ -1,4 +1,4 @@
-"""A sweep over the frequency really played, with the prediction and its collision regions beneath."""
+"""Live plots of a run: time histories, spectra, responses, phase portrait and hidden motion."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -22,11 +22,11 @@ from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
 Curves = Mapping[str, pg.PlotDataItem]
-"""By the field that they show."""
+"""Curves by the field that they show."""
 
 
 def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
-    """Draw fields of a prediction over its frequencies, or none."""
+    """Draw fields of a prediction over frequency; None clears the curves."""
     for name, curve in curves.items():
         if seen is None:
             curve.clear()
@@ -35,7 +35,7 @@ def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
 
 
 class SweepPlot(QWidget):
-    """Points of a sine or a sweep as it goes."""
+    """Responses of a dwell, steps or a sweep over the actual drive frequency."""
 
     def __init__(self, tab: str, plot: Plot) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class SweepPlot(QWidget):
         filled(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw all points so far, in the order of time."""
+        """Draw all points in time order."""
         history = view.history()
         if len(history.time_s) == self._shown:
             return
@@ -56,22 +56,22 @@ class SweepPlot(QWidget):
             curve.setData(history.frequency_hz, getattr(history, name))
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Lay a prediction beneath, and where it collides; or none."""
+        """Draw a prediction and its collision regions behind the points; None clears them."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         show_predicted(self.predicted, seen)
 
     def clear(self) -> None:
-        """Forget the last run."""
+        """Clear the plot."""
         self._shown = 0
         for curve in self.measured.values():
             curve.clear()
 
 
 def sweep_history(theme: Theme) -> SweepPlot:
-    """Make the plot of Responses I and II."""
+    """Return the plot of Responses I and II."""
     up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
     plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
-    plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
+    plot.with_hint("A point every tenth of a second of a dwell or a sweep, with the prediction.")
     made = SweepPlot("Responses", plot)
     made.predicted = {
         "response_i": plot.curve(PREDICTED, "I, simulated"),
@@ -86,7 +86,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
 
 
 def sweep_envelope(theme: Theme) -> SweepPlot:
-    """Make the plot of the extremes of m0's velocity."""
+    """Return the plot of the largest and smallest velocity of m0."""
     plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
     plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
     made = SweepPlot("Envelope", plot)
@@ -107,26 +107,26 @@ _SHORT = {"amplifier_voltage": "amp."}
 
 
 def channel_word(role: str) -> str:
-    """Say a channel in a word."""
+    """Return a short name of a channel."""
     return _WORDS.get(role, role.replace("_", " "))
 
 
 def channel_axis(role: str, unit: str) -> PlotAxis:
-    """Return a channel's axis: its word, in the unit that is shown."""
+    """Return the axis of a channel, in the chosen unit."""
     return PlotAxis(channel_word(role), plain_unit(unit), short=_SHORT.get(role, channel_word(role)))
 
 
 AGO = PlotAxis("Time before now", "s")
-"""An axis that stands still: one that scrolls would be painted again in every frame."""
+"""A fixed time axis; a scrolling one would be painted again in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Of a plot: as many as there are lines side by side; between fewer, room would stay empty."""
+"""Columns of a plot: one per pixel column within these limits, so that no gap appears."""
 AXIS_EM, TIME_AXIS_EM = 4.0, 3
 USUAL_SPAN_S = 2.0
-"""What a plot shows at first."""
+"""Time range shown at first [s]."""
 
 
 class TimeHistoryPlots(QWidget):
-    """Plots over one time axis; they change with the channels of the run."""
+    """Plots over one time axis, rebuilt when the channels change."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -140,13 +140,13 @@ class TimeHistoryPlots(QWidget):
         self._layout.setSpacing(1)
 
     def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Have a plot for each channel, given by role and unit."""
+        """Show one plot per channel, given by role and unit."""
         if channels != self._channels:
             self._build(channels)
             self._channels = channels
 
     def show_view(self, view: LiveView, span_s: float) -> None:
-        """Draw the newest seconds."""
+        """Draw the newest ``span_s`` seconds."""
         self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
         if not self.plots:
             return
@@ -165,11 +165,11 @@ class TimeHistoryPlots(QWidget):
         self._span_s = span_s
 
     def retheme(self, theme: Theme) -> None:
-        """Make further plots in other colours."""
+        """Use other colours for new plots."""
         self._theme = theme
 
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Have as many plots as channels; those that are there are used again, for a plot is slow to make."""
+        """Create the missing plots and reuse the others, because creating a plot is slow."""
         for plot in self.plots[len(channels) :]:
             self._layout.removeWidget(plot)
             plot.deleteLater()
@@ -199,12 +199,11 @@ class TimeHistoryPlots(QWidget):
         self._share_height()
 
     def _share_height(self) -> None:
-        """Give the last plot as much more as its time axis takes."""
         axis = TIME_AXIS_EM * self.fontMetrics().height()
         height = max(1, (self.height() - axis) // max(1, len(self.plots)))
         for place in range(len(self.plots)):
             self._layout.setStretch(place, height + (axis if place == len(self.plots) - 1 else 0))
-        # At once: a layout that comes after the first picture has everything painted twice.
+        # Activate the layout now, because a later change would repaint everything.
         self._layout.activate()
 
 
@@ -233,12 +232,12 @@ class TransmissibilityPlot(QWidget):
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.3)
         self.coherence.setXLink(self.magnitude)
-        # One frequency axis for both: the lower one's.
+        # The lower plot labels the frequency axis of both.
         self.magnitude.across.show_nothing()
         filled(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw what is known by now."""
+        """Draw the current estimates."""
         found = view.frequency_response()
         if found is None:
             return
@@ -247,11 +246,11 @@ class TransmissibilityPlot(QWidget):
         self._coherence.setData(found.frequency_hz, found.coherence)
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Lay a prediction beneath, or none."""
+        """Draw a prediction behind the estimates; None clears it."""
         show_predicted(self._predicted, seen)
 
     def clear(self) -> None:
-        """Forget the last run."""
+        """Clear the plot."""
         for curve in (self._measured, self._coherence):
             curve.clear()
         self._band.set_data([], [], [])
@@ -278,7 +277,7 @@ class SpectrumPlot(QWidget):
         filled(QVBoxLayout(self), self.plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw what is known by now."""
+        """Draw the current spectra."""
         found = view.spectrum()
         if found is None:
             return
@@ -291,14 +290,14 @@ class SpectrumPlot(QWidget):
             curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
 
     def _draw_anew(self) -> None:
-        """Draw in other units: the axis has that of each channel."""
+        """Redraw after a change of units; the axis has the unit of each channel."""
         self.plot.wipe()
         self._curves.clear()
         if self._view is not None:
             self.show_view(self._view)
 
     def clear(self) -> None:
-        """Forget the last run."""
+        """Clear the plot."""
         self._view = None
         for curve in self._curves:
             curve.clear()
@@ -309,12 +308,12 @@ _UP = PlotAxis("m0 velocity", "m/s", short="v")
 
 
 def extent(values: NDArray[np.floating]) -> tuple[float, float]:
-    """Smallest and largest."""
+    """Return the smallest and largest value."""
     return float(values.min()), float(values.max())
 
 
 class PortraitPlot(QWidget):
-    """Orbit on the left, points once a drive period on the right."""
+    """Phase portrait on the left, Poincaré section on the right."""
 
     title = "Phase portrait and Poincaré section"
     tab = "Phase portrait, Poincaré"
@@ -346,7 +345,7 @@ class PortraitPlot(QWidget):
         self._points.setData(section.displacement_m, section.velocity_m_per_s)
 
     def clear(self) -> None:
-        """Forget the last run."""
+        """Clear the plots."""
         for item in (self._orbit, self._strobe, self._points):
             item.clear()
 
@@ -354,7 +353,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Shades of a forecast; the last one is nearly gone where its error is a quarter of the gap, and it ends."""
+"""Shades of a forecast. It ends where its error is a quarter of the gap, with the faintest shade."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "p of m1 between its stops, while a test runs and the live twin is on."
@@ -366,7 +365,7 @@ def _faded(number: int, theme: Theme) -> Colour:
 
 
 class HiddenMotionPlot(QWidget):
-    """The newest 50 ms, what comes, and the numbers found."""
+    """The newest 50 ms of hidden motion, the forecast, and the estimated parameters."""
 
     title = "Hidden motion: m1 between its stops"
     tab = "Hidden motion"
@@ -380,14 +379,14 @@ class HiddenMotionPlot(QWidget):
         ]
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.said = SentenceLabel(rank="second")
-        self.said.setAccessibleName("What the live twin says")
+        self.said.setAccessibleName("Report of the live twin")
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
         filled(QVBoxLayout(self), self.said, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)
         self.clear()
 
     def show_status(self, status: EngineStatus | None) -> None:
-        """Draw what the twin told last, if that is news."""
+        """Draw the twin's newest status if it has changed."""
         twin = None if status is None else status.twin
         if twin is None:
             self.clear()
@@ -405,7 +404,7 @@ class HiddenMotionPlot(QWidget):
         self.plot.keep_in_view(up=(-reach, reach))
 
     def clear(self) -> None:
-        """Show nothing: there is no twin, or another run begins."""
+        """Clear the plot: there is no twin, or a new run begins."""
         for curve in (self.told, *self.forecast):
             curve.setData([], [])
         for line in self._stops:
@@ -414,14 +413,14 @@ class HiddenMotionPlot(QWidget):
         self._end = (0, -1)
 
     def _draw_forecast(self, twin: TwinStatus) -> None:
-        """Draw it in pieces, each as faint as its error is large."""
+        """Draw the forecast in pieces; a larger error gives a fainter piece."""
         p, error = np.array(twin.forecast_m), np.array(twin.forecast_error_m)
         time_s = np.arange(1, p.size + 1) * twin.step_s
         worth = _WORTH_OF_GAP * min(map(abs, twin.stops_m))
         shade = np.minimum(_SHADES * error / worth, _SHADES - 1).astype(int) if p.size else np.empty(0)
         for number, curve in enumerate(self.forecast):
             here = np.flatnonzero(shade == number)
-            # A piece begins where the one before has ended.
+            # Start each piece at the last point of the piece before.
             part = slice(max(here[0] - 1, 0), here[-1] + 1) if here.size else slice(0, 0)
             curve.setData(time_s[part], p[part])
 
@@ -430,5 +429,5 @@ def _words(twin: TwinStatus) -> str:
     numbers = "; ".join(f"{name} {value}" for name, value in twin.numbers[:3])
     parts = [twin.state, twin.sentence, numbers]
     if twin.missed_s:
-        parts.append(f"{twin.missed_s:.1f} s were not looked at: the computer was too busy")
+        parts.append(f"{twin.missed_s:.1f} s were skipped: the computer was too busy")
     return " · ".join(each for each in parts if each)

@@ -1,4 +1,4 @@
-"""The Run page: arm, start, watch; every picture is of the newest samples."""
+"""The Run page: arm, start, watch; the pictures show the newest samples."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -51,12 +51,12 @@ from .live_plots import (
 )
 
 _ROW = 1.9
-"""Height of a meter, in heights of the font."""
+"""Height of a level meter, in font heights."""
 _WORDS = {LevelVerdict.OVER: "✖ over", LevelVerdict.GOOD: "", LevelVerdict.QUIET: "⚠ quiet"}
 
 
 class LevelMeters(QWidget):
-    """One row a channel."""
+    """Level meters, one row per channel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -83,12 +83,12 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Room for four channels, which most benches have."""
+        """Room for four channels, the usual number."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
     def minimumSizeHint(self) -> QSize:
-        """Never less than the words need."""
+        """Room for the text."""
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -121,15 +121,15 @@ class LevelMeters(QWidget):
 
 
 SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
-"""Seconds in a time history."""
+"""Time ranges of the time histories [s]."""
 
 
 class WatchCard(QGroupBox):
-    """What is watched in numbers, and what may be done about the picture."""
+    """Progress, averages, impacts, time range, marks and the live twin's switch."""
 
     mark_wanted = Signal(str)
     reject_wanted = Signal()
-    """Take no result from the average of noise that is played."""
+    """Exclude the current average of noise from all results."""
     twin_wanted = Signal(object)
     """A `TwinSwitch`."""
 
@@ -143,7 +143,7 @@ class WatchCard(QGroupBox):
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
-        self.impacts.setToolTip("Kinks in the acceleration of m0, as the vibrometer sees them")
+        self.impacts.setToolTip("Jumps in the acceleration of m0, derived from the vibrometer signal")
         self.meters = LevelMeters(theme)
         self.span = Choice()
         for span_s in SPANS_S:
@@ -151,23 +151,23 @@ class WatchCard(QGroupBox):
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
         self.span.setToolTip("Seconds in a time history")
         self.freeze = QCheckBox("Freeze the picture  (Space)")
-        self.freeze.setToolTip("Only the picture stands still; the recording goes on")
+        self.freeze.setToolTip("Only the picture stops; the recording continues")
         self.twin = QCheckBox("Live twin")
         self.twin.setToolTip(
-            "Follow m1 between its stops, and note when the specimen changes. It is a process of its own: "
-            "the measurement does not wait for it"
+            "Estimate the motion of m1 between its stops, and report changes of the specimen. It runs in a "
+            "separate process, so that the measurement never waits"
         )
         self.twin.clicked.connect(
             lambda is_on: self.twin_wanted.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
         )
         self._begun = 0
         self.averages = QLabel("–")
-        self.averages.setToolTip("Averages of noise begun and planned")
+        self.averages.setToolTip("Averages of noise, started and planned")
         self.reject_button = push_button(
             "Reject this one", "Exclude the current average from all results", self.reject_wanted.emit
         )
         self.mark = LineField("event")
-        self.mark.setToolTip("What the mark in the recording says")
+        self.mark.setToolTip("Text of the mark in the recording")
         self.mark_button = QPushButton("Mark  (M)")
         self.mark_button.setToolTip("Put the mark at the next sample of the recording")
         self.mark_button.clicked.connect(self.wish_mark)
@@ -175,22 +175,22 @@ class WatchCard(QGroupBox):
 
     @property
     def span_s(self) -> float:
-        """Seconds in a time history."""
+        """Time range of the time histories [s]."""
         return SPANS_S[self.span.currentIndex()]
 
     def wish_mark(self) -> None:
-        """Ask for a mark with the text of the field."""
+        """Request a mark with the text of the field."""
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
-        """Show where the run stands; this many averages of noise are planned, 0 for anything else."""
+        """Show the state of the run; ``averages`` is the planned number for noise, else 0."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
         if run is None or not is_running or not averages:
             self._begun = 0
         else:
-            # While the next one settles, the last one counts.
+            # Count the previous average while the next one settles.
             self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
         self.reject_button.setEnabled(self._begun > 0)
         self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
@@ -241,42 +241,40 @@ UNREAD = "Read to the end  (PgDn)"
 
 
 class ArmCard(QGroupBox):
-    """Arm, then Start or Cancel; while something runs: hold, go on."""
+    """Buttons to arm, start, cancel, hold and resume, with the description of the armed plan."""
 
     arm_wanted = Signal()
     start_wanted = Signal()
     cancel_wanted = Signal()
     hold_wanted = Signal()
     news = Signal()
-    """Something else is armed: what will happen is to be read from its beginning."""
+    """Another plan was armed: scroll the description to its beginning."""
 
     def __init__(self) -> None:
         super().__init__("What will happen")
         self._words = SentenceLabel()
         self._words.setAccessibleName("What will happen")
         self.arm_button = push_button(
-            "A&rm…  (Ctrl+Return)", "Say in words what will happen", self.arm_wanted.emit
+            "A&rm…  (Ctrl+Return)", "Describe in words what will happen", self.arm_wanted.emit
         )
         self.arm_button.setProperty("rank", "first")
         self.cancel_button = push_button("Cancel", "Disarm; nothing was played", self.cancel_wanted.emit)
         self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit)
         self.start_button.setProperty("rank", "first")
-        self.hold_button = push_button(
-            "Hold", "Stay where the run is; the drive stays on", self.hold_wanted.emit
-        )
+        self.hold_button = push_button("Hold", "Hold the run; the drive stays on", self.hold_wanted.emit)
         filled(QVBoxLayout(self), self._words)
         self.buttons = column(
             self.arm_button, row(self.cancel_button, (self.start_button, 1)), self.hold_button
         )
-        """What can be done now; it stays in sight when the words are scrolled."""
+        """The possible commands; they do not scroll with the description."""
         self._armed: tuple[str, ...] = ()
-        """What is armed, in words; nothing while nothing is."""
+        """Description of the armed plan; empty when nothing is armed."""
         self._read: tuple[str, ...] = ()
-        """Words whose end has been in sight."""
+        """Description whose end was displayed."""
 
     @property
     def is_read(self) -> bool:
-        """Whether the end of what will happen has been in sight: only then it may be started."""
+        """Whether the end of the description was displayed; starting requires it."""
         words = self._words
         end = QPoint(0, words.height() - 1)
         is_whole = words.height() >= words.heightForWidth(words.width())
@@ -286,11 +284,11 @@ class ArmCard(QGroupBox):
 
     @property
     def words(self) -> str:
-        """What is said."""
+        """The displayed text."""
         return self._words.text()
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
-        """Show what can be done now; ``reason`` says why the test cannot be armed, empty when it can."""
+        """Show the possible commands; ``reason`` tells why the test cannot be armed, empty when it can."""
         state = EngineState.CLOSED if status is None else status.state
         armed = None if status is None else status.armed
         is_armed = state is EngineState.ARMED and armed is not None
@@ -312,7 +310,7 @@ class ArmCard(QGroupBox):
         if words != self._armed:
             self._armed, self._read = words, ()
             if words:
-                # To start needs another key than the one that armed.
+                # Arming and starting need different keys.
                 self.cancel_button.setFocus()
                 self.news.emit()
         self.start_button.setEnabled(self.is_read)
@@ -324,12 +322,12 @@ class ArmCard(QGroupBox):
 
 
 LAYOUT_ROUNDS = 4
-"""A scroll bar that comes makes the words narrower, and longer."""
+"""Layout passes until a scroll bar and the line breaks agree."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
 class RunPage(Page):
-    """Viewer of the engine's run: it keeps nothing but what is on the screen."""
+    """Displays the engine's run; it stores no data of the run."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -359,12 +357,12 @@ class RunPage(Page):
         self._show_channels()
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
 
     @property
     def is_done(self) -> bool:
-        """Something was recorded since the window opened."""
+        """Ticked when something was recorded since the window opened."""
         return self._ended is not None
 
     def refresh(self) -> None:
@@ -379,7 +377,7 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The buttons that had the focus are gone; without this the next list in the row would have it.
+            # The focused buttons are hidden; without this call the next list in the row would get the focus.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._played
@@ -407,7 +405,7 @@ class RunPage(Page):
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """Pictures and numbers, of the run that they are of; frozen ones are what somebody wants to see."""
+        """Pictures and numbers, with their run as input; frozen pictures are not marked as outdated."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
         return tuple(Shown(each, self._view, self.context.bridge.view) for each in self._of_the_run)
@@ -418,7 +416,7 @@ class RunPage(Page):
         return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Space freezes, M marks, PgDn reads on; all are left to fields and buttons that use them."""
+        """Space freezes, M marks, PgDn scrolls; fields and buttons that use these keys keep them."""
         bar = self._parts.side.verticalScrollBar()
         match event.key():
             case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
@@ -442,7 +440,7 @@ class RunPage(Page):
         }
 
     def _begin(self, view: LiveView) -> None:
-        """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
+        """Clear the pictures, show the run's prediction, and select the pictures of its excitation."""
         self._view = view
         measurement = self._played
         prediction = self.context.selection.prediction
@@ -456,7 +454,7 @@ class RunPage(Page):
         self._show_prediction(prediction)
         if measurement is not None:
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
-                # What the check plays before the run lies outside, and would make the band small.
+                # The signal of a preceding check lies outside and would compress the plotted band.
                 plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
         shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
         self.left_tabs.setCurrentWidget(pictures[shown.left])
@@ -476,7 +474,7 @@ class RunPage(Page):
         self.look_button.show()
 
     def _show_channels(self) -> None:
-        """Have the plots before the first sample: to make them in a run would cost it a moment."""
+        """Create the plots before the first sample, because a run has no time for it."""
         rig = self.context.selection.rig
         if rig is not None:
             self.time_histories.show_channels(
@@ -494,7 +492,6 @@ class RunPage(Page):
 
     @property
     def _played(self) -> Measurement | None:
-        """The measurement that runs, where its plan is known."""
         status = self.context.bridge.status
         run = None if status is None else status.run
         return None if run is None else measurement_called(self.context.bridge.campaign, run.name)
@@ -511,7 +508,7 @@ class RunPage(Page):
             self.right_tabs.setCurrentWidget(self.hidden_motion)
 
     def _is_armed_read(self) -> bool:
-        """Look now: what was armed a moment ago may not have been laid out yet."""
+        """Return whether the description was read; check now, since a new one may not be laid out yet."""
         self.refresh()
         for _ in range(LAYOUT_ROUNDS):
             QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
@@ -526,7 +523,7 @@ class RunPage(Page):
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         self.watch_card.reject_wanted.connect(self._reject)
-        # Until the next tick the picture of a run that has ended meanwhile would pass for that of this one.
+        # Otherwise the pictures of a finished run would pass for those of this run until the next tick.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_wanted.connect(self._turn_twin)
         self.look_button.clicked.connect(self._look)

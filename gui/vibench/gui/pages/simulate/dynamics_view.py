@@ -1,4 +1,4 @@
-"""A tab of the Simulate page: a form, an answer that grows piece by piece, and its cost and error."""
+"""A tab of the Simulate page: a form, the growing result, and its cost and error."""
 
 import time
 from collections.abc import Callable
@@ -37,36 +37,34 @@ Shown_contra = TypeVar("Shown_contra", contravariant=True)
 
 
 class AnswerPicture(Protocol[Shown_contra]):
-    """Draws an answer as far as it has come."""
+    """Draws a result, complete or not."""
 
     @property
     def widget(self) -> QWidget:
-        """What is put into the tab."""
+        """Widget of the plots."""
 
     def show_answer(self, answer: Shown_contra) -> None:
-        """Draw again."""
+        """Draw a result."""
 
 
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
-    """Request of a tab, and how its answer is shown."""
+    """Request type of a tab, and functions that describe its result."""
 
     name: str
     request: type[Request]
     hidden: frozenset[str]
-    """Fields that a form cannot show."""
+    """Fields of the request without an editor."""
     answer: Callable[[Request, tuple[PartialResult, ...], float], Answer]
-    """From the pieces so far, and the seconds they took."""
+    """Assembles the result from the pieces so far and the seconds elapsed."""
     cost: Callable[[Answer], str]
     curves: Callable[[Answer], tuple[Curve, ...]]
     before: str
-    """What an answer costs and errs, said before there is one."""
+    """Text on cost and error, shown before a result exists."""
 
 
 @dataclass
 class _Course:
-    """An answer under way."""
-
     request: Asked
     began: float
     parts: list[PartialResult] = field(default_factory=list)
@@ -74,7 +72,7 @@ class _Course:
 
 
 class DynamicsView(QWidget, Generic[Request, Answer]):
-    """The form on the left; on the right the picture, its cost and error below it."""
+    """The form on the left; on the right the plots, with cost and error below."""
 
     def __init__(
         self, context: AppContext, kind: DynamicsKind[Request, Answer], picture: AnswerPicture[Answer]
@@ -93,27 +91,27 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     @property
     def said(self) -> str:
-        """What stands below the picture."""
+        """Text below the plots."""
         return self._state.text()
 
     @property
     def shown(self) -> Shown:
-        """The picture, of what was asked."""
+        """The plots, with the request as input."""
         asked = None if self._course is None else self._course.request
         return Shown(self.picture.widget, asked, self.form.value)
 
     def refresh(self) -> None:
-        """Draw what has come since the last time."""
+        """Draw the pieces received since the last tick."""
         if self._is_stale and self.answer is not None:
             self._is_stale = False
             self.picture.show_answer(self.answer)
 
     def left(self) -> None:
-        """Keep how the tab is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
 
     def begin(self) -> None:
-        """Ask what the form says."""
+        """Compute the request of the form."""
         request = self.form.value
         if request is None:
             return
@@ -121,12 +119,12 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._judge()
         self._take(())
         self.simulator.begin(request)  # type: ignore[arg-type]
-        self._say("Looking; the first answer waits for the program to be made ready…")
+        self._say("Computing; the program is being loaded for the first result…")
 
     def cancel(self) -> None:
-        """Want no more; what has been found stays."""
+        """Cancel the computation; pieces found so far stay."""
         self.simulator.cancel()
-        self._say("Cancelled; what had been found is shown.")
+        self._say("Cancelled; the results so far are shown.")
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         self._take(parts)
@@ -154,7 +152,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _die(self, what: str) -> None:
         self.context.say(
-            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Ask again.", "SIMULATOR")
+            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Ask again.", "SIMULATOR")
         )
         self._say("It broke off.")
 
@@ -186,14 +184,14 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return column(scene, before, 1)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
+        self._begin = push_button("Find", "Compute the request of the form in another process", self.begin)
         self._begin.setProperty("rank", "first")
-        self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
+        self._cancel = push_button("Cancel", "Stop; the results so far stay", self.cancel)
         self._cancel.setEnabled(False)
         return row((self._begin, 1), self._cancel)
 
     def _right(self) -> QWidget:
-        self._state = SentenceLabel("Nothing has been asked yet.")
+        self._state = SentenceLabel("Nothing has been computed yet.")
         self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
             "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
@@ -217,7 +215,7 @@ def _chain(request: ChainRequest, parts: tuple[PartialResult, ...], elapsed_s: f
 
 
 def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
-    """Exponents and chains are no responses of a specimen: nothing to lay over a recording."""
+    """Return no curves: exponents and chains are not comparable with the response of a recording."""
     return ()
 
 
@@ -229,8 +227,8 @@ BRANCHES = DynamicsKind(
     cost=lambda answer: answer.cost_sentence,
     curves=lambda answer: answer.curves(),
     before=(
-        "A search runs every start for 300 drive periods, a branch takes a second to some; the error of each "
-        "motion is told with it (docs/branches.md)."
+        "A search runs every start for 300 drive periods. A branch takes one to several seconds. Each "
+        "motion is shown with its error (docs/branches.md)."
     ),
 )
 SPECTRUM = DynamicsKind(
@@ -241,8 +239,8 @@ SPECTRUM = DynamicsKind(
     cost=lambda answer: answer.cost_sentence,
     curves=_no_curves,
     before=(
-        "Each point follows six small changes for its whole duration; the sum of the exponents, which the "
-        "dampers fix, is its check (docs/branches.md)."
+        "Each point integrates six perturbations over its whole duration. The sum of the exponents is "
+        "known from the damping and checks the result (docs/branches.md)."
     ),
 )
 CHAIN = DynamicsKind(
@@ -253,8 +251,8 @@ CHAIN = DynamicsKind(
     cost=lambda answer: answer.cost_sentence,
     curves=_no_curves,
     before=(
-        "Waves need no run. A simulated second of 8 cells that strike takes some hundredths of a second, of "
-        "64 cells a third; contacts err as the accuracy says, energies carry their standard error "
-        "(docs/chains.md)."
+        "Waves need no run. One simulated second with contacts takes a few hundredths of a second for 8 "
+        "cells, a third of a second for 64. Errors of contacts follow the accuracy; energies have a "
+        "standard error (docs/chains.md)."
     ),
 )

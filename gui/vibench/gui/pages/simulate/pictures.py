@@ -1,4 +1,4 @@
-"""Pictures of branches and of exponents, over frequency or level."""
+"""Plots of simulations: branches, exponents, chains, responses, motion and similarity."""
 
 import math
 from collections.abc import Callable
@@ -33,11 +33,11 @@ DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
 _FIRST_SPECIAL_COLOUR = 1
-"""The first is that of motions of one period."""
+"""Colour 0 is used for motions of one drive period."""
 
 
 class _TwoPlots(QStackedWidget):
-    """Two plots above one another, once over frequency and once over level."""
+    """Two pairs of plots, one over frequency and one over level; one pair is visible."""
 
     def __init__(self, theme: Theme, titles: tuple[str, str], axes: tuple[PlotAxis, PlotAxis], hint: str):
         super().__init__()
@@ -52,7 +52,7 @@ class _TwoPlots(QStackedWidget):
             self.addWidget(column((first, 1), (second, 1)))
 
     def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Bring the pair of a parameter to the front, empty."""
+        """Show the empty pair of plots over a parameter."""
         self.setCurrentIndex(list(ACROSS).index(along))
         pair = self.pairs[along]
         for plot in pair:
@@ -61,19 +61,17 @@ class _TwoPlots(QStackedWidget):
 
 
 class _PairPicture:
-    """What pictures of two plots have alike."""
-
     def __init__(self, plots: _TwoPlots) -> None:
         self.widget = plots
-        """Both plots."""
+        """Widget of the plots."""
 
     def plots(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Those over one parameter."""
+        """Return the pair of plots over a parameter."""
         return self.widget.pairs[along]
 
 
 class BranchPicture(_PairPicture):
-    """Stable motions solid, unstable ones dashed; longer periods in other colours; special points marked."""
+    """Stable motions solid, unstable dashed; coloured by period; special points marked."""
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
@@ -105,7 +103,7 @@ class BranchPicture(_PairPicture):
 
 
 class SpectrumPicture(_PairPicture):
-    """Six exponents with their intervals, and the dimension with its own."""
+    """Six exponents with their intervals, and the dimension with its interval."""
 
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, as they are found."
@@ -113,7 +111,7 @@ class SpectrumPicture(_PairPicture):
         super().__init__(_TwoPlots(theme, titles, (EXPONENT, DIMENSION), hint))
 
     def show_answer(self, answer: ExponentSpectrum) -> None:
-        """Draw what is there."""
+        """Draw the spectra found so far."""
         along = answer.request.along
         upper, lower = self.widget.cleared(along)
         if not answer.points:
@@ -153,32 +151,32 @@ PLACE = PlotAxis("Cell, from the base", short="Cell")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
 _GAP = LineStyle(lambda theme: theme.muted, filled=0.14)
 _SMALLEST = 1e-8
-"""Transmissions below are drawn at the foot of the axis."""
+"""Smaller transmissibilities are drawn at this value."""
 _MOST_TRACES = 32
-"""Cells whose motion is drawn, evenly chosen in longer chains."""
+"""Most traces of motion; longer chains show evenly spaced cells."""
 _HEIGHT = 0.45
 """Height of the largest motion, in cells."""
 
 
 class ChainPicture:
-    """Three plots above one another, drawn again as runs come in."""
+    """Three plots of a chain, redrawn as runs finish."""
 
     def __init__(self, theme: Theme) -> None:
         self.across = Plot("Transmission along the chain over frequency", FREQUENCY, ALONG_CHAIN, theme)
         self.motion = Plot("Motion of m0 over place and time", TIME, PLACE, theme)
         self.energies = Plot("Energy of the cells", PLACE, ENERGY, theme)
-        self.across.with_legend().with_hint("Dashed: without contact; grey: gaps of the endless chain.")
+        self.across.with_legend().with_hint("Dashed: without contact; grey: band gaps of the infinite chain.")
         self.motion.with_hint("m0 of every cell over time, with its impacts, in the last run.")
         self.energies.with_legend().with_hint("Mean energy of every cell, in the last run.")
         self.widget = column(*((plot, 1) for plot in self.plots))
 
     @property
     def plots(self) -> tuple[Plot, Plot, Plot]:
-        """All three."""
+        """All plots."""
         return self.across, self.motion, self.energies
 
     def show_answer(self, answer: ChainAnswer) -> None:
-        """Draw what is there."""
+        """Draw the results so far."""
         for plot in self.plots:
             plot.wipe()
         self._show_across(answer)
@@ -235,11 +233,11 @@ _HINTS = (
     "How far the two models differ, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
-"""Equal curves have no logarithm: they are drawn at the foot of the axis."""
+"""Smaller differences are drawn at this value, because equal curves have no logarithm."""
 
 
 class AnswerPlots(QWidget):
-    """Drawn again from the course of a simulation, as often as it grows."""
+    """Four plots of a simulation, redrawn as it grows."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -257,16 +255,16 @@ class AnswerPlots(QWidget):
 
     @property
     def plots(self) -> tuple[Plot, ...]:
-        """All four, row by row."""
+        """All plots, row by row."""
         return (self.responses, self.motion, self.exponents, self.likeness)
 
     def show_progress(self, progress: SimulationProgress | None) -> None:
-        """Draw what is there."""
+        """Draw the results so far."""
         for step in self.steps(progress):
             step()
 
     def steps(self, progress: SimulationProgress | None) -> list[Callable[[], None]]:
-        """Draw what is there picture by picture: together they take longer than a frame has."""
+        """Return one drawing function per plot, because drawing all takes longer than a frame."""
         draws = (self._responses, self._motion, self._exponents, self._likeness)
         return [
             partial(_draw_anew, plot, draw, progress) for plot, draw in zip(self.plots, draws, strict=True)

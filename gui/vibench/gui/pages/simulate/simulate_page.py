@@ -1,4 +1,4 @@
-"""Simulate: a scene as a form, its cost beside it, and curves that grow while they are computed."""
+"""Simulate: a scene as a form, its cost, and curves that grow while they are computed."""
 
 import json
 import os
@@ -27,11 +27,11 @@ from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
 from .pictures import AnswerPlots, BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
-"""Lines of the table of motions, headings among them."""
+"""Lines of the table of motions, including the heading."""
 
 
 class SimulatePage(Page):
-    """The form on the left; the answer on the right, as far as it has come."""
+    """The form on the left, the results on the right."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -41,9 +41,9 @@ class SimulatePage(Page):
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.progress: SimulationProgress | None = None
-        """What has been found so far."""
+        """Results so far."""
         self._request: SimulationRequest | None = None
-        """What the curves are of."""
+        """Request of the displayed curves."""
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
@@ -53,7 +53,7 @@ class SimulatePage(Page):
         self._build()
         self.form.changed.connect(self._say_cost)
         context.scene_wanted.connect(self.show_scene)
-        with suppress(ValueError):  # of another version, or written by somebody
+        with suppress(ValueError):  # stored by another version or edited by hand
             self.form.form.show_content(dict(json.loads(context.settings.text(Remembered.SCENES))))
         if self.form.value is None:
             self.form.form.show_content({})
@@ -62,15 +62,15 @@ class SimulatePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked once there is a whole answer."""
+        """Ticked when a simulation is complete."""
         return self.progress is not None and not self.simulator.is_busy and self.progress.done > 0
 
     def refresh(self) -> None:
-        """Draw what has come since the last time, a picture a tick."""
+        """Draw the results received since the last tick, one plot per tick."""
         if self._is_stale and not self._undrawn:
             self._is_stale = False
             self._undrawn = self.plots.steps(self.progress)
-            # Points that came to more than one motion; without any there is no table.
+            # Points with several motions; the table is hidden without any.
             rows = () if self.progress is None else self.progress.motion_rows
             self.motions.show_rows(rows)
             self.motions.setVisible(bool(rows))
@@ -80,7 +80,7 @@ class SimulatePage(Page):
             view.refresh()
 
     def left(self) -> None:
-        """Keep how the page is divided."""
+        """Store the position of the divider."""
         self._parts.keep()
         kept = self.form.form.content()
         self.context.settings.keep_text(Remembered.SCENES, json.dumps(kept))
@@ -89,16 +89,16 @@ class SimulatePage(Page):
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """The curves, of the scene that was asked for."""
+        """The curves, with their request as input."""
         return (Shown(self.plots, self._request, self.form.value), *(view.shown for view in self._views))
 
     @property
     def styled(self) -> tuple[QWidget, ...]:
-        """Its tabs: each has as many fields as another page."""
+        """The tabs, each of which has as many fields as another page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:
-        """Simulate what the form says."""
+        """Simulate the scene of the form."""
         request = self.form.value
         if request is None:
             return
@@ -112,10 +112,10 @@ class SimulatePage(Page):
         self.plots.setEnabled(True)
         self._bar.begin()
         self.simulator.begin(request)
-        self._say_progress("Simulating; the first answer waits for the program to be made ready…")
+        self._say_progress("Simulating; the program is being loaded for the first result…")
 
     def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Fill the form in for the surroundings of a drive, and for its time signal."""
+        """Set the form to a frequency range around a drive, and to the time signal at that drive."""
         content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
         content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
         content["step_hz"] = 0.01 * frequency_hz
@@ -123,9 +123,9 @@ class SimulatePage(Page):
         self.tabs.setCurrentIndex(0)
 
     def cancel(self) -> None:
-        """Stop at once; what has been found stays."""
+        """Stop the computation; points found so far stay."""
         self.simulator.cancel()
-        self._say_progress("Cancelled; what had been found is shown.")
+        self._say_progress("Cancelled; the results so far are shown.")
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         if self.progress is not None:
@@ -136,17 +136,21 @@ class SimulatePage(Page):
     def _end(self) -> None:
         self._is_stale = True
         troubles = () if self.progress is None else self.progress.troubles
-        said = "Complete." if not troubles else f"Complete but for {len(troubles)} points."
+        said = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
         forgotten = 0 if self.progress is None else self.progress.forgotten
-        self._say_progress(f"{said} At {forgotten} points the start is forgotten." if forgotten else said)
+        self._say_progress(
+            f"{said} At {forgotten} points the motion depends sensitively on the start."
+            if forgotten
+            else said
+        )
         if troubles:
             self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
 
     def _die(self, what: str) -> None:
         self.context.say(
-            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
+            Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Simulate again.", "SIMULATOR")
         )
-        self._say_progress("The simulation broke off.")
+        self._say_progress("The simulation failed.")
 
     def _say_cost(self) -> None:
         request = self.form.value
@@ -189,9 +193,11 @@ class SimulatePage(Page):
         return column(scene, cost, 1)
 
     def _buttons(self) -> QLayout:
-        self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)
+        self._begin = push_button(
+            "&Simulate", "Compute the request of the form in another process", self.begin
+        )
         self._begin.setProperty("rank", "first")
-        self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
+        self._cancel = push_button("&Cancel", "Stop at once; the results so far stay", self.cancel)
         return row((self._begin, 1), self._cancel)
 
     def _answer(self) -> QWidget:
@@ -203,7 +209,7 @@ class SimulatePage(Page):
             "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
         )
         self.motions = ReadTable(
-            "Motions of points whose start is forgotten, and their shares", MOTION_COLUMNS
+            "Motions of points that depend sensitively on the start, and their shares", MOTION_COLUMNS
         )
         self.motions.setMaximumHeight(_LINES * self.motions.verticalHeader().defaultSectionSize())
         self.motions.hide()

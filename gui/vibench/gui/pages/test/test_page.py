@@ -1,4 +1,4 @@
-"""The Test page: a form of what will be played, and beside it exactly what that is and does."""
+"""The Test page: a form of the next test, with preview and prediction."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -80,7 +80,7 @@ USUAL = {
     "spectrum": [{"frequency_hz": 40.0, "density": 1e-3}, {"frequency_hz": 600.0, "density": 1e-3}],
     "accelerations_m_per_s2": [0.3, 0.6],
 }
-"""What a kind of test that needs a value, and was given none, begins with."""
+"""Starting values of required fields for every kind of test."""
 
 FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     {
@@ -91,11 +91,11 @@ FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     },
     {},
 )
-"""What a kind begins with, whatever the one before it had."""
+"""Starting values by kind, used in place of the values of the previous kind."""
 
 
 class TestForm(JudgedForm[Measurement]):
-    """Every value of a measurement; `value` is None while one of them is not allowed."""
+    """Form of a measurement; `value` is None while it is not valid."""
 
     def __init__(self) -> None:
         super().__init__(Measurement, "test", frozenset({"repeats"}))
@@ -111,27 +111,27 @@ class TestForm(JudgedForm[Measurement]):
         choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
 
     def _rename(self, kind: str) -> None:
-        """Give a test of a new kind its name: the old one would say something else."""
+        """Rename the test after a change of kind, because the old name describes the old kind."""
         self.form.editors["name"].show_content(kind)
         self.form.changed.emit()
 
 
 FIRST = "quick"
-"""The campaign whose tests are listed before all others."""
+"""The campaign whose tests are listed first."""
 MOST_OF_ONE = 12
-"""Tests listed of one campaign; sweeps make hundreds."""
+"""Most tests listed of one campaign; sweeps have hundreds."""
 
 
 @dataclass(frozen=True)
 class NamedTest:
-    """A test and where it is from."""
+    """A test and its origin."""
 
     label: str
     measurement: Measurement
 
 
 def shipped_tests() -> tuple[NamedTest, ...]:
-    """Every measurement of the campaigns that come with vibench and need no package that is missing."""
+    """Return the tests of the shipped campaigns whose required packages are installed."""
     campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
     return tuple(
         NamedTest(f"{campaign.name} / {each.name}", each)
@@ -141,7 +141,7 @@ def shipped_tests() -> tuple[NamedTest, ...]:
 
 
 def own_tests(folder: Path) -> tuple[NamedTest, ...]:
-    """Every test that was saved in a folder; a file that cannot be read is left out."""
+    """Return the tests saved in a folder; unreadable files are skipped."""
     found = _readable(sorted(folder.glob("*.toml")), load_test)
     return tuple(NamedTest(f"own / {path.stem}", test) for path, test in found)
 
@@ -153,7 +153,7 @@ def _readable(paths: Iterable[Path], load: Callable[[Path], Any]) -> Iterator[tu
 
 
 def load_test(path: Path) -> Measurement:
-    """Read a test; raises ConfigurationError with file, key and what is allowed."""
+    """Return the test of a file; raises ConfigurationError with file, key and allowed values."""
     return load_toml(path, Measurement)
 
 
@@ -161,7 +161,7 @@ COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
 
 
 class PredictionPlot(Plot):
-    """Simulated, and labelled so: dashed lines, the model in the legend, collision regions as stripes."""
+    """Simulated response: dashed lines, the model in the legend, collision regions as stripes."""
 
     def __init__(self, theme: Theme) -> None:
         up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
@@ -192,15 +192,15 @@ class PredictionPlot(Plot):
 
 
 _FLOOR = 1e-5
-"""Lines this far below the highest are numerical dust."""
+"""Relative level below which spectral lines are rounding errors."""
 _LEAST_HZ = 1.0
-"""Nothing below is of interest: no shaker moves there."""
+"""Lower end of the spectrum; no shaker moves below it."""
 _LEAST_LINES = 9
-"""Fewest lines of text: less says nothing."""
+"""Smallest useful height of the text, in lines."""
 
 
 class PreviewPlots(QWidget):
-    """Two plots side by side; a zoom into the time signal shows its samples."""
+    """Two plots side by side; zooming into the time signal shows its samples."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -218,7 +218,7 @@ class PreviewPlots(QWidget):
         filled(QHBoxLayout(self), (self.time, 1), (self.spectrum, 1), margin=0)
 
     def show_preview(self, seen: MeasurementPreview) -> None:
-        """Draw another signal."""
+        """Draw the preview of a test."""
         self.time.show_everything()
         self._signal.set_samples(seen.volts, seen.sample_rate_hz)
         floor_v = _FLOOR * float(np.max(seen.spectrum_v))
@@ -232,14 +232,14 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
 class LimitTable(ReadTable):
-    """One row a limit, the most used first."""
+    """One row per limit, the most used first."""
 
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
-        """Show what was checked against the rig."""
+        """Show the loads checked against the rig's limits."""
         units = [fitted_unit(check.unit, check.limit) for check in checks]
         self.show_rows(
             [
@@ -283,9 +283,9 @@ _SHOWN = {
 
 
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
-    """Return what is played; then peak stroke, acceleration, force and volts beside their limits, time, size.
+    """Return excitation, loads beside their limits, time and size in words.
 
-    ``refusal`` is why a fast loop would not hold it.
+    ``refusal`` tells why feedback control would not hold the motion.
     """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
@@ -295,7 +295,9 @@ def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     parts.append(f"takes {clock(seen.duration_s)}")
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
     if seen.least_growth_time_s is not None:
-        parts.append(f"holds motions that take {seen.least_growth_time_s:.3g} s or more to grow by e")
+        parts.append(
+            f"holds motions that take {seen.least_growth_time_s:.3g} s or more to grow by a factor e"
+        )
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
     said = "   ·   ".join(parts)
@@ -315,9 +317,9 @@ def _load(check: LimitCheck, name: str) -> str:
 
 Asked = tuple[Measurement | None, Rig | None] | None
 NAMELESS = {"name": "test", "notes": ""}
-"""What is predicted of a test depends on neither."""
+"""Name and notes of a test in predictions, which depend on neither."""
 LOOK_MS, PREDICT_MS = 200, 900
-"""How long a test stands unchanged before it is previewed, and before it is simulated."""
+"""Delays between the last edit and preview or simulation [ms]."""
 
 
 class TestPage(Page):
@@ -362,25 +364,25 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """The test is complete, keeps every limit, and no fast loop is known to lose it."""
+        """Ticked when the test is valid, within all limits, and no feedback is known to lose it."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
     def is_busy(self) -> bool:
-        """Whether a preview or a prediction is still to come."""
+        """Whether a preview or a prediction is being computed."""
         return self._looking.is_busy or self._predicting.is_busy
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Tests."""
+        """Files of tests."""
         return {FileKind.TEST: self.open_file}
 
     def undo(self) -> None:
-        """Take back an edit of the test."""
+        """Undo an edit of the test."""
         self._show_again(self._history.undo())
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo an edit."""
         self._show_again(self._history.redo())
 
     def _show_again(self, measurement: Measurement | None) -> None:
@@ -389,7 +391,7 @@ class TestPage(Page):
 
     @property
     def shown(self) -> tuple[Shown, ...]:
-        """Loads, pictures and prediction, each of the test and rig it was worked out for."""
+        """Loads, plots and prediction, each with its test and rig as inputs."""
         wanted = self._wanted
         return (
             Shown(self.summary, self._summary_of, wanted),
@@ -400,13 +402,12 @@ class TestPage(Page):
 
     @property
     def _wanted(self) -> tuple[Measurement | None, Rig | None]:
-        """The test, without its name, and the rig."""
         value = self.form.value
         nameless = None if value is None else value.model_copy(update=NAMELESS)
         return nameless, self.context.selection.rig
 
     def left(self) -> None:
-        """Keep the test for next time, and how the page is divided."""
+        """Store the test and the position of the divider."""
         self._parts.keep()
         measurement = self.form.value
         if measurement is not None:
@@ -419,12 +420,12 @@ class TestPage(Page):
         if measurement is not None:
             self._history.note(measurement)
             if asked == self._asked:
-                # Another name alone: what is predicted of the test, or will be, stays.
+                # A new name changes no prediction.
                 if seen is not None:
                     self.context.selection.keep_prediction(seen)
                 return
         self._preview, self._refusal = None, ""
-        # What stands there belongs to another test until its own has come.
+        # Mark the old prediction as outdated until the new one arrives.
         self._asked = self._summary_of = asked
         measurement, rig = asked
         for each in (self.limits, self.plots, self.prediction, self.prediction_note):
@@ -487,7 +488,7 @@ class TestPage(Page):
         self._tests = (*own_tests(self._own_folder), *shipped_tests())
         self.choice.blockSignals(True)
         self.choice.clear()
-        self.choice.addItem("take over a test…")
+        self.choice.addItem("load a test…")
         for test in self._tests:
             self.choice.addItem(printable(test.label))
         self.choice.blockSignals(False)
@@ -517,7 +518,7 @@ class TestPage(Page):
             self.save_as(measurement, Path(given))
 
     def save_as(self, measurement: Measurement, path: Path) -> None:
-        """Keep a test under a name; it is listed from now on if it lies in the folder of tests."""
+        """Save a test; it is listed from now on if it is in the folder of tests."""
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
@@ -533,7 +534,7 @@ class TestPage(Page):
             self.open_file(Path(given))
 
     def open_file(self, path: Path) -> None:
-        """Take over the test of a file."""
+        """Load the test of a file."""
         try:
             self.form.show_value(load_test(path))
             self.context.note_file(path)
@@ -568,18 +569,18 @@ class TestPage(Page):
             2,
             1,
         )
-        # Below, words take their part of the height.
+        # The lower parts of the page share the remaining height.
         cells.setRowStretch(1, 2)
         cells.setRowStretch(2, 3)
         for table in (self.limits, self.prediction):
-            # Neither asks for more height than the preview: they share what is there.
+            # Neither plot may ask for more height than the preview; they share the remaining height.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
         filled(QVBoxLayout(self), self._parts)
 
 
 def _kept_test(text: str) -> Measurement | None:
-    """Read what was kept; a test of an older version that is not allowed any more is left alone."""
+    """Return a stored test; None if an older version stored one that is no longer valid."""
     try:
         return validated(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):

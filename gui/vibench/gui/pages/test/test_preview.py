@@ -1,4 +1,4 @@
-"""What is worked out about a test in another process: its outlook, and what the specimen will do."""
+"""Preview and prediction of a test, computed in another process."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -21,24 +21,24 @@ class TestPreview:
 
 
 def preview_test(test: TestPreview) -> MeasurementPreview:
-    """Work out signal, loads, time and size."""
+    """Return signal, loads, time and size."""
     return preview_measurement(test.measurement, test.rig)
 
 
 @dataclass(frozen=True, eq=False)
 class TestPrediction:
-    """What a test will do, and how well it will tell what it is made for."""
+    """Predicted response, and the predicted quality of the result."""
 
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
     recorded_s: float | None
     """Predicted time of recording with `until` [s]; None if it is not known, or without `until`."""
     refusal: str
-    """Why feedback on the rig would not hold it; empty where nothing speaks against it."""
+    """Why feedback on the rig would not hold the motion; empty without an objection."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
-    """Simulate what the specimen will do."""
+    """Simulate the response of the specimen."""
     refusal = ""
     try:
         test.measurement.excitation.require_holdable(test.rig)
