@@ -92,8 +92,8 @@ def test_nothing_of_an_engine_that_was_killed_is_taken_for_the_next_one(window, 
     assert not bridge.is_ordering
     for _ in run():
         window.tick()
-        assert not any(each.widget.isEnabled() for each in page.shown), "pictures of another run"
+        assert not any(each.widget.isEnabled() for each in page.displayed_results), "pictures of another run"
     window.tick()
     assert bridge.view is not first
-    assert page.shown
-    assert all(each.inputs is bridge.view and each.widget.isEnabled() for each in page.shown)
+    assert page.displayed_results
+    assert all(each.inputs is bridge.view and each.widget.isEnabled() for each in page.displayed_results)

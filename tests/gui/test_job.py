@@ -194,7 +194,7 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, w
     key(Qt.Key.Key_A, CONTROL)
     key(Qt.Key.Key_M, ALT)
     qtbot.waitUntil(lambda: bench.page is compare)
-    qtbot.waitUntil(lambda: len(compare.curves.shown()) == before + 1, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: len(compare.curves.displayed_results()) == before + 1, timeout=PATIENCE_MS)
     timer = type_into_dialog(qtbot, str(tmp_path / "overlay.svg"))
     key(Qt.Key.Key_X, ALT)
     qtbot.waitUntil((tmp_path / "overlay.svg").exists, timeout=PATIENCE_MS)
@@ -313,7 +313,7 @@ def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
     assert drive_is_on(bench)
     bench.user_actions.hold_or_resume()
     reach(qtbot, bench, EngineState.RUNNING)
-    bench.banner.stop_wanted.emit()
+    bench.banner.stop_requested.emit()
     reach(qtbot, bench, EngineState.READY)
     assert recorded(bench).state == "stopped"
     with open_recording(recorded(bench).file) as recording:
@@ -343,7 +343,7 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     page.watch_card.freeze.setChecked(False)
     now = page.time_histories.plots[0].getPlotItem().listDataItems()[0].getData()[0]
     assert now.shape != frozen.shape or (now != frozen).any(), "what was frozen is old at once"
-    assert all(each.is_true for each in page.shown)
+    assert all(each.is_current for each in page.displayed_results)
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
     # An abort goes before what waits in line.

@@ -179,8 +179,8 @@ class Robot:
     def look(self):
         """No number may belong to other inputs."""
         for name, page in self.window.pages.items():
-            for shown in page.shown:
-                if not shown.is_true:
+            for shown in page.displayed_results:
+                if not shown.is_current:
                     self.find(
                         f"{name}: {shown.widget.accessibleName() or type(shown.widget).__name__} shows "
                         f"{str(shown.inputs)[:300]} while {str(shown.wanted)[:300]} is asked for"
@@ -320,7 +320,7 @@ class Robot:
             QTest.keyClick(self._target(), Qt.Key.Key_Escape)
             ramp_s = 0.5
         else:
-            self.window.banner.stop_wanted.emit()
+            self.window.banner.stop_requested.emit()
         late = LATE if os.getloadavg()[0] > (os.cpu_count() or 1) else 1.0
         while bridge.state in DRIVING and time.monotonic() - begun_s < late * STOPPED_S + ramp_s:
             self.live(20)

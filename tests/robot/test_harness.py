@@ -12,7 +12,7 @@ QtWidgets = pytest.importorskip("PySide6.QtWidgets", exc_type=ImportError)
 
 @pytest.fixture
 def robot(qtbot):
-    from vibench.gui.page.page import Shown
+    from vibench.gui.page.page import DisplayedResult
 
     from .robot import Robot
 
@@ -20,7 +20,7 @@ def robot(qtbot):
     qtbot.addWidget(label)
     made = object.__new__(Robot)
     made.findings, made.recent = [], deque(["type_value"])
-    made.page = SimpleNamespace(shown=(Shown(label, "amplitude 2", "amplitude 1"),))
+    made.page = SimpleNamespace(shown=(DisplayedResult(label, "amplitude 2", "amplitude 1"),))
     made.window = SimpleNamespace(pages={"Test": made.page})
     made.label = label
     return made

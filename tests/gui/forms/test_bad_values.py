@@ -9,7 +9,7 @@ from vibench.acquisition.plan import EXCITATION_KINDS, Measurement, SineSweep
 from vibench.analysis import AnalysisOptions
 from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
 from vibench.gui.forms.editor import Choice
-from vibench.gui.forms.model_form import GroupEditor, JudgedForm
+from vibench.gui.forms.model_form import GroupEditor, ValidatedForm
 from vibench.gui.pages.queue.queue_page import SweepForm
 from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN, SPECTRUM
 from vibench.gui.pages.test.test_page import TestForm as FormOfATest
@@ -49,19 +49,19 @@ def form_of_a_kind(kind):
 
 
 def settings():
-    form = JudgedForm(Preferences, "settings")
+    form = ValidatedForm(Preferences, "settings")
     form.form.show_content({"font_pt": 9, "patience_s": 2.0, "recordings_folder": str(Path.home())})
     return form
 
 
 FORMS = {
     **{f"test {kind}": lambda kind=kind: form_of_a_kind(kind) for kind in EXCITATION_KINDS},
-    "analysis": lambda: JudgedForm(AnalysisOptions, "analysis"),
-    "map": lambda: JudgedForm(MapRequest, "map", frozenset({"described"})),
+    "analysis": lambda: ValidatedForm(AnalysisOptions, "analysis"),
+    "map": lambda: ValidatedForm(MapRequest, "map", frozenset({"described"})),
     "settings": settings,
-    "simulation": lambda: JudgedForm(SimulationRequest, "simulation", frozenset({"described"})),
+    "simulation": lambda: ValidatedForm(SimulationRequest, "simulation", frozenset({"described"})),
     **{
-        kind.name: lambda kind=kind: JudgedForm(kind.request, kind.name, kind.hidden)
+        kind.name: lambda kind=kind: ValidatedForm(kind.request, kind.name, kind.hidden)
         for kind in (BRANCHES, SPECTRUM, CHAIN)
     },
 }

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
 from vibench.analysis.dynamics import SpecimenChoice
-from vibench.gui.forms.model_form import JudgedForm, ModelForm
+from vibench.gui.forms.model_form import ModelForm, ValidatedForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
 MEASUREMENTS = {
@@ -104,7 +104,7 @@ def test_what_a_field_says_of_itself_in_the_plan_is_its_explanation(form):
 def test_a_specimen_whose_springs_follow_from_another_mass_is_warned_of(qtbot, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\nmodel = "gong2025"\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n')
-    form = JudgedForm(SpecimenChoice, "scene", frozenset({"described"}))
+    form = ValidatedForm(SpecimenChoice, "scene", frozenset({"described"}))
     qtbot.addWidget(form)
     form.form.show_content({"specimen": str(path)})
     assert form.value is not None

@@ -4,7 +4,7 @@ import pytest
 
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
 from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
-from vibench.gui.forms.model_form import JudgedForm
+from vibench.gui.forms.model_form import ValidatedForm
 from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN
 
 HIDDEN = BRANCHES.hidden | CHAIN.hidden
@@ -20,7 +20,7 @@ GIVEN = {"start": 60.0, "stop": 62.0}
     [("specimen", "nothing", "no specimen is called"), ("model", "rubber", "Contact 'rubber' is not known")],
 )
 def test_an_unknown_specimen_or_law_is_complained_of_at_its_field(qapp, model, field, value, said):
-    form = JudgedForm(model, "scene", HIDDEN)
+    form = ValidatedForm(model, "scene", HIDDEN)
     if field not in form.form.editors:
         pytest.skip("the models of a simulation are a list")
     form.form.show_content(GIVEN | {field: value})

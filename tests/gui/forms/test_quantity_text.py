@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.plan import Dwell
 from vibench.gui.forms.editor import ListEditor
-from vibench.gui.forms.model_form import JudgedForm
-from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from vibench.gui.forms.model_form import ValidatedForm
+from vibench.gui.forms.quantity_edit import QuantityEdit, parse_quantity, quantity_text
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quant
     ],
 )
 def test_numbers_are_read_as_people_write_them(text, unit, value):
-    assert parsed_quantity(text, unit) == value
+    assert parse_quantity(text, unit) == value
 
 
 @pytest.mark.parametrize(
@@ -35,12 +35,12 @@ def test_numbers_are_read_as_people_write_them(text, unit, value):
 )
 def test_other_units_and_words_are_refused(text, unit):
     with pytest.raises(ConfigurationError, match=r"number|unit"):
-        parsed_quantity(text, unit)
+        parse_quantity(text, unit)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["", "Hz", "m", "s", "Vpp", "m/s²"]))
 def test_what_is_shown_reads_back_as_the_same_number(value, unit):
-    assert parsed_quantity(quantity_text(value, unit), unit) == value
+    assert parse_quantity(quantity_text(value, unit), unit) == value
 
 
 def test_a_gap_is_shown_in_micrometres():
@@ -110,7 +110,7 @@ def test_a_value_a_thousand_times_the_old_one_is_asked_about(qtbot, field):
 
 
 def test_a_value_that_is_asked_about_is_not_taken_by_the_form(qtbot, field):
-    form = JudgedForm(Dwell, "dwell")
+    form = ValidatedForm(Dwell, "dwell")
     qtbot.addWidget(form)
     form.show_value(Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=8.0))
     typed(qtbot, form.form.editors["duration_s"].widget, "9000")

@@ -21,14 +21,14 @@ from vibench.acquisition.plan import EXCITATION_KINDS, Dwell, HeldDwell, Measure
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.prediction.progress import SettledMotion
-from vibench.gui.forms.model_form import JudgedForm
-from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from vibench.gui.forms.model_form import ValidatedForm
+from vibench.gui.forms.quantity_edit import QuantityEdit, parse_quantity, quantity_text
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.pages.test.test_page import TestForm as FormOfATest
 from vibench.gui.pages.test.test_preview import TestPreview as Previewed, preview_test
 from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.notice import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
-from vibench.gui.widgets.units import CHOICES, UNITS, fitted_unit
+from vibench.gui.widgets.units import CHOICES, UNITS, prefixed_unit
 from vibench.gui.window.menus import SettingsDialog
 
 OLD = re.compile(r"(?:\d|\()\s?(?:µm|m/s²|m/s2|m s-[12]|mm/s)(?![\w/²·])")
@@ -45,7 +45,7 @@ def _usual_again():
 
 
 @pytest.fixture
-def filled(window, record, tmp_path, qtbot):
+def fill_box(window, record, tmp_path, qtbot):
     """Something that has displacements, velocities and accelerations on every page."""
     pages, context = window.pages, window.context
     rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
@@ -71,7 +71,7 @@ def filled(window, record, tmp_path, qtbot):
     )  # fmt: skip
     pages[RUN].hidden_motion.show_status(status.model_copy(update={"twin": twin}))
     path = record(tmp_path, "a")
-    context.recording_wanted.emit(path)
+    context.recording_requested.emit(path)
     frequency_hz = np.linspace(200.0, 300.0, 50)
     for name in ("model hertz, 5 µm", "model linear, 10 to 20 µm"):
         curve = Curve(
@@ -133,17 +133,17 @@ def numbers_of(page):
     return [edit.value() for edit in page.findChildren(QuantityEdit)]
 
 
-def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
-    before = {name: list(texts_of(page)) for name, page in filled.pages.items()}
-    values = {name: numbers_of(page) for name, page in filled.pages.items()}
+def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(fill_box):
+    before = {name: list(texts_of(page)) for name, page in fill_box.pages.items()}
+    values = {name: numbers_of(page) for name, page in fill_box.pages.items()}
     told = {name for name, texts in before.items() if any(map(OLD.search, texts))}
     assert told >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
-    chosen_in(filled, OTHERS)
-    for name, page in filled.pages.items():
+    chosen_in(fill_box, OTHERS)
+    for name, page in fill_box.pages.items():
         left = [text for text in texts_of(page) if OLD.search(text)]
         assert left == [], name
         assert numbers_of(page) == values[name], name
-    now = " | ".join(text for page in filled.pages.values() for text in texts_of(page))
+    now = " | ".join(text for page in fill_box.pages.values() for text in texts_of(page))
     for text in (
         "stroke 0.05 mm of 5 mm",
         "acceleration 1.27 g of 6.12 g",
@@ -151,8 +151,8 @@ def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
         "(g)",
     ):
         assert text in now, text
-    chosen_in(filled, USUAL)
-    assert {name: list(texts_of(page)) for name, page in filled.pages.items()} == before
+    chosen_in(fill_box, USUAL)
+    assert {name: list(texts_of(page)) for name, page in fill_box.pages.items()} == before
 
 
 @pytest.mark.parametrize("kind", EXCITATION_KINDS)
@@ -181,18 +181,18 @@ def test_numbers_of_a_list_are_read_in_the_unit_that_is_shown(qtbot):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
-    chosen_in(filled, OTHERS)
+def test_a_chosen_unit_is_there_again_after_a_start(fill_box, tmp_path):
+    chosen_in(fill_box, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
     assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
     again.background.close()
 
 
-def test_an_axis_says_the_number_of_its_unit(filled):
-    plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
+def test_an_axis_says_the_number_of_its_unit(fill_box):
+    plot = next(each for each in fill_box.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
-    chosen_in(filled, OTHERS)
+    chosen_in(fill_box, OTHERS)
     assert plot.up.labelText == "g"
     assert plot.up.tickStrings([0.0, STANDARD], 1.0, STANDARD) == ["0", "1"] != usual
 
@@ -212,12 +212,12 @@ def test_an_axis_says_the_number_of_its_unit(filled):
 )
 def test_a_field_takes_what_it_shows_and_any_unit_that_is_named(unit, shown, text, value):
     UNITS.choose({unit: shown})
-    assert parsed_quantity(text, unit) == value
-    assert parsed_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
+    assert parse_quantity(text, unit) == value
+    assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
 
 
 def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
-    form = JudgedForm(HeldDwell, "dwell")
+    form = ValidatedForm(HeldDwell, "dwell")
     qtbot.addWidget(form)
     form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})
     edit = form.form.editors["base_level"].form.editors["acceleration_m_per_s2"].widget
@@ -241,7 +241,7 @@ def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
 )
 def test_a_sentence_is_told_in_the_chosen_units_and_nothing_else_of_it_changes(sentence, told):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
-    assert UNITS.told(sentence) == told
+    assert UNITS.convert(sentence) == told
 
 
 @pytest.mark.parametrize("unit", CHOICES)
@@ -249,6 +249,6 @@ def test_a_sentence_is_told_in_the_chosen_units_and_nothing_else_of_it_changes(s
 def test_every_choice_writes_the_same_quantity(unit, value):
     for name in CHOICES[unit]:
         UNITS.choose({unit: name})
-        fitted = fitted_unit(unit, value)
-        said = UNITS.told(fitted.text(value, 6))
-        assert parsed_quantity(said, unit) == pytest.approx(value, rel=2e-3), name
+        fitted = prefixed_unit(unit, value)
+        said = UNITS.convert(fitted.text(value, 6))
+        assert parse_quantity(said, unit) == pytest.approx(value, rel=2e-3), name

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QLabel
 
-from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis, thinned
+from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis, thin_ticks
 from vibench.gui.plots.line_style import LIMIT, LineStyle, curve_style
 from vibench.gui.plots.plot import Plot
 from vibench.gui.plots.plot_actions import numbers_of, write_plot
@@ -85,7 +85,7 @@ def test_a_label_without_room_gives_way_to_a_shorter_one(plot, qapp):
 
 @pytest.mark.parametrize("most", [2, 3, 5])
 def test_ticks_are_thinned_to_round_steps(most):
-    step, values = thinned(0.1, [0.1 * n for n in range(11)], most)
+    step, values = thin_ticks(0.1, [0.1 * n for n in range(11)], most)
     assert len(values) <= most
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
 
@@ -93,7 +93,7 @@ def test_ticks_are_thinned_to_round_steps(most):
 @pytest.mark.parametrize("reach", [12.0, 17.0, 19.0, 26.0, 44.0])
 def test_a_low_axis_has_two_numbers_at_least_for_one_alone_says_no_scale(reach):
     places = [5.0 * n for n in range(-8, 9) if abs(5.0 * n) <= reach]
-    step, values = thinned(5.0, places, 2)
+    step, values = thin_ticks(5.0, places, 2)
     assert len(values) == 2
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
 

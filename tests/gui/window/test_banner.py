@@ -22,7 +22,7 @@ def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
 def test_a_click_on_stop_asks_for_a_stop(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
-    with qtbot.waitSignal(banner.stop_wanted):
+    with qtbot.waitSignal(banner.stop_requested):
         banner.findChild(QPushButton, "stop").click()
 
 

@@ -281,10 +281,10 @@ class Bridge(QObject):
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
             self.rig, request, self.status = found
             self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._tell(self.status)  # what happened before the next request
+            self._emit_news(self.status)  # what happened before the next request
             self.adopted.emit(request)
 
-        self._order(_taken_over, keep)
+        self._order(_adopt, keep)
 
     def order(
         self, verb: Callable[Concatenate[EngineClient, P], object], *args: P.args, **kwargs: P.kwargs
@@ -367,7 +367,7 @@ class Bridge(QObject):
             self._is_looking = False
         else:
             self._begin_taking(self.status, self.status.bench, newest_samples)
-        self._tell(self.status)
+        self._emit_news(self.status)
 
     def _begin_taking(self, status: EngineStatus, bench: BenchFacts, newest_samples: SampleSlice) -> None:
         if self.view is None or newest_samples.run_id != self._view_run:
@@ -387,7 +387,7 @@ class Bridge(QObject):
             self.beat()
             QTimer.singleShot(0, self, lambda: self._take(view, first_sample + size, rest, size))
 
-    def _tell(self, status: EngineStatus) -> None:
+    def _emit_news(self, status: EngineStatus) -> None:
         for message in status.messages:
             if message.number > self._last_message:
                 self._last_message = message.number
@@ -401,7 +401,7 @@ class Bridge(QObject):
 
     def _refused(self, error: AcquisitionError) -> None:
         if isinstance(error, EngineGone):
-            self._gone(error)
+            self._drop_engine(error)
         else:
             self.noticed.emit(notice_of(error))
 
@@ -409,7 +409,7 @@ class Bridge(QObject):
         self._is_looking = False
         self._refused(error)
 
-    def _gone(self, error: EngineGone) -> None:
+    def _drop_engine(self, error: EngineGone) -> None:
         """Discard all values of an engine that has ended."""
         if self._line is None:
             return
@@ -442,7 +442,7 @@ def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> No
     warm_up()
 
 
-def _taken_over(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
+def _adopt(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
     warm_up()
     return client.open_rig(), client.carried_request(), client.status()
 

@@ -14,7 +14,7 @@ from vibench.acquisition import ConfigurationError
 
 from ..widgets.units import CHOICES
 from .field_facts import FieldFacts
-from .quantity_edit import LineField, QuantityEdit, draw_edge, parsed_quantity, quantity_text, unit_of
+from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, quantity_text, unit_of
 
 
 class Editor(Protocol):
@@ -235,7 +235,7 @@ class ListEditor:
             if self._unit:
                 shown = self._shown[0].split(",")
                 return [
-                    parsed_quantity(each, self._unit, unit_of(shown[min(place, len(shown) - 1)], self._unit))
+                    parse_quantity(each, self._unit, unit_of(shown[min(place, len(shown) - 1)], self._unit))
                     for place, each in enumerate(text.split(","))
                     if text.strip()
                 ]
@@ -255,20 +255,20 @@ class ListEditor:
         self._line.setText(text)
 
 
-def unwrapped(annotation: Any) -> tuple[Any, bool]:
+def unwrap_optional(annotation: Any) -> tuple[Any, bool]:
     """Return a type without ``Annotated`` and ``| None``, and whether None is allowed."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
         parts = [part for part in get_args(annotation) if part is not NoneType]
         if len(parts) == 1 and len(parts) < len(get_args(annotation)):
-            return unwrapped(parts[0])[0], True
+            return unwrap_optional(parts[0])[0], True
     return annotation, False
 
 
 def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
     """Return the editor for a plain value."""
-    plain, may_be_missing = unwrapped(annotation)
+    plain, may_be_missing = unwrap_optional(annotation)
     if plain in (float, int):
         return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")
     if get_origin(plain) is Literal:

@@ -53,21 +53,21 @@ class FieldFacts:
     @property
     def limits(self) -> str:
         """Allowed values, in the chosen units."""
-        return UNITS.told(self.allowed)
+        return UNITS.convert(self.allowed)
 
     @property
     def tooltip(self) -> str:
         """Explanation and limits."""
         limits = f"Allowed: {self.limits}" if self.limits else ""
-        return "\n".join(part for part in (UNITS.told(self.explanation), limits) if part)
+        return "\n".join(part for part in (UNITS.convert(self.explanation), limits) if part)
 
     @property
-    def named(self) -> str:
+    def label_with_unit(self) -> str:
         """Label and unit, at the beginning of a complaint."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
-    def spoken(self) -> str:
+    def accessible_name(self) -> str:
         """Name for screen readers."""
         return f"{self.label} in {self.shown_unit}" if self.unit else self.label
 
@@ -91,8 +91,8 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 def _limits(field: FieldInfo, unit: str) -> str:
     """Return the bounds as text, with the unit once, or at each bound if the unit can be chosen."""
     each = f" {unit}" if unit in CHOICES else ""
-    said = ", ".join(_limit_texts(field, each))
-    return said if each or not said else f"{said} {unit}".strip()
+    texts = ", ".join(_limit_texts(field, each))
+    return texts if each or not texts else f"{texts} {unit}".strip()
 
 
 def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:

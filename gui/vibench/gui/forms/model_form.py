@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLa
 
 from vibench.sim import SpecimenWarning
 
-from ..widgets.boxes import filled
+from ..widgets.boxes import fill_box
 from ..widgets.units import CHOICES, UNITS, SentenceLabel
-from .editor import Choice, ChoiceEditor, Editor, unwrapped, value_editor
+from .editor import Choice, ChoiceEditor, Editor, unwrap_optional, value_editor
 from .field_facts import FieldFacts, field_facts
 
 Loc = tuple[int | str, ...]
@@ -32,7 +32,7 @@ class _Row:
         for each in (self.editor.widget, self.label):
             if each is not None:
                 each.setToolTip(self.facts.tooltip)
-        self.editor.widget.setAccessibleName(self.facts.spoken)
+        self.editor.widget.setAccessibleName(self.facts.accessible_name)
         self.editor.widget.setAccessibleDescription(self.facts.tooltip)
 
 
@@ -64,7 +64,7 @@ class ModelForm(QWidget):
         for name, field in model.model_fields.items():
             if name in hidden:
                 continue
-            plain, _ = unwrapped(field.annotation)
+            plain, _ = unwrap_optional(field.annotation)
             if get_origin(plain) is Literal and (name == "kind" or len(get_args(plain)) == 1):
                 self._fixed[name] = get_args(plain)[0]
             else:
@@ -156,7 +156,7 @@ class ModelForm(QWidget):
         row = self._rows.get(name)
         if row is not None:
             inside = row.editor.form.edited if isinstance(row.editor, GroupEditor) else ""
-            self.edited = inside or row.facts.named
+            self.edited = inside or row.facts.label_with_unit
             self.changed.emit()
 
 
@@ -210,7 +210,7 @@ class GroupEditor:
         """Show complaints at the fields of the inner form."""
         return self.form.complain(complaints)
 
-    def know(
+    def set_starting_values(
         self,
         usual: Mapping[str, Any],
         fresh: Mapping[str, Mapping[str, Any]],
@@ -241,8 +241,8 @@ class GroupEditor:
         self.form.hide()
         self.form.deleteLater()
         self.form = self._new_form(model)
-        begun = {**self._memory, **known_of}
-        known = {name: value for name, value in begun.items() if name in model.model_fields}
+        values = {**self._memory, **known_of}
+        known = {name: value for name, value in values.items() if name in model.model_fields}
         self.form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
         self._changed()
 
@@ -286,8 +286,8 @@ _DRAWN = frozenset({"excited_lines", "detection_lines"})
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
     """Return the editor of a field, inner models included."""
-    plain, may_be_missing = unwrapped(field.annotation)
-    kinds = tuple(unwrapped(part)[0] for part in get_args(plain)) or (plain,)
+    plain, may_be_missing = unwrap_optional(field.annotation)
+    kinds = tuple(unwrap_optional(part)[0] for part in get_args(plain)) or (plain,)
     if all(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
         make = OptionalGroupEditor if may_be_missing else GroupEditor
         return make(facts, kinds, changed)
@@ -300,7 +300,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 def _may_be_emptied(field: FieldInfo) -> bool:
     """Return whether an empty field differs from the default."""
-    return unwrapped(field.annotation)[1] and not field.is_required() and _default(field) is not None
+    return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
 def _default(field: FieldInfo) -> Any:
@@ -332,7 +332,7 @@ def _sentence(text: str, facts: FieldFacts) -> str:
 Model = TypeVar("Model", bound=BaseModel)
 
 
-class JudgedForm(QWidget, Generic[Model]):
+class ValidatedForm(QWidget, Generic[Model]):
     """A form with the complaints and warnings of its model below it."""
 
     changed = Signal()
@@ -352,9 +352,9 @@ class JudgedForm(QWidget, Generic[Model]):
         self._complaint.setAccessibleName(f"Complaint about the {name}")
         self._warning = SentenceLabel()
         self._warning.setAccessibleName(f"Warning about the {name}")
-        filled(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
+        fill_box(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
         self.form.changed.connect(self._take)
-        UNITS.on_change(self._judge)
+        UNITS.on_change(self._validate)
         self.form.show_content({})
 
     @property
@@ -372,10 +372,10 @@ class JudgedForm(QWidget, Generic[Model]):
         self.form.show_content(value.model_dump(mode="json"))
 
     def _take(self) -> None:
-        self._judge()
+        self._validate()
         self.changed.emit()
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         complaints: dict[Loc, str] = {}
         self.value = None
         with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:

@@ -42,7 +42,7 @@ def quantity_text(value: float, unit: str) -> str:
     if shown.per_si != 1.0:
         # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45, but parsing must return the same value.
         text = shown.text(value, 12)
-        if parsed_quantity(text, unit, shown.name) == value:
+        if parse_quantity(text, unit, shown.name) == value:
             return text
         if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
@@ -59,7 +59,7 @@ def unit_of(text: str, unit: str) -> str:
     return (match[2] if match else "") or UNITS.in_field(unit)
 
 
-def parsed_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
+def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
     """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
     A plain number is in the unit ``shown``; without one, in the unit of an empty field.
@@ -75,7 +75,7 @@ def parsed_quantity(text: str, unit: str, shown: str = "", example: str = "") ->
     if given == "g" and unit in CHOICES and "g" in CHOICES[unit]:
         return float(number) * STANDARD_GRAVITY
     if unit and given.endswith(unit) and given.removesuffix(unit) in POWERS:
-        return _scaled(number, given.removesuffix(unit))
+        return _scale(number, given.removesuffix(unit))
     raise ConfigurationError(
         f"{_short(given)} is not a unit of this field; give {shown or 'a plain number'}"
         + (f", for example {example}" if example else "")
@@ -86,7 +86,7 @@ def _short(text: str) -> str:
     return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
 
 
-def _scaled(number: str, prefix: str) -> float:
+def _scale(number: str, prefix: str) -> float:
     """Shift the decimal point in the text, so that 45 µm equals 45e-6 exactly."""
     mantissa, _, exponent = number.lower().partition("e")
     return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
@@ -223,7 +223,7 @@ class QuantityEdit(QAbstractSpinBox):
         if not text.strip():
             return None
         example = "" if self._value is None else quantity_text(self._value, self._unit)
-        value = parsed_quantity(text, self._unit, self._shown_unit, example)
+        value = parse_quantity(text, self._unit, self._shown_unit, example)
         if not isfinite(value):
             raise ConfigurationError(
                 f"{_short(text)} is too large a number; write for example {example or 12}"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from vibench.analysis import MeasurementPrediction
 
 
-class Remembered(StrEnum):
+class SettingKey(StrEnum):
     """Keys of the settings file."""
 
     GEOMETRY = "window/geometry"
@@ -45,34 +45,34 @@ class Settings:
     def __init__(self, path: Path) -> None:
         self._store = QSettings(str(path), QSettings.Format.IniFormat)
 
-    def text(self, key: Remembered, otherwise: str = "") -> str:
+    def text(self, key: SettingKey, otherwise: str = "") -> str:
         """Return a stored text, or ``otherwise``."""
         value = self._store.value(key.value)
         return value if isinstance(value, str) and value else otherwise
 
-    def number(self, key: Remembered, otherwise: float, low: float, high: float) -> float:
+    def number(self, key: SettingKey, otherwise: float, low: float, high: float) -> float:
         """Return a stored number, limited to its bounds; ``otherwise`` without a valid number."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:
             return otherwise
 
-    def keep_text(self, key: Remembered, value: str) -> None:
+    def keep_text(self, key: SettingKey, value: str) -> None:
         """Store a text."""
         self._store.setValue(key.value, value)
 
-    def state(self, key: Remembered, name: str = "") -> QByteArray:
+    def state(self, key: SettingKey, name: str = "") -> QByteArray:
         """Return the stored layout of a window or splitter; empty without one."""
         value = self._store.value(f"{key.value}/{name}" if name else key.value)
         return value if isinstance(value, QByteArray) else QByteArray()
 
-    def keep_state(self, key: Remembered, state: QByteArray, name: str = "") -> None:
+    def keep_state(self, key: SettingKey, state: QByteArray, name: str = "") -> None:
         """Store the layout of a window or splitter."""
         self._store.setValue(f"{key.value}/{name}" if name else key.value, state)
 
     def forget_layout(self) -> None:
         """Delete stored layouts, so that the window opens with its default layout."""
-        for key in (Remembered.GEOMETRY, Remembered.SPLITTERS):
+        for key in (SettingKey.GEOMETRY, SettingKey.SPLITTERS):
             self._store.remove(key.value)
 
 
@@ -136,17 +136,17 @@ class AppContext(QObject):
     """Folder of new recordings, after a change."""
     noticed = Signal(object)
     """A `Notice` for the message strip."""
-    page_wanted = Signal(str)
+    page_requested = Signal(str)
     """Name of a page to show."""
-    recording_wanted = Signal(object)
+    recording_requested = Signal(object)
     """Path of a recording to open on the Files page."""
     recording_made = Signal(object)
     """Path of a recording that has just ended."""
-    comparison_wanted = Signal(object)
+    comparison_requested = Signal(object)
     """Paths of recordings to overlay on the Compare page."""
     prediction_made = Signal(object)
     """Predicted curves to overlay on the Compare page."""
-    scene_wanted = Signal(float, float)
+    scene_requested = Signal(float, float)
     """Drive frequency [Hz] and base amplitude [m] of a scene for the Simulate page."""
     theme_changed = Signal(object)
     """The new `Theme`."""
@@ -167,47 +167,47 @@ class AppContext(QObject):
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
         """Worker for short jobs that must not wait behind long ones: previews."""
-        UNITS.choose(dict(zip(CHOICES, settings.text(Remembered.UNITS).split(), strict=False)))
-        self.theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
+        UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
+        self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
         """Current colours."""
 
     def choose_theme(self, theme: Theme) -> None:
         """Change the colours and store the choice."""
         self.theme = theme
-        self.settings.keep_text(Remembered.THEME, theme.name)
+        self.settings.keep_text(SettingKey.THEME, theme.name)
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
         """Change the units of quantities, given by SI unit, and store the choice."""
         UNITS.choose(chosen)
-        self.settings.keep_text(Remembered.UNITS, " ".join(UNITS.chosen.values()))
+        self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen.values()))
 
     @property
     def patience_s(self) -> float:
         """How long a run far from all limits may continue while the window does not answer [s]."""
         return self.settings.number(
-            Remembered.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
+            SettingKey.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
         )
 
     @property
     def folder(self) -> Path:
         """Folder of recordings."""
-        return Path(self.settings.text(Remembered.FOLDER, str(Path.home() / "vibench")))
+        return Path(self.settings.text(SettingKey.FOLDER, str(Path.home() / "vibench")))
 
     def choose_folder(self, folder: Path) -> None:
         """Change the folder of new recordings."""
-        self.settings.keep_text(Remembered.FOLDER, str(folder))
+        self.settings.keep_text(SettingKey.FOLDER, str(folder))
         self.folder_chosen.emit(folder)
 
     @property
     def recent_files(self) -> tuple[Path, ...]:
         """Files opened or saved last, the newest first."""
-        return tuple(Path(each) for each in self.settings.text(Remembered.RECENT).split("\n") if each)
+        return tuple(Path(each) for each in self.settings.text(SettingKey.RECENT).split("\n") if each)
 
     def note_file(self, path: Path) -> None:
         """Add a file to the recent files."""
         known = [str(each) for each in self.recent_files if each != path]
-        self.settings.keep_text(Remembered.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
+        self.settings.keep_text(SettingKey.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
 
     def say(self, notice: Notice) -> None:
         """Show a message on the strip."""

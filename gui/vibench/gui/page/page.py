@@ -13,9 +13,9 @@ from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
 from vibench.acquisition import ConfigurationError, RecordingError, open_recording
 
-from ..widgets.boxes import Scrolled, column, title_of
+from ..widgets.boxes import ScrollArea, column, title_of
 from ..widgets.theme import Theme
-from .app_context import AppContext, Remembered
+from .app_context import AppContext, SettingKey
 
 
 class FileKind(Enum):
@@ -69,7 +69,7 @@ def file_kind(path: Path) -> FileKind:
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayedResult:
     """A displayed result, and the inputs from which it was computed.
 
     ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled, so
@@ -82,7 +82,7 @@ class Shown:
     wanted: object
 
     @property
-    def is_true(self) -> bool:
+    def is_current(self) -> bool:
         """Whether the result is current, absent, or marked as outdated."""
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
@@ -122,12 +122,12 @@ class Page(QWidget):
         """Redo the last undone edit."""
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """Displayed results with their inputs."""
         return ()
 
     @property
-    def styled(self) -> tuple[QWidget, ...]:
+    def styled_parts(self) -> tuple[QWidget, ...]:
         """Parts to restyle one after another; restyling the whole page would block the event loop."""
         return (self,)
 
@@ -137,7 +137,7 @@ class Page(QWidget):
             if isinstance(part, Themed):
                 part.retheme(theme)
 
-    def entered(self) -> None:
+    def enter(self) -> None:
         """Prepare to be shown."""
 
     def left(self) -> None:
@@ -176,20 +176,20 @@ class SideAndPicture(QSplitter):
         self._settings, self._page = context.settings, page
         self._was_moved = False
         self.setAccessibleName(f"Parts of the {page} page")
-        self.side = Scrolled(f"Choices of the {page} page", side)
+        self.side = ScrollArea(f"Choices of the {page} page", side)
         feet = () if foot is None else (foot,)
         self.addWidget(column(title_of(page), (self.side, 1), *feet))
-        self.addWidget(Scrolled(f"Pictures of the {page} page", picture))
+        self.addWidget(ScrollArea(f"Pictures of the {page} page", picture))
         self.setStretchFactor(1, 1)
         self.setChildrenCollapsible(False)
         self.splitterMoved.connect(self._move)
-        kept = self._settings.state(Remembered.SPLITTERS, page)
+        kept = self._settings.state(SettingKey.SPLITTERS, page)
         self._was_moved = not kept.isEmpty() and self.restoreState(kept)
 
     def keep(self) -> None:
         """Store the position of the divider if the user has moved it."""
         if self._was_moved:
-            self._settings.keep_state(Remembered.SPLITTERS, self.saveState(), self._page)
+            self._settings.keep_state(SettingKey.SPLITTERS, self.saveState(), self._page)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Set the left part to its natural width, unless the user has moved the divider."""

@@ -87,7 +87,7 @@ class UserActions(QObject):
                 "Cannot start: the description of the test has not been shown to its end.",
                 "Read it on the Run page (Ctrl+3); PgDn scrolls.",
             )
-            self._context.page_wanted.emit(RUN)
+            self._context.page_requested.emit(RUN)
 
     def stop(self) -> None:
         """Ramp down as planned; a second call during the ramp uses the fastest ramp of the shaker."""

@@ -169,12 +169,12 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             if self._is_upright:
-                step, values = thinned(step, values, self._most_labels(size))
+                step, values = thin_ticks(step, values, self._most_labels(size))
             return [(step / factor, [value / factor for value in values])]
         shift = log10(self._axis.shown.per_si)
         ticks = logarithmic_ticks(low + shift, high + shift)
         if len(ticks[0][1]) > self._most_labels(size):
-            ticks = [thinned(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
+            ticks = [thin_ticks(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
         return [(step, [value - shift for value in values]) for step, values in ticks]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
@@ -193,7 +193,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return max(2, int(size / each))
 
 
-def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
+def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
     """Remove ticks between multiples of a larger step, until at most ``most`` are left.
 
     A single number defines no scale; in that case the outermost two of the previous step are kept.
@@ -278,16 +278,16 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
     def paint(self, painter: QPainter, *_: object) -> None:
         """Draw lines at the ticks that the axes have just painted."""
         to_pixels = painter.transform()
-        seen = to_pixels.mapRect(self.boundingRect())
+        visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
         for level, places in enumerate(self._across.levels):
-            painter.setPen(self._shade(level, seen.width() / (len(places) + 1)))
+            painter.setPen(self._shade(level, visible.width() / (len(places) + 1)))
             columns = (place * to_pixels.m11() + to_pixels.m31() for place in places)
-            painter.drawLines([QLineF(at, seen.top(), at, seen.bottom()) for at in columns])
+            painter.drawLines([QLineF(at, visible.top(), at, visible.bottom()) for at in columns])
         for level, places in enumerate(self._up.levels):
-            painter.setPen(self._shade(level, seen.height() / (len(places) + 1)))
+            painter.setPen(self._shade(level, visible.height() / (len(places) + 1)))
             rows = (place * to_pixels.m22() + to_pixels.m32() for place in places)
-            painter.drawLines([QLineF(seen.left(), at, seen.right(), at) for at in rows])
+            painter.drawLines([QLineF(visible.left(), at, visible.right(), at) for at in rows])
 
     def _shade(self, level: int, apart: float) -> QColor:
         shade = QColor(self._colour)

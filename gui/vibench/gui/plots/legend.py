@@ -45,13 +45,13 @@ class LegendLine(QLabel):
 
     def show_entries(self, entries: tuple[LegendEntry, ...]) -> None:
         """Show the names of these curves."""
-        said = "&nbsp;&nbsp;&nbsp; ".join(
+        text = "&nbsp;&nbsp;&nbsp; ".join(
             f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
             f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
             for each in entries
         )
-        if said != self.text():
-            self.setText(said)
+        if text != self.text():
+            self.setText(text)
             self.setAccessibleName("Legend: " + ", ".join(printable(each.name) for each in entries))
 
     def height_for(self, width: int) -> int:

@@ -104,8 +104,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.reading = Reading(self)
         add_actions(self)
         self.scene().sigMouseMoved.connect(self.reading.follow)
-        self.getViewBox().sigRangeChangedManually.connect(self._let_be)
-        UNITS.on_change(self._tell_anew)
+        self.getViewBox().sigRangeChangedManually.connect(self._stop_following)
+        UNITS.on_change(self._show_units)
         self.retheme(theme)
 
     def follow_font(self) -> None:
@@ -308,7 +308,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         if QApplication.activePopupWidget() is None:
             self.reading.hide()
 
-    def _let_be(self, *_: object) -> None:
+    def _stop_following(self, *_: object) -> None:
         """Stop following the data after the user has zoomed or moved the view."""
         self._follows = False
 
@@ -368,7 +368,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
-    def _tell_anew(self) -> None:
+    def _show_units(self) -> None:
         """Rewrite names and readings in other units, unless the plot is closed."""
         if self.plotItem is not None:
             self._relegend()
@@ -379,7 +379,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             return
         self._legend.show_entries(
             tuple(
-                LegendEntry(sign, line_style.colour(self.theme), UNITS.told(name))
+                LegendEntry(sign, line_style.colour(self.theme), UNITS.convert(name))
                 for line_style, sign, name in self._legend_entries
             )
         )

@@ -60,28 +60,28 @@ class Reading:
         """Read at a point in view coordinates."""
         self._at = point
         drawn, scales = (point.x(), point.y()), self._plot.scales
-        for line, at in zip(self._made()[:2], drawn, strict=True):
+        for line, at in zip(self._create_lines()[:2], drawn, strict=True):
             line.setValue(at)
             line.show()
         across, up = (_value(at, scale) for at, scale in zip(drawn, scales, strict=True))
         self.place = across, up
         axes = self._plot.across.axis, self._plot.up.axis
-        said = [_shown(value, axis) for value, axis in zip(self.place, axes, strict=True)]
+        parts = [_value_text(value, axis) for value, axis in zip(self.place, axes, strict=True)]
         nearest = self._nearest(point)
         if nearest is not None:
             name, height = nearest
-            said.append(f"{UNITS.told(name) or 'curve'}: {_shown(height, axes[1])}")
+            parts.append(f"{UNITS.convert(name) or 'curve'}: {_value_text(height, axes[1])}")
             bounds = next((each.at(across) for each in self._plot.bands if name and each.of == name), None)
             if bounds is not None:
-                said.append(f"bounds {_shown(bounds[0], axes[1])} to {_shown(bounds[1], axes[1])}")
+                parts.append(f"bounds {_value_text(bounds[0], axes[1])} to {_value_text(bounds[1], axes[1])}")
         if more := self._plot.read_more(*drawn):
-            said.append(more)
+            parts.append(more)
         if self._marked is not None:
             changes = [now - then for now, then in zip(self.place, self._marked, strict=True)]
-            said.append("Δ " + ", ".join(map(_shown, changes, axes)))
+            parts.append("Δ " + ", ".join(map(_value_text, changes, axes)))
             if scales[1] is Scale.LOGARITHMIC and self._marked[1] > 0.0:
-                said.append(f"{20 * log10(up / self._marked[1]):+.2f} dB")
-        self._tell("   ".join(said))
+                parts.append(f"{20 * log10(up / self._marked[1]):+.2f} dB")
+        self._show_text("   ".join(parts))
 
     def again(self) -> None:
         """Read again after a change of the curves."""
@@ -129,7 +129,7 @@ class Reading:
             if is_drawn:
                 line.setValue(log10(value) if scale is Scale.LOGARITHMIC else value)
 
-    def _made(self) -> tuple[pg.InfiniteLine, ...]:
+    def _create_lines(self) -> tuple[pg.InfiniteLine, ...]:
         if not self._lines:
             self._lines = tuple(pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0, 90, 0))
             for line in self._lines:
@@ -138,7 +138,7 @@ class Reading:
             self.dress(self._plot.theme)
         return self._lines
 
-    def _tell(self, text: str) -> None:
+    def _show_text(self, text: str) -> None:
         if self._label is None:
             self._label = QLabel(self._plot)
             self._label.setTextFormat(Qt.TextFormat.PlainText)
@@ -171,6 +171,6 @@ def _value(drawn: float, scale: Scale) -> float:
     return float(10.0 ** min(max(drawn, -300.0), 300.0)) if scale is Scale.LOGARITHMIC else drawn
 
 
-def _shown(value: float, axis: PlotAxis) -> str:
+def _value_text(value: float, axis: PlotAxis) -> str:
     shown = axis.shown
     return f"{value * shown.per_si:.5g} {shown.name or axis.short}".strip()

@@ -47,13 +47,13 @@ class SignalCurve:
         if (first, last, columns) == self._drawn:
             return
         self._drawn = (first, last, columns)
-        seen = self._samples[first:last]
-        if len(seen) <= 2 * columns:
+        visible = self._samples[first:last]
+        if len(visible) <= 2 * columns:
             time_s = self._start_s + np.arange(first, last) / self._rate_hz
-            self._curve.setData(time_s, seen)
+            self._curve.setData(time_s, visible)
             return
-        low, high = outline(seen, columns)
-        edges = np.arange(columns) * len(seen) // columns
+        low, high = outline(visible, columns)
+        edges = np.arange(columns) * len(visible) // columns
         time_s = self._start_s + (first + np.repeat(edges, 2)) / self._rate_hz
         self._curve.setData(time_s, zigzag(np.asarray(low, float), np.asarray(high, float)))
 

@@ -26,9 +26,9 @@ class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
         """Start painting in pixels; return the visible rectangle and the scale from values to columns."""
         to_pixels = painter.transform()
-        seen = to_pixels.mapRect(self.boundingRect())
+        visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
-        return seen, to_pixels.m11(), to_pixels.m31()
+        return visible, to_pixels.m11(), to_pixels.m31()
 
 
 class Stripes(_UprightMarks):
@@ -52,9 +52,9 @@ class Stripes(_UprightMarks):
 
     def paint(self, painter: QPainter, *_: object) -> None:
         """Fill every pixel column that a stripe touches, once."""
-        seen, scale, shift = self._begin(painter)
-        width = max(1, round(seen.width()))
-        edges = np.clip(np.floor(self._bands * scale + shift - seen.left()), -1, width).astype(int)
+        visible, scale, shift = self._begin(painter)
+        width = max(1, round(visible.width()))
+        edges = np.clip(np.floor(self._bands * scale + shift - visible.left()), -1, width).astype(int)
         steps = np.zeros(width + 3, dtype=int)
         np.add.at(steps, edges[:, 0] + 1, 1)
         np.add.at(steps, np.maximum(edges[:, 1], edges[:, 0] + 1) + 1, -1)
@@ -62,7 +62,7 @@ class Stripes(_UprightMarks):
         turns = np.flatnonzero(np.diff(covered.astype(int), prepend=0, append=0))
         for first, last in turns.reshape(-1, 2).tolist():
             painter.fillRect(
-                QRectF(seen.left() + first, seen.top(), last - first, seen.height()), self._shade
+                QRectF(visible.left() + first, visible.top(), last - first, visible.height()), self._shade
             )
 
 
@@ -86,10 +86,10 @@ class Rules(_UprightMarks):
 
     def paint(self, painter: QPainter, *_: object) -> None:
         """Draw the visible lines."""
-        seen, scale, shift = self._begin(painter)
+        visible, scale, shift = self._begin(painter)
         columns = np.unique(np.round(self._places * scale + shift))
-        columns = columns[(columns >= seen.left()) & (columns <= seen.right())]
-        if columns.size * _LEAST_APART > seen.width():
+        columns = columns[(columns >= visible.left()) & (columns <= visible.right())]
+        if columns.size * _LEAST_APART > visible.width():
             return
         painter.setPen(self._pen)
-        painter.drawLines([QLineF(at, seen.top(), at, seen.bottom()) for at in columns.tolist()])
+        painter.drawLines([QLineF(at, visible.top(), at, visible.bottom()) for at in columns.tolist()])

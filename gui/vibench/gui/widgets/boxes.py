@@ -34,7 +34,7 @@ Part = Content | tuple[Content, int] | int
 """A widget or layout, optionally with its share of the remaining space; a number is an empty share."""
 
 
-def filled(box: Box, *parts: Part, margin: int | None = None) -> Box:
+def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
     """Add parts to a box in order; ``margin`` [pixels] is by default that of the style."""
     if margin is not None:
         box.setContentsMargins(margin, margin, margin, margin)
@@ -55,20 +55,20 @@ def filled(box: Box, *parts: Part, margin: int | None = None) -> Box:
 
 def row(*parts: Part) -> QHBoxLayout:
     """Return a layout of parts side by side."""
-    return filled(QHBoxLayout(), *parts)
+    return fill_box(QHBoxLayout(), *parts)
 
 
 def column(*parts: Part) -> QWidget:
     """Return a widget with parts below one another and no margin."""
     whole = QWidget()
-    filled(QVBoxLayout(whole), *parts, margin=0)
+    fill_box(QVBoxLayout(whole), *parts, margin=0)
     return whole
 
 
-def boxed(title: str, *parts: Part) -> QGroupBox:
+def titled_box(title: str, *parts: Part) -> QGroupBox:
     """Return a titled frame with parts below one another."""
     frame = QGroupBox(title)
-    filled(QVBoxLayout(frame), *parts)
+    fill_box(QVBoxLayout(frame), *parts)
     return frame
 
 
@@ -79,7 +79,7 @@ def title_of(page: str) -> QLabel:
     return title
 
 
-class Scrolled(QScrollArea):
+class ScrollArea(QScrollArea):
     """A scrolling part of a page, which never widens the window.
 
     Parameters
@@ -87,7 +87,7 @@ class Scrolled(QScrollArea):
     name
         Name for screen readers.
     content
-        Scrolled widget.
+        ScrollArea widget.
     """
 
     LEAST_EM = 7, 3

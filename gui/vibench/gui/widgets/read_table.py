@@ -118,8 +118,8 @@ class ReadTable(QTableWidget):
             for column, text in enumerate(row):
                 item = self.item(number, column)
                 if isinstance(item, QTableWidgetItem):
-                    item.setText(UNITS.told(plain_lines(text)))
-                    item.setToolTip(plain_tip(UNITS.told(tips[number] if tips else text)))
+                    item.setText(UNITS.convert(plain_lines(text)))
+                    item.setToolTip(plain_tip(UNITS.convert(tips[number] if tips else text)))
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -60,7 +60,7 @@ class ShownUnit:
         shown = value * self.per_si
         # Counts are exact: 8192 points, not 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
-        return f"{_written(Decimal(number))} {self.name}".strip()
+        return f"{_number_text(Decimal(number))} {self.name}".strip()
 
 
 def plain_unit(unit: str) -> str:
@@ -68,7 +68,7 @@ def plain_unit(unit: str) -> str:
     return _SPELLED.get(unit, unit)
 
 
-def fitted_unit(unit: str, value: float) -> ShownUnit:
+def prefixed_unit(unit: str, value: float) -> ShownUnit:
     """Return a unit with the prefix that suits the value, regardless of the user's choice."""
     si = plain_unit(unit)
     is_plain = si not in PREFIXED or value == 0.0 or _PLAIN_FROM <= abs(value) < _PLAIN_TO
@@ -117,23 +117,23 @@ class DisplayUnits:
     def of(self, unit: str, value: float) -> ShownUnit:
         """Return the unit in which a field displays this value."""
         name = self._chosen.get(unit, AUTOMATIC)
-        return fitted_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
+        return prefixed_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
         """Return the unit of a plain number in an empty field of this SI unit."""
         return self.on_axis(unit).name
 
-    def told(self, sentence: str) -> str:
+    def convert(self, sentence: str) -> str:
         """Return a sentence with displacements, velocities and accelerations in the chosen units."""
-        return _QUANTITY.sub(self._retold, sentence)
+        return _QUANTITY.sub(self._convert_match, sentence)
 
-    def _retold(self, found: re.Match[str]) -> str:
+    def _convert_match(self, found: re.Match[str]) -> str:
         given = plain_unit(found[2])
         si = _SI_OF[given]
         name = self._chosen[si]
         name = given if name == AUTOMATIC else name
         factor = _shown(si, name).per_si / _shown(si, given).per_si
-        return f"{re.sub(_NUMBER, lambda number: _rewritten(number[0], factor), found[1])} {name}"
+        return f"{re.sub(_NUMBER, lambda number: _scale_number(number[0], factor), found[1])} {name}"
 
 
 def _shown(si: str, name: str) -> ShownUnit:
@@ -142,18 +142,18 @@ def _shown(si: str, name: str) -> ShownUnit:
     return ShownUnit(name, 10.0 ** -POWERS[name.removesuffix(si)])
 
 
-def _rewritten(number: str, factor: float) -> str:
+def _scale_number(number: str, factor: float) -> str:
     """Scale a number in a text; a power of ten shifts the decimal point and keeps every digit."""
     power = round(log10(factor))
     if factor == 1.0:
         return number
     if abs(factor / 10.0**power - 1.0) > 1e-9:
         digits = max(_LEAST_DIGITS, len(Decimal(number).normalize().as_tuple().digits))
-        return _written(Decimal(f"{float(number) * factor:.{digits}g}"))
-    return _written(Decimal(number).scaleb(power))
+        return _number_text(Decimal(f"{float(number) * factor:.{digits}g}"))
+    return _number_text(Decimal(number).scaleb(power))
 
 
-def _written(number: Decimal) -> str:
+def _number_text(number: Decimal) -> str:
     """Return all digits; very small or large numbers have a power of ten."""
     if number == 0 or not number.is_finite() or _LONG_FROM <= abs(number) < _LONG_TO:
         return f"{number:f}"
@@ -179,23 +179,23 @@ class SentenceLabel(QLabel):
         if rank:
             self.setProperty("rank", rank)
         self.setText(text)
-        UNITS.on_change(self._tell)
+        UNITS.on_change(self._show_converted)
 
     def setText(self, text: str) -> None:
         """Set the text; its quantities are converted for display."""
         self.sentence = text
-        self._tell()
+        self._show_converted()
 
     def setToolTip(self, text: str) -> None:
         """Set the tooltip, converted in the same way."""
         self._tip = text
-        self._tell()
+        self._show_converted()
 
     def text(self) -> str:
         """Return the displayed text."""
         return super().text().replace(_BREAK, "")
 
-    def _tell(self) -> None:
+    def _show_converted(self) -> None:
         # Allow breaks in long words, because Qt would not wrap or would cut off a path.
-        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(plain_lines(self.sentence))))
-        super().setToolTip(plain_tip(UNITS.told(self._tip)))
+        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.convert(plain_lines(self.sentence))))
+        super().setToolTip(plain_tip(UNITS.convert(self._tip)))

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPlainTextEdit, QPush
 
 from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus
 
-from ..widgets.boxes import ElidedLabel, filled
+from ..widgets.boxes import ElidedLabel, fill_box
 from ..widgets.notice import Notice, NoticeKind, clock
 from ..widgets.theme import Tone
 from ..widgets.units import SentenceLabel
@@ -113,7 +113,7 @@ CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page"
 class Banner(QFrame):
     """Shows one state; a change of its word is announced to screen readers."""
 
-    stop_wanted = Signal()
+    stop_requested = Signal()
     """Ramp down as planned; a second press uses the fastest ramp."""
 
     def __init__(self) -> None:
@@ -135,8 +135,8 @@ class Banner(QFrame):
             "This is not an emergency stop: in an emergency, switch the amplifier off."
         )
         self._stop.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._stop.clicked.connect(self.stop_wanted)
-        layout = filled(QHBoxLayout(self), self._label, (self._detail, 1), self._stop)
+        self._stop.clicked.connect(self.stop_requested)
+        layout = fill_box(QHBoxLayout(self), self._label, (self._detail, 1), self._stop)
         layout.setContentsMargins(10, 6, 10, 6)
         self._fit()
         self._paint()

@@ -90,17 +90,17 @@ class EventLoopMonitor(QObject):
     @property
     def text(self) -> str:
         """Return the logged delays, the newest first."""
-        said = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
-        said += [
+        lines = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
+        lines += [
             f"{each.at:%H:%M:%S}  {each.about}: {1e3 * each.own_s:.0f} ms" for each in reversed(self._noted)
         ]
-        return "\n".join(said)
+        return "\n".join(lines)
 
     def _look(self) -> None:
         now = self._clocks()
-        passed_s, busy_s, delayed_s = (new - old for new, old in zip(now, self._before, strict=True))
+        elapsed_s, busy_s, delayed_s = (new - old for new, old in zip(now, self._before, strict=True))
         self._before = now
-        own_s = max(0.0, passed_s - delayed_s - 1e-3 * EVERY_MS)
+        own_s = max(0.0, elapsed_s - delayed_s - 1e-3 * EVERY_MS)
         self._waits.append((now[0], own_s, busy_s))
         if own_s > BOUND_S:
             self._noted.append(Wait(own_s, busy_s, datetime.now().astimezone(), self._about()))

@@ -28,10 +28,10 @@ from vibench.acquisition import ConfigurationError, printable, shipped_folder
 from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
 from vibench.sim import FrozenModel
 
-from ..forms.model_form import JudgedForm
-from ..page.app_context import AppContext, Remembered
+from ..forms.model_form import ValidatedForm
+from ..page.app_context import AppContext, SettingKey
 from ..page.user_actions import UserActions
-from ..widgets.boxes import filled, push_button
+from ..widgets.boxes import fill_box, push_button
 from ..widgets.notice import notice_of
 from ..widgets.theme import DARK, LIGHT, THEMES, Theme
 from ..widgets.units import UNITS
@@ -70,15 +70,15 @@ class SettingsDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Settings")
         self._context = context
-        self.form: JudgedForm[Preferences] = JudgedForm(Preferences, "settings")
+        self.form: ValidatedForm[Preferences] = ValidatedForm(Preferences, "settings")
         self.buttons = QDialogButtonBox(
             QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
         )
         self.buttons.accepted.connect(self.accept)
         self.buttons.rejected.connect(self.reject)
-        filled(QVBoxLayout(self), self.form, self.buttons)
+        fill_box(QVBoxLayout(self), self.form, self.buttons)
         self.setMinimumWidth(30 * self.fontMetrics().height())
-        self.form.changed.connect(self._judge)
+        self.form.changed.connect(self._validate)
         self.form.show_value(
             Preferences(
                 theme=context.theme.name,
@@ -98,8 +98,8 @@ class SettingsDialog(QDialog):
             return
         if wanted.theme != self._context.theme.name:
             self._context.choose_theme(THEMES[wanted.theme])
-        self._context.settings.keep_text(Remembered.PATIENCE, f"{wanted.patience_s:g}")
-        self._context.settings.keep_text(Remembered.FONT, str(wanted.font_pt))
+        self._context.settings.keep_text(SettingKey.PATIENCE, f"{wanted.patience_s:g}")
+        self._context.settings.keep_text(SettingKey.FONT, str(wanted.font_pt))
         self._context.choose_units(
             {"m": wanted.displacements_in, "m/s": wanted.velocities_in, "m/s²": wanted.accelerations_in}
         )
@@ -111,7 +111,7 @@ class SettingsDialog(QDialog):
             self._context.choose_folder(folder)
         super().accept()
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         self.buttons.button(QDialogButtonBox.StandardButton.Ok).setEnabled(self.form.value is not None)
 
 
@@ -133,7 +133,7 @@ class Reader(QDialog):
         self.browser.sourceChanged.connect(self._fit)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         self.buttons.rejected.connect(self.reject)
-        filled(QVBoxLayout(self), self.browser, self.buttons)
+        fill_box(QVBoxLayout(self), self.browser, self.buttons)
         em = self.fontMetrics().height()
         self.resize(50 * em, 38 * em)
 
@@ -163,9 +163,9 @@ def show_manual(parent: QWidget) -> Reader:
 
 def installation_text() -> str:
     """Return the output of `vibench doctor`."""
-    asked = [sys.executable, "-m", "vibench.cli", "doctor"]
+    command = [sys.executable, "-m", "vibench.cli", "doctor"]
     told = subprocess.run(  # noqa: S603 - this interpreter, and our own package
-        asked, capture_output=True, text=True, check=False, timeout=LONGEST_S
+        command, capture_output=True, text=True, check=False, timeout=LONGEST_S
     )
     return told.stdout or told.stderr
 
@@ -305,7 +305,7 @@ def menu_actions(
         MenuAction("&Test", "A&bort (Esc)", actions.abort),
         *(
             MenuAction(
-                "&View", f"&{number}  {name}", partial(context.page_wanted.emit, name), f"Ctrl+{number}"
+                "&View", f"&{number}  {name}", partial(context.page_requested.emit, name), f"Ctrl+{number}"
             )
             for number, name in enumerate(pages, start=1)
         ),

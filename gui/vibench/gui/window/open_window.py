@@ -14,7 +14,7 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QLabel, QStyleFactory
 
-from ..page.app_context import AppContext, Remembered, Settings, default_settings_path
+from ..page.app_context import AppContext, SettingKey, Settings, default_settings_path
 from .window import PAGES, Window
 
 FONT_FILES = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSansMono.ttf")
@@ -46,11 +46,11 @@ def _font() -> QFont:
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
     """Show the window until it is closed and return the exit code; ``starting`` is the label to close."""
     app = application(["vibench"])
-    kept = Settings(settings or default_settings_path())
-    context = AppContext(kept)
+    stored = Settings(settings or default_settings_path())
+    context = AppContext(stored)
     context.first_bench = None if bench is None else bench.resolve()
     font = app.font()
-    font.setPointSize(int(kept.number(Remembered.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
+    font.setPointSize(int(stored.number(SettingKey.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
     app.setFont(font)
     window = Window(context, PAGES)
     # Exclude existing objects from garbage collection, which would block the event loop.

@@ -18,7 +18,7 @@ from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Dwell, Hold, Measurement, SineSweep
 from vibench.analysis.live import RowSpacing
 
-from ..page.app_context import AppContext, Remembered, Settings
+from ..page.app_context import AppContext, SettingKey, Settings
 from ..pages.compare.compare_page import ComparePage
 from ..pages.files.files_page import FilesPage
 from ..pages.maps.maps_page import MapsPage
@@ -69,7 +69,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
     with TemporaryDirectory(prefix="vibench_") as scratch:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
-            settings.keep_text(Remembered.BENCH, str(bench.resolve()))
+            settings.keep_text(SettingKey.BENCH, str(bench.resolve()))
         # Unattended, because changing the theme and saving pictures takes longer than an attended run allows.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
@@ -143,12 +143,14 @@ def _fill(window: Window) -> None:
         view.form.form.show_content({**view.form.form.content(), **asked})
         view.begin()
         _wait(lambda view=view: not view.simulator.is_busy)  # type: ignore[misc]
-    window.context.comparison_wanted.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
+    window.context.comparison_requested.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
     queue.open_file(shipped(CAMPAIGN))
     maps.pick(*MOTION)
-    _wait(lambda: maps.shown[1].inputs == maps.shown[1].wanted and not compare.is_busy)
+    _wait(
+        lambda: maps.displayed_results[1].inputs == maps.displayed_results[1].wanted and not compare.is_busy
+    )
     for path in window.context.folder.glob("sweep*.h5"):
-        window.context.recording_wanted.emit(path)
+        window.context.recording_requested.emit(path)
     if simulation.progress is not None:
         compare.add_prediction(simulation.progress.curves())
 

@@ -24,7 +24,7 @@ from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
 from ..engine_link.bridge import Urgency
-from ..page.app_context import AppContext, Remembered
+from ..page.app_context import AppContext, SettingKey
 from ..page.page import Page, file_kind
 from ..page.user_actions import UserActions
 from ..pages.compare.compare_page import ComparePage
@@ -35,7 +35,7 @@ from ..pages.rig.rig_page import RigPage
 from ..pages.run.run_page import RunPage
 from ..pages.simulate.simulate_page import SimulatePage
 from ..pages.test.test_page import TestPage
-from ..widgets.boxes import filled, row
+from ..widgets.boxes import fill_box, row
 from ..widgets.notice import (
     COMPARE,
     FILES,
@@ -185,8 +185,8 @@ class Window(QMainWindow):
         self.page.left()
         self._stack.setCurrentWidget(page)
         self.navigation.choose(name)
-        self.context.settings.keep_text(Remembered.PAGE, name)
-        page.entered()
+        self.context.settings.keep_text(SettingKey.PAGE, name)
+        page.enter()
         page.refresh()
 
     def tick(self) -> None:
@@ -215,7 +215,7 @@ class Window(QMainWindow):
         self.event_loop_monitor.stop()
         self.context.bridge.close(how)
         self.page.left()
-        self.context.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
+        self.context.settings.keep_state(SettingKey.GEOMETRY, self.saveGeometry())
         self.context.background.close()
         super().closeEvent(event)
 
@@ -267,31 +267,31 @@ class Window(QMainWindow):
         body = row(self.navigation, (self._stack, 1))
         body.setSpacing(0)
         middle = QWidget()
-        layout = filled(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
+        layout = fill_box(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
         layout.setSpacing(0)
         self.setCentralWidget(middle)
 
     def _connect(self) -> None:
         self.navigation.chosen.connect(self.show_page)
-        self.context.page_wanted.connect(self.show_page)
+        self.context.page_requested.connect(self.show_page)
         self.context.noticed.connect(self.strip.say)
         self.context.theme_changed.connect(self._retheme)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         self.abort_key = AbortKey(application, self)
         self.abort_key.pressed.connect(self.user_actions.abort)
-        self.banner.stop_wanted.connect(self.user_actions.stop)
+        self.banner.stop_requested.connect(self.user_actions.stop)
         self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
         self.context.bridge.adopted.connect(self._show_adopted)
         self.context.bridge.advanced.connect(self.strip.give_way)
 
     def _restore(self) -> None:
         self.resize(1280, 800)
-        geometry = self.context.settings.state(Remembered.GEOMETRY)
+        geometry = self.context.settings.state(SettingKey.GEOMETRY)
         if not geometry.isEmpty():
             self.restoreGeometry(geometry)
         first = next(iter(self.pages))
-        wanted = self.context.settings.text(Remembered.PAGE, first)
+        wanted = self.context.settings.text(SettingKey.PAGE, first)
         name = wanted if wanted in self.pages else first
         self._stack.setCurrentWidget(self.pages[name])
         self.navigation.choose(name)
@@ -322,7 +322,7 @@ class Window(QMainWindow):
             for page in pages
             for step in (
                 partial(page.retheme, theme),
-                *(partial(part.setStyleSheet, sheet) for part in page.styled),
+                *(partial(part.setStyleSheet, sheet) for part in page.styled_parts),
                 partial(page.setUpdatesEnabled, True),
             )
         ]
@@ -342,7 +342,7 @@ class Window(QMainWindow):
         """Focus the first page's next step, and not STOP."""
         super().showEvent(event)
         self.navigation.setFocus()
-        self.page.entered()
+        self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply a change of the font, which parts with a style sheet take over only with a new sheet."""

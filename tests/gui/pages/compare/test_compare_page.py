@@ -126,7 +126,7 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
     paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))
     notices = []
     working.context.noticed.connect(notices.append)
-    working.context.comparison_wanted.emit(paths)
+    working.context.comparison_requested.emit(paths)
     assert working.is_busy
     waited(lambda: not working.is_busy, 90.0)
     assert notices == []

@@ -19,7 +19,7 @@ from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files import files_page as _files_page
 from vibench.gui.pages.files.files_page import FilesPage
-from vibench.gui.pages.files.recording_table import HEADINGS, facts_text, listed, made_levels
+from vibench.gui.pages.files.recording_table import HEADINGS, facts_text, read_levels, read_listing
 from vibench.gui.widgets.theme import DARK
 
 IMPACT_S = 40_002 / 6400.0
@@ -62,7 +62,7 @@ def shown(shared_context, folder, waited):
     page = FilesPage(shared_context)
     page.resize(1200, 800)
     page.show()
-    page.entered()
+    page.enter()
     waited(lambda: len(page.table.recordings.entries) == 4 and not shared_context.background.is_busy)
     yield page
     page.time_histories.show_recording(None)
@@ -216,7 +216,7 @@ def test_a_campaign_says_how_far_it_is_and_shows_its_own_recordings(page):
 
 def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
     page.table.selectAll()
-    with qtbot.waitSignals([page.context.comparison_wanted, page.context.page_wanted]):
+    with qtbot.waitSignals([page.context.comparison_requested, page.context.page_requested]):
         page._compare.click()
     assert set(page.table.chosen_paths()) == {
         folder / f"{n}.h5" for n in ("whole", "stopped", "old", "broken")
@@ -225,7 +225,7 @@ def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
 
 def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, record, tmp_path, qtbot):
     path = record(tmp_path, "elsewhere")
-    page.context.recording_wanted.emit(path)
+    page.context.recording_requested.emit(path)
     qtbot.waitUntil(lambda: page._opened.path == path)
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
@@ -280,7 +280,7 @@ def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(
     page.open_path(part)
     waited(lambda: len(page.time_histories.plots) == 3 and page.table.chosen_paths() == (final,))
     assert page._opened.path == final
-    assert set(made_levels(part)) == set(page._opened.roles)
+    assert set(read_levels(part)) == set(page._opened.roles)
     assert thumbnail(part) is not None
     page.context.noticed.disconnect(said.append)
     assert said == []
@@ -356,8 +356,8 @@ def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_r
     """512 MB were shown a second after a long run had begun."""
     writer, part = begin_recording(tmp_path, "grows")
     waited(lambda: writer.committed_samples == 6400)
-    (entry,) = listed(tmp_path).recordings
-    assert entry.said.size_bytes == 3 * 6400 * 4 < part.stat().st_size
+    (entry,) = read_listing(tmp_path).recordings
+    assert entry.catalogue_entry.size_bytes == 3 * 6400 * 4 < part.stat().st_size
     writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 
 

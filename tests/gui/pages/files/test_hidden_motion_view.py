@@ -38,7 +38,7 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
         waited(lambda: not view.is_busy)
         assert "Zoom in" in view.plot._hint
         pictures.time_histories.show_range(1.0, 1.4)
-        waited(lambda: "tracked in 100 %" in view.said.text())
+        waited(lambda: "tracked in 100 %" in view.caption.text())
         time_s, p = view.tracked.getData()
         true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
         assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
@@ -64,14 +64,14 @@ def test_another_specimen_is_chosen_and_its_numbers_are_found(
         levels = {role: kept_levels(recording, role) for role in recording.roles}
         pictures.show_recording(RecordingOverview(recording, levels), "")
         pictures.time_histories.show_range(0.6, 2.2)
-        waited(lambda: "tracked in 100 %" in view.said.text())
+        waited(lambda: "tracked in 100 %" in view.caption.text())
         last = view.specimen.count() - 1
         view.specimen.setCurrentIndex(last)
         view.specimen.activated.emit(last)
         assert view.specimen.currentText() == "tight.toml"
-        waited(lambda: "elsewhere" in view.said.text())
+        waited(lambda: "elsewhere" in view.caption.text())
         view.find_numbers.click()
-        waited(lambda: "upper gap (45.0" in view.said.text() or "upper gap (44.99" in view.said.text())
-        assert "tracked in 100 %" in view.said.text()
+        waited(lambda: "upper gap (45.0" in view.caption.text() or "upper gap (44.99" in view.caption.text())
+        assert "tracked in 100 %" in view.caption.text()
         pictures.show_recording(None, "")
     pictures.close()

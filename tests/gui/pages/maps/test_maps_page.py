@@ -70,8 +70,8 @@ def test_what_is_in_sight_is_computed_finer(page, waited):
 def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
     mapped(page, waited)
     wanted, pages = [], []
-    page.context.scene_wanted.connect(lambda *point: wanted.append(point))
-    page.context.page_wanted.connect(pages.append)
+    page.context.scene_requested.connect(lambda *point: wanted.append(point))
+    page.context.page_requested.connect(pages.append)
     box = page.map.plot.getViewBox()
     place = page.map.plot.mapFromScene(box.mapViewToScene(box.viewRect().center()))
     QTest.mouseClick(
@@ -111,12 +111,12 @@ def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
     assert page.map.isEnabled()
     before = page.form.form.content()
     page.form.form.show_content({**before, "gap_m": 60e-6})
-    assert [each.widget.isEnabled() for each in page.shown] == [False, False]
+    assert [each.widget.isEnabled() for each in page.displayed_results] == [False, False]
     page.form.form.show_content(before)
-    assert [each.widget.isEnabled() for each in page.shown] == [True, True]
+    assert [each.widget.isEnabled() for each in page.displayed_results] == [True, True]
     page.pick(130.0, 1e-5)
     assert not page.motion.isEnabled()
-    assert all(each.is_true for each in page.shown)
+    assert all(each.is_current for each in page.displayed_results)
     page.begin()
     assert page.map.image.image is None
     page.cancel()

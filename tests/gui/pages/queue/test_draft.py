@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml, shipped
 from vibench.acquisition.plan import Measurement, Range, SweepAxis
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
+from vibench.gui.pages.queue.draft import move_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
     {
@@ -40,7 +40,7 @@ def test_a_sweep_past_what_the_generator_can_play_is_refused():
 def test_entries_change_places_and_go_away():
     other = DWELL.model_copy(update={"name": "other"})
     campaign = with_measurement(with_measurement(None, DWELL), other)
-    assert names(moved_up(campaign, 1)) == ("other", "dwell")
+    assert names(move_up(campaign, 1)) == ("other", "dwell")
     assert names(without(campaign, 0)) == ("other",)
     assert without(without(campaign, 0), 0) is None
 

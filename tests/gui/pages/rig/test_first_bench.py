@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import shipped
-from vibench.gui.page.app_context import AppContext, Remembered, Settings
+from vibench.gui.page.app_context import AppContext, SettingKey, Settings
 from vibench.gui.pages.rig.rig_page import RigPage
 
 
@@ -45,7 +45,7 @@ def test_a_bench_that_can_be_used_is_remembered(opened):
     assert opened(lab).choice.rig.name == "laboratory rig"
     again = opened(None)
     assert again.choice.rig.name == "laboratory rig"
-    assert again.context.settings.text(Remembered.BENCH) == str(lab)
+    assert again.context.settings.text(SettingKey.BENCH) == str(lab)
 
 
 def test_a_bench_whose_springs_follow_from_another_mass_is_warned_of(opened, tmp_path):

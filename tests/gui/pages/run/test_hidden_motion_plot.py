@@ -58,7 +58,7 @@ def test_p_ends_at_the_newest_sample_between_the_stops(picture):
     assert np.diff(time_s) == pytest.approx(np.full(299, STEP_S))
     assert p == pytest.approx(np.array(P_M))
     assert [line.value() for line in picture._stops] == list(STOPS_M)
-    assert "tracked · lower gap (44.001 ± 0.005) µm" in picture.said.text()
+    assert "tracked · lower gap (44.001 ± 0.005) µm" in picture.caption.text()
 
 
 def test_a_forecast_goes_on_from_there_and_fades_as_its_error_grows(picture):
@@ -78,7 +78,7 @@ def test_what_was_not_followed_is_a_hole_and_a_lost_track_is_said(picture):
         status(state="lost", sentence="the motion does not fit", p_m=lost, forecast_m=(), forecast_error_m=())
     )
     assert np.isnan(picture.told.getData()[1]).sum() == 200
-    assert picture.said.text().startswith("lost · the motion does not fit")
+    assert picture.caption.text().startswith("lost · the motion does not fit")
     assert all(is_empty(curve) for curve in picture.forecast)
 
 
@@ -86,7 +86,7 @@ def test_without_a_twin_nothing_is_shown(picture):
     picture.show_status(status())
     picture.show_status(EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED))
     assert is_empty(picture.told)
-    assert picture.said.text() == "The live twin is off."
+    assert picture.caption.text() == "The live twin is off."
 
 
 def test_the_switch_shows_whether_a_twin_is_on_and_asks_for_one(context, qtbot):
@@ -95,7 +95,7 @@ def test_the_switch_shows_whether_a_twin_is_on_and_asks_for_one(context, qtbot):
     assert card.twin.isChecked()
     assert not card.twin.isEnabled()
     card.twin.setEnabled(True)
-    with qtbot.waitSignal(card.twin_wanted) as asked:
+    with qtbot.waitSignal(card.twin_requested) as asked:
         card.twin.click()
     assert asked.args == [TwinSwitch.OFF]
 
@@ -110,7 +110,7 @@ def test_averages_begun_and_planned_are_shown_and_the_one_that_is_played_can_be_
     running = EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED, run=playing)
     card.show_status(running, 10)
     assert card.averages.text() == "4 of 10"
-    with qtbot.waitSignal(card.reject_wanted):
+    with qtbot.waitSignal(card.reject_requested):
         card.reject_button.click()
     card.show_status(running.model_copy(update={"state": EngineState.READY}), 10)
     assert card.averages.text() == "–"

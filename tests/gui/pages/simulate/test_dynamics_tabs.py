@@ -91,7 +91,7 @@ def test_branches_are_laid_over_recordings(page):
     view._grow((line(),))
     laid, wanted = [], []
     page.context.prediction_made.connect(laid.append)
-    page.context.page_wanted.connect(wanted.append)
+    page.context.page_requested.connect(wanted.append)
     view._hand_to_compare()
     assert {each.origin for each in laid[0]} == {CurveOrigin.STABLE, CurveOrigin.UNSTABLE}
     assert wanted == [COMPARE]
@@ -176,7 +176,7 @@ def test_while_a_tab_still_looks_it_says_so_and_gives_no_answer(page, name):
     """Branches said: no periodic motion was found; 0.0 s."""
     view = getattr(page, name)
     view.begin()
-    assert view.said.strip().startswith("Looking")
+    assert view.said.strip().startswith("Computing")
     assert not re.search(r"[Nn]o |0\.0 s|not found", view.said)
     view.cancel()
 

@@ -192,7 +192,7 @@ def test_curves_of_another_scene_than_the_form_says_lie_under_a_veil_and_the_sce
     assert page.plots.isEnabled()
     page.form.show_value(SimulationRequest(**{**LINEAR, "amplitude_m": 9e-6}))
     assert not page.plots.isEnabled()
-    assert all(each.is_true for each in page.shown)
+    assert all(each.is_current for each in page.displayed_results)
     page.left()
     again = SimulatePage(page.context)
     assert again.form.value.amplitude_m == 9e-6

@@ -81,8 +81,8 @@ def test_another_name_asks_for_no_other_prediction_not_even_while_one_is_made(pa
     page.form.show_value(Measurement(name="after", excitation=plan))
     assert asked == []
     assert page.context.selection.measurement.name == "after"
-    page._looked(preview.preview_test(preview.TestPreview(page._wanted[0], RIG)))
-    assert all(each.is_true for each in page.shown)
+    page._looked(preview.preview_test(preview.TestPreview(page._inputs[0], RIG)))
+    assert all(each.is_current for each in page.displayed_results)
     assert page.is_done
     page.form.show_value(Measurement(name="after", excitation=plan.model_copy(update={"duration_s": 7.0})))
     assert len(asked) == 2

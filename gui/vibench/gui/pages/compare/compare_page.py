@@ -11,10 +11,10 @@ from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_
 from vibench.analysis.dynamics import branch_curves
 from vibench.sim.background import Job
 
-from ...forms.model_form import JudgedForm
+from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
 from ...page.page import FileKind, Page, SideAndPicture
-from ...widgets.boxes import TimedBar, column, filled, new_path, push_button, row
+from ...widgets.boxes import TimedBar, column, fill_box, new_path, push_button, row
 from ...widgets.notice import COMPARE, Notice, NoticeKind, notice_of
 from .curve_plots import (
     PEAK_HEADINGS,
@@ -28,7 +28,7 @@ from .curve_plots import (
 )
 
 
-def exported_elsewhere(
+def export_comparison(
     path: Path,
     curves: tuple[Curve, ...],
     recordings: tuple[ComparedRecording, ...],
@@ -50,7 +50,7 @@ class AnalysisPanel(QGroupBox):
 
     def __init__(self) -> None:
         super().__init__("Analysis")
-        self.form = JudgedForm(AnalysisOptions, "analysis")
+        self.form = ValidatedForm(AnalysisOptions, "analysis")
         self._again = QPushButton("Anal&yse again")
         self._again.setAccessibleName("Analyse again")
         self._again.setToolTip("Analyse all recordings with these options")
@@ -60,13 +60,13 @@ class AnalysisPanel(QGroupBox):
         self._cancel.setAccessibleName("Cancel the analysis")
         self._cancel.setToolTip("Cancel the remaining analyses")
         self._cancel.clicked.connect(lambda _checked=False: self.cancelled.emit())
-        filled(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
+        fill_box(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
         for widget in (self._bar, self._cancel):
             # Keep their space while hidden, so that nothing moves when an analysis starts or ends.
             policy = widget.sizePolicy()
             policy.setRetainSizeWhenHidden(True)
             widget.setSizePolicy(policy)
-        self.form.changed.connect(self._judge)
+        self.form.changed.connect(self._validate)
         self.show_progress(0, 0)
 
     def options(self) -> AnalysisOptions | None:
@@ -79,7 +79,7 @@ class AnalysisPanel(QGroupBox):
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < asked)
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         self._again.setEnabled(self.form.value is not None)
 
 
@@ -109,13 +109,13 @@ class ComparePage(Page):
         self.plots.markers_moved.connect(self._read)
         self.panel.wanted.connect(self.analyse_again)
         self.panel.cancelled.connect(self.cancel)
-        context.comparison_wanted.connect(self.add_recordings)
+        context.comparison_requested.connect(self.add_recordings)
         context.prediction_made.connect(self.add_prediction)
 
     @property
     def is_done(self) -> bool:
         """Ticked when two curves are overlaid."""
-        return len(self.curves.shown()) > 1
+        return len(self.curves.ticked()) > 1
 
     @property
     def is_busy(self) -> bool:
@@ -171,12 +171,12 @@ class ComparePage(Page):
 
     def export_to(self, path: Path) -> None:
         """Write the comparison in the background, in the format of the path's suffix."""
-        shown = tuple(each for each, _ in self.curves.shown())
+        shown = tuple(each for each, _ in self.curves.ticked())
         recordings = tuple(each for each in self._recordings.values() if each is not None)
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
         marked = self.plots.markers_hz
         ask = self.context.background.ask
-        ask(exported_elsewhere, self._exported, self._refused, path, shown, recordings, pair, marked)
+        ask(export_comparison, self._exported, self._refused, path, shown, recordings, pair, marked)
 
     def _compared(self, found: ComparedRecording) -> None:
         self._recordings[found.path] = found
@@ -208,7 +208,7 @@ class ComparePage(Page):
         self.context.say(notice_of(error))
 
     def _draw(self) -> None:
-        shown = self.curves.shown()
+        shown = self.curves.ticked()
         self.pair_box.offer(self.curves.curves, tuple(each for each, _ in shown))
         self.plots.show_curves(shown, self.pair_box.difference())
         self.peaks.show_numbers(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
@@ -218,7 +218,7 @@ class ComparePage(Page):
 
     def _read(self) -> None:
         markers_hz = self.plots.markers_hz
-        curves = tuple(each for each, _ in self.curves.shown()) if markers_hz else ()
+        curves = tuple(each for each, _ in self.curves.ticked()) if markers_hz else ()
         self.readings.show_numbers(marker_headings(markers_hz), marker_rows(curves, markers_hz))
 
     def _choose_recordings(self) -> None:
@@ -252,7 +252,7 @@ class ComparePage(Page):
 
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())
-        filled(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), self._parts)
 
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)

@@ -36,7 +36,7 @@ from ...forms.editor import Choice
 from ...plots.axis import LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style, dashed_pen
 from ...plots.plot import Plot
-from ...widgets.boxes import filled, paint_hint, plain_tip
+from ...widgets.boxes import fill_box, paint_hint, plain_tip
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
 from ...widgets.units import UNITS, SentenceLabel
@@ -70,7 +70,7 @@ class CurvePlots(QWidget):
         splitter.addWidget(self.magnitudes)
         splitter.addWidget(self.differences)
         splitter.setSizes([500, 170])
-        filled(QVBoxLayout(self), splitter, margin=0)
+        fill_box(QVBoxLayout(self), splitter, margin=0)
         self._marker_hz: list[float] = [100.0, 300.0]
         self._are_marked = False
         self._lines: list[tuple[pg.InfiniteLine, pg.InfiniteLine]] = []
@@ -240,14 +240,14 @@ class CurveList(QListWidget):
         self._theme = theme
         self._curves: list[Curve] = []
         self.itemChanged.connect(lambda _item: self.changed.emit())
-        UNITS.on_change(self._tell_anew)
+        UNITS.on_change(self._show_units)
 
     @property
     def curves(self) -> tuple[Curve, ...]:
         """All curves."""
         return tuple(self._curves)
 
-    def shown(self) -> tuple[tuple[Curve, LineStyle], ...]:
+    def ticked(self) -> tuple[tuple[Curve, LineStyle], ...]:
         """Return the ticked curves with their line styles."""
         return tuple(
             (each, self.line_style(each))
@@ -271,7 +271,7 @@ class CurveList(QListWidget):
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Replace the curves of a source."""
-        ticked = {each.name for each, _ in self.shown()}
+        ticked = {each.name for each, _ in self.ticked()}
         known = {each.name for each in self._curves}
         others = [each for each in self._curves if not _is_of(each, source)]
         place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
@@ -282,7 +282,7 @@ class CurveList(QListWidget):
     def remove_chosen(self) -> tuple[str, ...]:
         """Remove the selected curves; return the sources that have none left."""
         before = {each.source for each in self._curves}
-        ticked = {each.name for each, _ in self.shown()}
+        ticked = {each.name for each, _ in self.ticked()}
         rows = {index.row() for index in self.selectedIndexes()}
         self._curves = [each for row, each in enumerate(self._curves) if row not in rows]
         self._list(lambda each: each.name in ticked)
@@ -302,8 +302,8 @@ class CurveList(QListWidget):
             self.item(row).setIcon(_swatch(self.line_style(each), theme))
         self.blockSignals(blocked)
 
-    def _tell_anew(self) -> None:
-        ticked = {each.name for each, _ in self.shown()}
+    def _show_units(self) -> None:
+        ticked = {each.name for each, _ in self.ticked()}
         self._list(lambda each: each.name in ticked)
 
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
@@ -314,7 +314,7 @@ class CurveList(QListWidget):
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             wanted = is_ticked(each)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
-            item.setToolTip(plain_tip(UNITS.told(each.note)))
+            item.setToolTip(plain_tip(UNITS.convert(each.note)))
             item.setIcon(_swatch(self.line_style(each), self._theme))
             self.addItem(item)
         self.blockSignals(blocked)
@@ -322,7 +322,7 @@ class CurveList(QListWidget):
 
 
 def _name(each: Curve) -> str:
-    return printable(UNITS.told(each.name))
+    return printable(UNITS.convert(each.name))
 
 
 def _is_of(each: Curve, source: str) -> bool:
@@ -366,7 +366,7 @@ class PairBox(QGroupBox):
     def __init__(self) -> None:
         super().__init__("Difference in dB")
         self._curves: dict[str, Curve] = {}
-        self._curve, self._reference, self._said = Choice(), Choice(), SentenceLabel(rank="second")
+        self._curve, self._reference, self._summary = Choice(), Choice(), SentenceLabel(rank="second")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
@@ -376,12 +376,12 @@ class PairBox(QGroupBox):
             choice.setMinimumContentsLength(16)
             choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
             form.addRow(label, choice)
-        form.addRow(self._said)
+        form.addRow(self._summary)
 
     @property
     def said(self) -> str:
         """The difference in words, or why there is none."""
-        return self._said.text()
+        return self._summary.text()
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Offer these curves; the selection is kept where possible."""
@@ -406,15 +406,15 @@ class PairBox(QGroupBox):
     def difference(self) -> CurveDifference | None:
         """Return the difference and show it in words; None without a comparison."""
         pair = self.pair()
-        self._said.setText("")
+        self._summary.setText("")
         if pair is None:
             return None
         try:
             found = curve_difference(*pair)
         except AnalysisError as error:
-            self._said.setText(str(error))
+            self._summary.setText(str(error))
             return None
-        self._said.setText(
+        self._summary.setText(
             f"Median {found.median_abs_db:.2g} dB, root mean square {found.rms_db:.2g} dB{_caution(*pair)}"
         )
         return found

@@ -14,9 +14,9 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 from vibench.sim.background import Job
 
 from ...forms.quantity_edit import LineField
-from ...page.app_context import AppContext, Remembered
-from ...page.page import FileKind, Page, Shown
-from ...widgets.boxes import ElidedLabel, Scrolled, column, filled, new_path, push_button, row
+from ...page.app_context import AppContext, SettingKey
+from ...page.page import DisplayedResult, FileKind, Page
+from ...widgets.boxes import ElidedLabel, ScrollArea, column, fill_box, new_path, push_button, row
 from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind, notice_of
 from ...widgets.units import SentenceLabel
 from .recording_table import (
@@ -24,11 +24,11 @@ from .recording_table import (
     Levels,
     Listing,
     RecordingTable,
-    exported,
+    add_note,
+    export_recording,
     facts_text,
-    listed,
-    made_levels,
-    noted,
+    read_levels,
+    read_listing,
     thumbnails,
 )
 from .spectrogram_view import Pictures
@@ -58,7 +58,7 @@ class FilesPage(Page):
         self._looked_s = 0.0
         self._build()
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
-        context.recording_wanted.connect(self.open_path)
+        context.recording_requested.connect(self.open_path)
         context.recording_made.connect(lambda _path: self.list_folder())
         context.folder_chosen.connect(self._go_to)
 
@@ -68,18 +68,18 @@ class FilesPage(Page):
         return self._opened is not None
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The pictures, with the recording named above them."""
         wanted = None if self._opened is None else self._opened.path
-        inside = self.pictures.spectrogram.shown, self.pictures.hidden_motion.shown
-        return Shown(self.pictures, self._pictured_path, wanted), *inside
+        inside = self.pictures.spectrogram.displayed_results, self.pictures.hidden_motion.displayed_results
+        return DisplayedResult(self.pictures, self._pictured_path, wanted), *inside
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Recordings and their folders."""
         return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
-    def entered(self) -> None:
+    def enter(self) -> None:
         """List the folder again, because new files may exist, and focus the table."""
         self.list_folder()
         self.table.setFocus()
@@ -94,7 +94,7 @@ class FilesPage(Page):
 
     def left(self) -> None:
         """Store the position of the divider."""
-        self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
+        self.context.settings.keep_state(SettingKey.SPLITTERS, self._splitter.saveState(), FILES)
 
     def list_folder(self) -> None:
         """List the files of the folder, in the background."""
@@ -105,11 +105,11 @@ class FilesPage(Page):
         if self._listing is not None:
             self._listing.drop()
         self.table.is_listing = True
-        self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
+        self._listing = self.context.background.ask(read_listing, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording from any folder."""
-        self.context.page_wanted.emit(FILES)
+        self.context.page_requested.emit(FILES)
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
@@ -181,7 +181,7 @@ class FilesPage(Page):
             self._take_next(recording, {})
         else:
             self._facts.setText("Reading all samples, for this file keeps no overview…")
-            self._making = self.context.background.ask(made_levels, self._show, self._failed, path)
+            self._making = self.context.background.ask(read_levels, self._show, self._failed, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
         """Add one channel per event loop pass; all channels of a long recording would block the window."""
@@ -257,7 +257,7 @@ class FilesPage(Page):
     def _choose_export(self) -> None:
         path = self.table.chosen_paths()[0]
         if (target := new_path(self, "Export", path.with_suffix(".uff"), EXPORTS)) is not None:
-            self.context.background.ask(exported, self._exported, self._failed, path, target)
+            self.context.background.ask(export_recording, self._exported, self._failed, path, target)
 
     def _exported(self, files: tuple[Path, ...]) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
@@ -266,25 +266,25 @@ class FilesPage(Page):
         text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is stored in the recording.")
         if is_given and text.strip():
             self.context.background.ask(
-                noted, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
+                add_note, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
             )
 
     def _hand_to_compare(self) -> None:
         paths = self.table.chosen_paths()
         if paths:
-            self.context.comparison_wanted.emit(paths)
-            self.context.page_wanted.emit(COMPARE)
+            self.context.comparison_requested.emit(paths)
+            self.context.page_requested.emit(COMPARE)
 
     def _build(self) -> None:
         self._splitter = QSplitter(Qt.Orientation.Vertical)
         self._splitter.setAccessibleName("List and recording")
         for name, part in (("List of recordings", self._browser()), ("Recording in sight", self._viewer())):
-            self._splitter.addWidget(Scrolled(name, part))
+            self._splitter.addWidget(ScrollArea(name, part))
         self._splitter.setSizes([200, 600])
         self._splitter.setStretchFactor(1, 1)
         self._splitter.setChildrenCollapsible(False)
-        filled(QVBoxLayout(self), self._splitter)
-        kept = self.context.settings.state(Remembered.SPLITTERS, FILES)
+        fill_box(QVBoxLayout(self), self._splitter)
+        kept = self.context.settings.state(SettingKey.SPLITTERS, FILES)
         if not kept.isEmpty():
             self._splitter.restoreState(kept)
         self.time_histories.range_changed.connect(self._say_view)

@@ -48,24 +48,24 @@ class ListedRecording:
     """A row of the table."""
 
     path: Path
-    said: CatalogueEntry
+    catalogue_entry: CatalogueEntry
 
     @property
     def name(self) -> str:
         """Path below the folder without suffix, so that attempts of one measurement differ."""
-        return self.said.path.removesuffix(".part").removesuffix(".h5")
+        return self.catalogue_entry.path.removesuffix(".part").removesuffix(".h5")
 
     @property
     def is_readable(self) -> bool:
         """Whether the recording can be opened."""
-        return self.said.state != UNREADABLE
+        return self.catalogue_entry.state != UNREADABLE
 
     @property
-    def played(self) -> str:
+    def excitation_text(self) -> str:
         """Excitation and band: ``"sine sweep 150 to 350 Hz"``."""
-        low, high = self.said.frequency_low_hz, self.said.frequency_high_hz
+        low, high = self.catalogue_entry.frequency_low_hz, self.catalogue_entry.frequency_high_hz
         band = "" if low is None else f"{low:g} Hz" if high in (None, low) else f"{low:g} to {high:g} Hz"
-        return f"{self.said.kind.replace('_', ' ')} {band}".strip()
+        return f"{self.catalogue_entry.kind.replace('_', ' ')} {band}".strip()
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Listing:
     campaigns: tuple[ListedCampaign, ...] = ()
 
 
-def listed(folder: Path) -> Listing:
+def read_listing(folder: Path) -> Listing:
     """Return the contents of a folder; a missing folder counts as empty."""
     if not folder.is_dir():
         return Listing()
@@ -119,7 +119,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         yield ListedCampaign(name, tuple(each.state for each in points), files)
 
 
-def exported(path: Path, target: Path) -> tuple[Path, ...]:
+def export_recording(path: Path, target: Path) -> tuple[Path, ...]:
     """Export a recording in the format of the target's suffix; return the files written."""
     from vibench.analysis.exchange import Format, excerpt, export_samples  # noqa: PLC0415 - slow to load
 
@@ -127,7 +127,7 @@ def exported(path: Path, target: Path) -> tuple[Path, ...]:
         return export_samples(excerpt(recording), Format(target.suffix[1:].lower()), target)
 
 
-def noted(path: Path, text: str) -> Path:
+def add_note(path: Path, text: str) -> Path:
     """Add a note to a recording."""
     with open_recording(path) as recording:
         recording.save_results(NOTE, {}, {"text": text}, roles=())
@@ -148,7 +148,7 @@ def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:
     return {path: thumbnail(path) for path in paths}
 
 
-def made_levels(path: Path) -> Levels:
+def read_levels(path: Path) -> Levels:
     """Return the stored overview of a recording, or compute it from all samples."""
     with open_recording(path) as recording:
         return overview_levels(recording)
@@ -341,8 +341,8 @@ class RecordingModel(QAbstractTableModel):
             case Qt.ItemDataRole.DecorationRole if column == PICTURE:
                 content = self._picture(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
-                said = (str(entry.path), entry.said.reason, entry.said.notes)
-                content = plain_tip("\n".join(map(printable, filter(None, said))))
+                facts = (str(entry.path), entry.catalogue_entry.reason, entry.catalogue_entry.notes)
+                content = plain_tip("\n".join(map(printable, filter(None, facts))))
             case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
                 content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
@@ -357,7 +357,7 @@ class RecordingModel(QAbstractTableModel):
         """Return the thumbnail of a visible row; drawing all those of a long campaign would take too long."""
         found = self._thumbnails.get(path)
         if found is not None and path not in self._pictures:
-            self._pictures[path] = _drawn(found, self._theme)
+            self._pictures[path] = _paint_thumbnail(found, self._theme)
         return self._pictures.get(path)
 
 
@@ -460,36 +460,36 @@ class RecordingTable(QTableView):
 
 
 def _texts(entry: ListedRecording) -> tuple[str, ...]:
-    said = entry.said
+    facts = entry.catalogue_entry
     return (
         "",
         printable(entry.name),
-        state_text(said.state),
-        printable(said.verdict),
-        moment_text(said.started_utc),
-        printable(entry.played),
-        "" if said.amplitude_vpp is None else f"{said.amplitude_vpp:g} Vpp",
-        "" if said.duration_s is None else duration_text(said.duration_s),
-        size_text(said.size_bytes),
+        state_text(facts.state),
+        printable(facts.verdict),
+        moment_text(facts.started_utc),
+        printable(entry.excitation_text),
+        "" if facts.amplitude_vpp is None else f"{facts.amplitude_vpp:g} Vpp",
+        "" if facts.duration_s is None else duration_text(facts.duration_s),
+        size_text(facts.size_bytes),
     )
 
 
 def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
-    said = entry.said
+    facts = entry.catalogue_entry
     return (
         entry.name,
         entry.name,
-        said.state,
-        said.verdict,
-        said.started_utc,
-        entry.played,
-        said.amplitude_vpp or 0.0,
-        said.duration_s or 0.0,
-        float(said.size_bytes),
+        facts.state,
+        facts.verdict,
+        facts.started_utc,
+        entry.excitation_text,
+        facts.amplitude_vpp or 0.0,
+        facts.duration_s or 0.0,
+        float(facts.size_bytes),
     )
 
 
-def _drawn(found: Thumbnail, theme: Theme) -> QPixmap:
+def _paint_thumbnail(found: Thumbnail, theme: Theme) -> QPixmap:
     """Return a thumbnail with a line from the lowest to the highest value of each column."""
     ratio = QGuiApplication.primaryScreen().devicePixelRatio()
     picture = QPixmap(THUMBNAIL_SIZE * ratio)

@@ -23,11 +23,11 @@ from vibench.sim import shipped_specimens
 
 from ...background.background import Background, LatestRequest
 from ...forms.editor import Choice
-from ...page.page import Shown
+from ...page.page import DisplayedResult
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis
 from ...plots.line_style import LIMIT, Dash, curve_style
 from ...plots.plot import Plot
-from ...widgets.boxes import ElidedLabel, filled, row
+from ...widgets.boxes import ElidedLabel, fill_box, row
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, plain_unit
 from .recording_table import role_text
@@ -50,7 +50,7 @@ class HiddenMotionView(QWidget):
         self.tracked = self.plot.curve(curve_style(0), "tracked")
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.said = SentenceLabel(rank="second")
+        self.caption = SentenceLabel(rank="second")
         self.specimen = Choice()
         self.specimen.setAccessibleName("Specimen of the hidden motion")
         self.specimen.setToolTip("Specimen whose springs, masses and stops are used for the estimate")
@@ -73,7 +73,7 @@ class HiddenMotionView(QWidget):
             background, hidden_view, self._show, self._fail, _MOTION_WAIT_MS, self
         )
         chosen = row(QLabel("Specimen"), self.specimen, self.find_numbers, 1)
-        filled(QVBoxLayout(self), chosen, self.said, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
+        fill_box(QVBoxLayout(self), chosen, self.caption, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
         self._clear(CHOOSE)
 
     @property
@@ -82,9 +82,9 @@ class HiddenMotionView(QWidget):
         return self._latest_request.is_busy
 
     @property
-    def shown(self) -> Shown:
+    def displayed_results(self) -> DisplayedResult:
         """The picture, with visible range and options as inputs."""
-        return Shown(self.plot, self._of, self._asked)
+        return DisplayedResult(self.plot, self._of, self._asked)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
         """Select another recording or none; the hint is shown until a picture exists."""
@@ -110,7 +110,7 @@ class HiddenMotionView(QWidget):
             self._latest_request.drop()
             self._clear(f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second.")
             return
-        self.said.setText("working it out…")
+        self.caption.setText("working it out…")
         numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
         specimen = self.specimen.currentData()
         self._asked = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
@@ -137,7 +137,7 @@ class HiddenMotionView(QWidget):
         self.free.setData(found.time_s, found.free_p, connect="finite")
         for line, place in zip(self._stops, found.stops_m, strict=True):
             self.plot.move_level(line, place)
-        self.said.setText(found.sentence)
+        self.caption.setText(found.sentence)
         self.plot.setXRange(found.request.low_s, found.request.high_s, padding=0.0)
 
     def _fail(self, error: BaseException) -> None:
@@ -150,7 +150,7 @@ class HiddenMotionView(QWidget):
             curve.setData([], [])
         for line in self._stops:
             self.plot.move_level(line, nan)
-        self.said.setText("")
+        self.caption.setText("")
         self.plot.with_hint(hint)
         self.plot.viewport().update()
 
@@ -185,8 +185,8 @@ class SpectrogramView(QWidget):
         self.line_width = Choice()
         for width_hz in _WIDTHS_HZ:
             self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
-        self.said = ElidedLabel()
-        self.said.setProperty("rank", "second")
+        self.caption = ElidedLabel()
+        self.caption.setProperty("rank", "second")
         self._theme = theme
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None
@@ -223,9 +223,9 @@ class SpectrogramView(QWidget):
         return self._images[self._spacing]
 
     @property
-    def shown(self) -> Shown:
+    def displayed_results(self) -> DisplayedResult:
         """The picture, with the selected options as inputs."""
-        return Shown(self.plot, self._of, self._asked)
+        return DisplayedResult(self.plot, self._of, self._asked)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
         """Select another recording or none; the hint is shown until a picture exists."""
@@ -285,14 +285,14 @@ class SpectrogramView(QWidget):
         )
         self._asked = asked
         self.plot.setEnabled(self._of in (None, asked))
-        self.said.setText("working it out…")
+        self.caption.setText("working it out…")
         self._latest_request.ask(asked)
 
     def _show(self, found: DensityPicture) -> None:
         self._of = found.request
         self.plot.setEnabled(self._of == self._asked)
         self._images[found.request.spacing].show_picture(found)
-        self.said.setText(
+        self.caption.setText(
             f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
             f"every sample used"
         )
@@ -301,7 +301,7 @@ class SpectrogramView(QWidget):
         self._of = None
         self.plot.setEnabled(True)
         self.image.clear(str(error))
-        self.said.setText("")
+        self.caption.setText("")
 
     def _lay_out(self) -> None:
         bar = QHBoxLayout()
@@ -315,10 +315,10 @@ class SpectrogramView(QWidget):
             label.setBuddy(choice)
             choice.setAccessibleName(f"Spectrogram: {text.lower()}")
             choice.setToolTip(tip)
-            filled(bar, label, choice)
-        bar.addWidget(self.said, 1)
+            fill_box(bar, label, choice)
+        bar.addWidget(self.caption, 1)
         plots = ((plot, 1) for plot in self._plots.values())
-        filled(QVBoxLayout(self), bar, *plots).setContentsMargins(0, 4, 0, 0)
+        fill_box(QVBoxLayout(self), bar, *plots).setContentsMargins(0, 4, 0, 0)
 
 
 class _Image:

@@ -26,14 +26,14 @@ from vibench.analysis.prediction.progress import (
 from vibench.sim.background import Job
 
 from ...forms.editor import Choice
-from ...forms.model_form import JudgedForm
+from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
-from ...page.page import Page, Shown, SideAndPicture
+from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.simulator import Simulator
 from ...plots.axis import FREQUENCY, TIME, PlotAxis, Scale
 from ...plots.line_style import LineStyle, curve_style
 from ...plots.plot import Plot
-from ...widgets.boxes import boxed, column, filled, push_button, row
+from ...widgets.boxes import column, fill_box, push_button, row, titled_box
 from ...widgets.notice import MAPS, SIMULATE, Notice, NoticeKind
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel
@@ -65,7 +65,7 @@ class MapPlot(QWidget):
         self._levels = [self.plot.curve(ON_TOP)]
         self._range: tuple[tuple[float, float], tuple[float, float]] | None = None
         self.plot.scene().sigMouseClicked.connect(self._click)
-        filled(QVBoxLayout(self), self.plot, margin=0)
+        fill_box(QVBoxLayout(self), self.plot, margin=0)
 
     @property
     def in_sight(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -162,7 +162,7 @@ class MotionView(QWidget):
             Plot("Spectrum of m0", FREQUENCY, LINE, theme),
         )
         self.curves = tuple(plot.with_hint("No motion yet.").curve(curve_style(0)) for plot in self.plots)
-        filled(QVBoxLayout(self), self.said, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
+        fill_box(QVBoxLayout(self), self.said, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
         """Clear the plots and show the reason."""
@@ -196,7 +196,7 @@ class MapsPage(Page):
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
-        self.form: JudgedForm[MapRequest] = JudgedForm(MapRequest, "map", frozenset({"described"}))
+        self.form: ValidatedForm[MapRequest] = ValidatedForm(MapRequest, "map", frozenset({"described"}))
         self.map = MapPlot(context.theme)
         self.motion = MotionView(context.theme)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
@@ -209,10 +209,10 @@ class MapsPage(Page):
         self._levels: list[RecordedLevel] = []
         self._is_stale = False
         self._build()
-        self.form.changed.connect(self._judge)
+        self.form.changed.connect(self._validate)
         self.map.picked.connect(self.pick)
-        context.comparison_wanted.connect(self.add_recordings)
-        self._judge()
+        context.comparison_requested.connect(self.add_recordings)
+        self._validate()
 
     @property
     def is_done(self) -> bool:
@@ -225,11 +225,11 @@ class MapsPage(Page):
         return self._state.text()
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The map and the motion, with their requests as inputs."""
         return (
-            Shown(self.map, self._asked, self.form.value),
-            Shown(self.motion, self._motion_of, self._motion_wanted),
+            DisplayedResult(self.map, self._asked, self.form.value),
+            DisplayedResult(self.motion, self._motion_of, self._motion_wanted),
         )
 
     @property
@@ -262,9 +262,9 @@ class MapsPage(Page):
             return
         self._asked, self.picture = request, None
         self.map.clear()
-        self._judge()
+        self._validate()
         self.simulator.begin(request)
-        self._say("Computing; the program is being loaded for the first picture…")
+        self._show_text("Computing; the program is being loaded for the first picture…")
 
     def begin_in_sight(self) -> None:
         """Compute the visible part with as many points as the whole map."""
@@ -280,7 +280,7 @@ class MapsPage(Page):
     def cancel(self) -> None:
         """Stop the computation; points found so far stay."""
         self.simulator.cancel()
-        self._say("Cancelled; the results so far are shown.")
+        self._show_text("Cancelled; the results so far are shown.")
 
     def pick(self, frequency_hz: float, amplitude_m: float) -> None:
         """Show the motion at a point of the map."""
@@ -292,7 +292,7 @@ class MapsPage(Page):
         self.map.mark(frequency_hz, amplitude_m)
         self.motion.said.setText("Following the motion…")
         self._open.setEnabled(True)
-        self._judge()
+        self._validate()
         if self._job is not None:
             self._job.drop()
         self._job = self.context.background.ask(
@@ -302,47 +302,47 @@ class MapsPage(Page):
     def add_recordings(self, paths: object) -> None:
         """Draw the levels of recordings over the map, where they depend on frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
-            self.context.background.ask(recorded_response, self._show_level, _let_pass, Path(path))
+            self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         for part in parts:
             match part:
                 case MapPicture():
                     self.picture, self._is_stale = part, True
-                    self._say(part.said)
+                    self._show_text(part.said)
                 case Trouble():
                     self.context.say(Notice(NoticeKind.WARNING, part.sentence))
                 case _:
                     pass
 
     def _end(self) -> None:
-        self._say(self.said)
+        self._show_text(self.said)
 
     def _die(self, what: str) -> None:
         self.context.say(
             Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Compute again.", "SIMULATOR")
         )
-        self._say("It broke off.")
+        self._show_text("It broke off.")
 
     def _show_motion(self, asked: MotionRequest, motion: SettledMotion) -> None:
         self._motion_of = asked
         self.motion.show_motion(motion)
-        self._judge()
+        self._validate()
 
     def _fail(self, error: BaseException) -> None:
         self._motion_of = None
         self.motion.show_nothing(str(error))
-        self._judge()
+        self._validate()
 
     def _show_level(self, level: RecordedLevel) -> None:
         self._levels.append(level)
         self.map.show_level(level, len(self._levels) - 1)
 
-    def _say(self, text: str) -> None:
+    def _show_text(self, text: str) -> None:
         self._state.setText(text)
         self._cancel.setEnabled(self.simulator.is_busy)
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         wanted = self.form.value
         for button in (self._begin, self._finer):
             button.setEnabled(wanted is not None)
@@ -356,12 +356,12 @@ class MapsPage(Page):
 
     def _open_in_simulate(self) -> None:
         if self._point is not None:
-            self.context.scene_wanted.emit(*self._point)
-            self.context.page_wanted.emit(SIMULATE)
+            self.context.scene_requested.emit(*self._point)
+            self.context.page_requested.emit(SIMULATE)
 
     def _build(self) -> None:
         self._parts = SideAndPicture(
-            self.context, MAPS, boxed("Map", self.form), self._answer(), self._buttons()
+            self.context, MAPS, titled_box("Map", self.form), self._answer(), self._buttons()
         )
         QVBoxLayout(self).addWidget(self._parts)
 
@@ -405,5 +405,5 @@ def _legend_entry(name: str, colour: str) -> str:
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
 
-def _let_pass(_error: BaseException) -> None:
+def _ignore(_error: BaseException) -> None:
     """Ignore the error: noise and dwells have no level over frequency; Compare reports unreadable files."""

@@ -31,7 +31,7 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
     named = measurement.model_copy(update={"name": _free(measurement.name, taken)})
-    return _changed(campaign, measurements=[*_dumped(campaign.measurements), _dump(named)])
+    return _changed(campaign, measurements=[*_dump_all(campaign.measurements), _dump(named)])
 
 
 def with_sweep(
@@ -56,12 +56,12 @@ def with_sweep(
         _require_playable(alone, rig)
     if campaign is None:
         return alone
-    return _changed(campaign, sweeps=[*_dumped(campaign.sweeps), sweep])
+    return _changed(campaign, sweeps=[*_dump_all(campaign.sweeps), sweep])
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
     """Remove one entry; None when none is left."""
-    measurements, sweeps = _dumped(campaign.measurements), _dumped(campaign.sweeps)
+    measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
     if not entries:
@@ -70,9 +70,9 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
     return _changed(campaign, measurements=entries[:first_sweep], sweeps=entries[first_sweep:])
 
 
-def moved_up(campaign: Campaign, number: int) -> Campaign:
+def move_up(campaign: Campaign, number: int) -> Campaign:
     """Move one entry up by one place; tests stay before sweeps."""
-    measurements, sweeps = _dumped(campaign.measurements), _dumped(campaign.sweeps)
+    measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     kind, place = (
         (measurements, number) if number < len(measurements) else (sweeps, number - len(measurements))
     )
@@ -83,11 +83,12 @@ def moved_up(campaign: Campaign, number: int) -> Campaign:
 
 
 def _require_playable(campaign: Campaign, rig: Rig) -> None:
-    asked = max(each.excitation.highest_amplitude_vpp for _, each in campaign.recordings())
+    needed_v = max(each.excitation.highest_amplitude_vpp for _, each in campaign.recordings())
     allowed = rig.generator.amplitude_limit_vpp
-    if asked > allowed:
+    if needed_v > allowed:
         raise ConfigurationError(
-            f"The sweep asks for up to {asked:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on this "
+            f"The sweep asks for up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on "
+            "this "
             "bench (amplitude_limit_vpp of the hardware configuration): lower its levels."
         )
 
@@ -96,7 +97,7 @@ def _changed(campaign: Campaign, **parts: object) -> Campaign:
     return validated({**_dump(campaign), **parts}, Campaign, campaign.name)
 
 
-def _dumped(models: Sequence[BaseModel]) -> list[dict[str, object]]:
+def _dump_all(models: Sequence[BaseModel]) -> list[dict[str, object]]:
     return [_dump(model) for model in models]
 
 
@@ -144,10 +145,10 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
 
 
 def point_rows(
-    seen: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
+    preview: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
 ) -> list[tuple[str, str, str, str]]:
     """Return the state of each recording, from the engine's rows or from the files in the folder."""
-    levels: Mapping[str, str] = {} if seen is None else seen.levels
+    levels: Mapping[str, str] = {} if preview is None else preview.levels
     known = {row.name for row in rows}
     if state in DRIVING or state is EngineState.ARMED or (levels and set(levels) == known):
         return [
@@ -159,7 +160,7 @@ def point_rows(
             )
             for row in rows
         ]
-    complete = frozenset() if seen is None else seen.complete
+    complete = frozenset() if preview is None else preview.complete
     return [
         ("✔", name, level, "recorded before") if name in complete else ("○", name, level, "planned")
         for name, level in levels.items()
@@ -181,9 +182,9 @@ class CampaignPreview:
     """Size [bytes]; None without a rig, which defines the sample rate."""
 
 
-def preview_campaign(asked: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
+def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
     """Return duration, size and levels of a campaign, and the recordings that exist in its folder."""
-    campaign, rig, folder = asked
+    campaign, rig, folder = request
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))
     levels = {

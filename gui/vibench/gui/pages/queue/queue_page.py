@@ -35,16 +35,16 @@ from ...background.background import LatestRequest
 from ...forms.editor import Choice
 from ...forms.model_form import complaints_of
 from ...forms.quantity_edit import QuantityEdit
-from ...page.app_context import AppContext, Remembered
-from ...page.page import FileKind, History, Page, Shown, SideAndPicture
+from ...page.app_context import AppContext, SettingKey
+from ...page.page import DisplayedResult, FileKind, History, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import ProgressBar, boxed, column, filled, push_button, row
+from ...widgets.boxes import ProgressBar, column, fill_box, push_button, row, titled_box
 from ...widgets.notice import QUEUE, Notice, NoticeKind, clock, notice_of
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
 from .draft import (
     CampaignPreview,
-    moved_up,
+    move_up,
     point_rows,
     preview_campaign,
     with_measurement,
@@ -140,7 +140,7 @@ class QueuePage(Page):
         super().__init__(context)
         self._actions = UserActions(context, self)
         self._history: History[Campaign] = History()
-        self._seen: CampaignPreview | None = None
+        self._preview: CampaignPreview | None = None
         self._of: tuple[Campaign, Rig | None] | None = None
         """Campaign and rig of the displayed summary; None without one."""
         self.choice = Choice()
@@ -171,12 +171,12 @@ class QueuePage(Page):
             "Keep complete recordings in the folder and record the rest",
             self._arm_missing,
         )
-        self.left_alone = QCheckBox("Left alone")
-        self.left_alone.setToolTip(
+        self.unattended = QCheckBox("Left alone")
+        self.unattended.setToolTip(
             "The engine controls limits, ramps and recordings. 'vibench watch' and 'vibench stop' reach it "
             "from a terminal.\nUnticked, the drive ramps down when the window does not answer."
         )
-        self.left_alone.setChecked(True)
+        self.unattended.setChecked(True)
         self.hold_button = push_button("Hold (drive on)", "Hold the run; the drive stays on", self._hold)
         self._looking = LatestRequest(
             context.looks, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
@@ -201,9 +201,9 @@ class QueuePage(Page):
             button.setEnabled(state is EngineState.READY and campaign is not None)
         self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
         self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold (drive on)")
-        self.rows.show_rows(point_rows(self._seen, () if status is None else status.rows, state))
-        if campaign is not None and self._seen is not None:
-            self._say_summary(campaign, self._seen)  # update the estimated end
+        self.rows.show_rows(point_rows(self._preview, () if status is None else status.rows, state))
+        if campaign is not None and self._preview is not None:
+            self._say_summary(campaign, self._preview)  # update the estimated end
         self._show_progress(status)
 
     @property
@@ -224,16 +224,16 @@ class QueuePage(Page):
             self.context.selection.choose_campaign(campaign)
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The summary and the rows, with their campaign as input."""
         wanted = (self.context.selection.campaign, self.context.selection.rig)
-        return tuple(Shown(each, self._of, wanted) for each in (self.summary, self.entries))
+        return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
     def left(self) -> None:
         """Store the campaign and the position of the divider."""
         self._parts.keep()
         campaign = self.context.selection.campaign
-        self.context.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
+        self.context.settings.keep_text(SettingKey.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
     def open_file(self, path: Path) -> None:
         """Load the campaign of a file."""
@@ -258,34 +258,34 @@ class QueuePage(Page):
         campaign, rig = self.context.selection.campaign, self.context.selection.rig
         if campaign is None:
             self._looking.drop()
-            self._seen = self._of = None
+            self._preview = self._of = None
             self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
         self._history.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
-        self._seen = self._of = None
+        self._preview = self._of = None
         self.entries.setEnabled(False)
         self._looking.ask((campaign, rig, self.context.folder / campaign.name))
 
-    def _looked(self, seen: CampaignPreview) -> None:
+    def _looked(self, preview: CampaignPreview) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
             return
-        self._seen, self._of = seen, (campaign, self.context.selection.rig)
+        self._preview, self._of = preview, (campaign, self.context.selection.rig)
         self.entries.setEnabled(True)
         row = self.entries.currentRow()
-        self.entries.show_rows(seen.rows)
-        self.entries.selectRow(min(row, len(seen.rows) - 1))
-        self._say_summary(campaign, seen)
+        self.entries.show_rows(preview.rows)
+        self.entries.selectRow(min(row, len(preview.rows) - 1))
+        self._say_summary(campaign, preview)
 
-    def _say_summary(self, campaign: Campaign, seen: CampaignPreview) -> None:
-        count = len(seen.levels)
-        size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
-        end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
+    def _say_summary(self, campaign: Campaign, preview: CampaignPreview) -> None:
+        count = len(preview.levels)
+        size = "" if preview.size_bytes is None else f"   ·   {preview.size_bytes / 1e9:.2f} GB"
+        end = datetime.now().astimezone() + timedelta(seconds=preview.duration_s)
         self.summary.setText(
             f"{campaign.name}: {count} recording{'' if count == 1 else 's'}   ·   "
-            f"takes {clock(seen.duration_s)}   ·   "
+            f"takes {clock(preview.duration_s)}   ·   "
             f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 
@@ -327,7 +327,7 @@ class QueuePage(Page):
     def _move_up(self) -> None:
         campaign, number = self.context.selection.campaign, self._chosen_entry
         if campaign is not None and number > 0:
-            self.context.selection.choose_campaign(moved_up(campaign, number))
+            self.context.selection.choose_campaign(move_up(campaign, number))
             self.entries.setCurrentCell(number - 1, 0)
 
     def _arm(self) -> None:
@@ -338,7 +338,7 @@ class QueuePage(Page):
 
     @property
     def _attendance(self) -> Supervision:
-        return Supervision.UNATTENDED if self.left_alone.isChecked() else Supervision.ATTENDED
+        return Supervision.UNATTENDED if self.unattended.isChecked() else Supervision.ATTENDED
 
     def _hold(self) -> None:
         self._actions.hold_or_resume()
@@ -368,7 +368,7 @@ class QueuePage(Page):
             self.open_file(all_shipped("campaigns")[row - 1])
 
     def _restore(self) -> None:
-        kept = self.context.settings.text(Remembered.CAMPAIGN)
+        kept = self.context.settings.text(SettingKey.CAMPAIGN)
         if kept:
             try:
                 campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
@@ -404,7 +404,7 @@ class QueuePage(Page):
             push_button("Move &up", "Move the chosen entry up", self._move_up),
             push_button("&Remove", "Remove the chosen entry", self._remove),
         )
-        campaign = boxed("Campaign", self.entries, edits)
+        campaign = titled_box("Campaign", self.entries, edits)
         attended = SentenceLabel("continues when the window freezes or is closed", rank="second")
         left = column(self.choice, files, (campaign, 1), self.sweep)
         right = column(
@@ -412,9 +412,9 @@ class QueuePage(Page):
             self.arm_button,
             self.resume_button,
             self.hold_button,
-            row(self.left_alone, (attended, 1)),
+            row(self.unattended, (attended, 1)),
             self.progress,
-            (boxed("Recordings", self.rows), 1),
+            (titled_box("Recordings", self.rows), 1),
         )
         self._parts = SideAndPicture(self.context, QUEUE, left, right)
-        filled(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), self._parts)

@@ -36,13 +36,13 @@ from vibench.sim import SpecimenWarning
 
 from ...forms.editor import Choice
 from ...forms.quantity_edit import LineField
-from ...page.app_context import AppContext, Remembered
+from ...page.app_context import AppContext, SettingKey
 from ...page.page import FileKind, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import boxed, column, filled, plain_tip, push_button
+from ...widgets.boxes import column, fill_box, plain_tip, push_button, titled_box
 from ...widgets.notice import RIG, Notice, NoticeKind, moment_text, notice_of
 from ...widgets.read_table import ReadTable
-from ...widgets.units import SentenceLabel, fitted_unit
+from ...widgets.units import SentenceLabel, prefixed_unit
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
 """Pace of a simulated bench."""
@@ -202,7 +202,7 @@ def measured_text(finding: Finding) -> str:
     number = finding.number
     if number is None or not isfinite(number):
         return finding.value
-    unit = fitted_unit(finding.unit, number)
+    unit = prefixed_unit(finding.unit, number)
     if unit.per_si == 1.0:
         return finding.value
     spread = "" if finding.uncertainty is None else f" ± {finding.uncertainty * unit.per_si:.1g}"
@@ -260,7 +260,7 @@ class RigPage(Page):
         self._lay_out()
         self._connect()
         otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
-        remembered = Path(self.context.settings.text(Remembered.BENCH, otherwise))
+        remembered = Path(self.context.settings.text(SettingKey.BENCH, otherwise))
         self.choice.choose(self.context.first_bench or remembered)
 
     @property
@@ -286,7 +286,7 @@ class RigPage(Page):
             self.instruments.show_rows([(part, reply) for part, reply in status.bench.identities.items()])
         self._show_check(status)
 
-    def entered(self) -> None:
+    def enter(self) -> None:
         """Focus the widget of the next step."""
         if self.open_button.isEnabled():
             self.open_button.setFocus()
@@ -355,7 +355,7 @@ class RigPage(Page):
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
             warning = f"\n⚠ {self.choice.warning}" if self.choice.warning else ""
             self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}{warning}")
-            self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
+            self.context.settings.keep_text(SettingKey.BENCH, str(self.choice.path))
         self.context.selection.choose_rig(rig)
 
     def _find(self) -> None:
@@ -389,12 +389,12 @@ class RigPage(Page):
     def _lay_out(self) -> None:
         buttons = self.open_button, self.check_button, self.find_button, self.close_button
         side = QWidget()
-        left = filled(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
+        left = fill_box(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
         left.addSpacing(self.fontMetrics().height())
-        filled(left, self.first_steps, 1)
+        fill_box(left, self.first_steps, 1)
         right = column(
-            (boxed("Instruments", self.instruments), 1),
-            (boxed("Check", self.verdict, self.findings), 3),
+            (titled_box("Instruments", self.instruments), 1),
+            (titled_box("Check", self.verdict, self.findings), 3),
         )
         self._parts = SideAndPicture(self.context, RIG, side, right)
-        filled(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), self._parts)

@@ -17,7 +17,7 @@ from vibench.analysis.live import LiveView, Portrait, zigzag
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import LIMIT, PREDICTED, Dash, LineStyle, curve_style
 from ...plots.plot import Plot
-from ...widgets.boxes import filled
+from ...widgets.boxes import fill_box
 from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
@@ -40,11 +40,11 @@ class SweepPlot(QWidget):
     def __init__(self, tab: str, plot: Plot) -> None:
         super().__init__()
         self.title, self.tab, self.plot = plot.accessibleName(), tab, plot
-        self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
+        self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], fill_box=0.15))
         self.predicted: Curves = {}
         self.measured: Curves = {}
         self._shown = 0
-        filled(QVBoxLayout(self), plot, margin=0)
+        fill_box(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw all points in time order."""
@@ -222,7 +222,7 @@ class TransmissibilityPlot(QWidget):
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
-        shade = LineStyle(lambda theme: theme.traces[0], filled=0.25)
+        shade = LineStyle(lambda theme: theme.traces[0], fill_box=0.25)
         self._band = self.magnitude.band(shade, MEASURED)
         self._predicted = {
             "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),
@@ -234,7 +234,7 @@ class TransmissibilityPlot(QWidget):
         self.coherence.setXLink(self.magnitude)
         # The lower plot labels the frequency axis of both.
         self.magnitude.across.show_nothing()
-        filled(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
+        fill_box(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
     def show_view(self, view: LiveView) -> None:
         """Draw the current estimates."""
@@ -273,8 +273,8 @@ class SpectrumPlot(QWidget):
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
         self._view: LiveView | None = None
-        UNITS.on_change(self._draw_anew)
-        filled(QVBoxLayout(self), self.plot, margin=0)
+        UNITS.on_change(self._redraw)
+        fill_box(QVBoxLayout(self), self.plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw the current spectra."""
@@ -289,7 +289,7 @@ class SpectrumPlot(QWidget):
         for curve, density, unit in zip(self._curves, found.amplitude_density, units, strict=False):
             curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
 
-    def _draw_anew(self) -> None:
+    def _redraw(self) -> None:
         """Redraw after a change of units; the axis has the unit of each channel."""
         self.plot.wipe()
         self._curves.clear()
@@ -328,7 +328,7 @@ class PortraitPlot(QWidget):
         self._strobe = self.orbit.dots(curve_style(3), size=6)
         self._points = self.section.dots(curve_style(3), size=3)
         self._shown: Portrait | None = None
-        filled(QHBoxLayout(self), (self.orbit, 1), (self.section, 1), margin=0)
+        fill_box(QHBoxLayout(self), (self.orbit, 1), (self.section, 1), margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw the newest periods."""
@@ -378,11 +378,11 @@ class HiddenMotionPlot(QWidget):
             self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
         ]
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.said = SentenceLabel(rank="second")
-        self.said.setAccessibleName("Report of the live twin")
+        self.caption = SentenceLabel(rank="second")
+        self.caption.setAccessibleName("Report of the live twin")
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
-        filled(QVBoxLayout(self), self.said, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)
+        fill_box(QVBoxLayout(self), self.caption, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)
         self.clear()
 
     def show_status(self, status: EngineStatus | None) -> None:
@@ -391,7 +391,7 @@ class HiddenMotionPlot(QWidget):
         if twin is None:
             self.clear()
             return
-        self.said.setText(_words(twin))
+        self.caption.setText(_words(twin))
         if (twin.run_id, twin.end_sample) == self._end or not twin.p_m:
             return
         self._end = (twin.run_id, twin.end_sample)
@@ -409,7 +409,7 @@ class HiddenMotionPlot(QWidget):
             curve.setData([], [])
         for line in self._stops:
             self.plot.move_level(line, nan)
-        self.said.setText("The live twin is off.")
+        self.caption.setText("The live twin is off.")
         self._end = (0, -1)
 
     def _draw_forecast(self, twin: TwinStatus) -> None:

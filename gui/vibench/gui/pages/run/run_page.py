@@ -31,9 +31,9 @@ from ...forms.editor import Choice
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
 from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
-from ...page.page import Page, Shown, SideAndPicture
+from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import ProgressBar, column, filled, paint_hint, push_button, row
+from ...widgets.boxes import ProgressBar, column, fill_box, paint_hint, push_button, row
 from ...widgets.notice import FILES, RUN, clock, outcome_text
 from ...widgets.theme import Theme, Tone
 from ...widgets.units import SentenceLabel
@@ -73,8 +73,8 @@ class LevelMeters(QWidget):
         if len(rows) != len(self._rows):
             self.updateGeometry()
         self._rows = rows
-        said = ", ".join(f"{word} {level.held_share:.0%} {_WORDS[level.verdict]}" for word, level in rows)
-        self.setAccessibleDescription(said)
+        text = ", ".join(f"{word} {level.held_share:.0%} {_WORDS[level.verdict]}" for word, level in rows)
+        self.setAccessibleDescription(text)
         self.update()
 
     def retheme(self, theme: Theme) -> None:
@@ -106,8 +106,8 @@ class LevelMeters(QWidget):
         painter.setPen(QColor(ink))
         line = QRectF(area.left(), area.top(), area.width(), text_height)
         painter.drawText(line, Qt.AlignmentFlag.AlignLeft, word)
-        said = f"{_WORDS[level.verdict]}  {100 * level.held_share:.1f} %"
-        painter.drawText(line, Qt.AlignmentFlag.AlignRight, said)
+        text = f"{_WORDS[level.verdict]}  {100 * level.held_share:.1f} %"
+        painter.drawText(line, Qt.AlignmentFlag.AlignRight, text)
         bar = QRectF(area.left(), area.top() + text_height + 1, area.width(), 0.45 * text_height)
         painter.fillRect(bar, QColor(self._theme.raised))
         tone = Tone.DANGER if level.verdict is LevelVerdict.OVER else Tone.GOOD
@@ -128,9 +128,9 @@ class WatchCard(QGroupBox):
     """Progress, averages, impacts, time range, marks and the live twin's switch."""
 
     mark_wanted = Signal(str)
-    reject_wanted = Signal()
+    reject_requested = Signal()
     """Exclude the current average of noise from all results."""
-    twin_wanted = Signal(object)
+    twin_requested = Signal(object)
     """A `TwinSwitch`."""
 
     def __init__(self, theme: Theme) -> None:
@@ -158,13 +158,13 @@ class WatchCard(QGroupBox):
             "separate process, so that the measurement never waits"
         )
         self.twin.clicked.connect(
-            lambda is_on: self.twin_wanted.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
+            lambda is_on: self.twin_requested.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
         )
         self._begun = 0
         self.averages = QLabel("–")
         self.averages.setToolTip("Averages of noise, started and planned")
         self.reject_button = push_button(
-            "Reject this one", "Exclude the current average from all results", self.reject_wanted.emit
+            "Reject this one", "Exclude the current average from all results", self.reject_requested.emit
         )
         self.mark = LineField("event")
         self.mark.setToolTip("Text of the mark in the recording")
@@ -221,7 +221,7 @@ class WatchCard(QGroupBox):
             form.addRow(label, field)
         self.mark.setAccessibleName("Text of the mark")
         marks = row((self.mark, 1), self.mark_button)
-        filled(QVBoxLayout(self), self.progress, form, self.meters, self.freeze, self.twin, marks)
+        fill_box(QVBoxLayout(self), self.progress, form, self.meters, self.freeze, self.twin, marks)
 
 
 def _progress_text(run: RunStatus) -> str:
@@ -262,7 +262,7 @@ class ArmCard(QGroupBox):
         self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit)
         self.start_button.setProperty("rank", "first")
         self.hold_button = push_button("Hold", "Hold the run; the drive stays on", self.hold_wanted.emit)
-        filled(QVBoxLayout(self), self._words)
+        fill_box(QVBoxLayout(self), self._words)
         self.buttons = column(
             self.arm_button, row(self.cancel_button, (self.start_button, 1)), self.hold_button
         )
@@ -296,11 +296,11 @@ class ArmCard(QGroupBox):
         if is_armed and armed is not None:
             left = f"Disarms itself in {armed.expires_in_s:.0f} s."
             words = (f"Campaign {armed.campaign}", *armed.lines)
-            self._say("\n".join((*words, left)))
+            self._show_words("\n".join((*words, left)))
         elif state in DRIVING:
-            self._say("Plan and limits are fixed while it runs. Stop ramps down; Esc aborts.")
+            self._show_words("Plan and limits are fixed while it runs. Stop ramps down; Esc aborts.")
         else:
-            self._say(_HINTS.get(state) or reason or f"Ready to arm: {test}")
+            self._show_words(_HINTS.get(state) or reason or f"Ready to arm: {test}")
         self.arm_button.setVisible(not is_armed and state not in DRIVING)
         self.arm_button.setEnabled(state is EngineState.READY and not reason)
         self.cancel_button.setVisible(is_armed)
@@ -316,7 +316,7 @@ class ArmCard(QGroupBox):
         self.start_button.setEnabled(self.is_read)
         self.start_button.setText("▶ Start  (F5)" if self.is_read else UNREAD)
 
-    def _say(self, text: str) -> None:
+    def _show_words(self, text: str) -> None:
         if self._words.sentence != text:
             self._words.setText(text)
 
@@ -404,11 +404,11 @@ class RunPage(Page):
                 shown.show_view(view)
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """Pictures and numbers, with their run as input; frozen pictures are not marked as outdated."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
-        return tuple(Shown(each, self._view, self.context.bridge.view) for each in self._of_the_run)
+        return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)
 
     @property
     def _of_the_run(self) -> tuple[QWidget, ...]:
@@ -460,10 +460,10 @@ class RunPage(Page):
         self.left_tabs.setCurrentWidget(pictures[shown.left])
         self.right_tabs.setCurrentWidget(pictures[shown.right])
 
-    def _show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        self.frequency_response.show_prediction(seen)
-        self.history.show_prediction(seen)
-        self.envelope.show_prediction(seen)
+    def _show_prediction(self, prediction: MeasurementPrediction | None) -> None:
+        self.frequency_response.show_prediction(prediction)
+        self.history.show_prediction(prediction)
+        self.envelope.show_prediction(prediction)
 
     def _recorded(self, path: Path) -> None:
         self._ended = path
@@ -483,8 +483,8 @@ class RunPage(Page):
 
     def _look(self) -> None:
         if self._ended is not None:
-            self.context.recording_wanted.emit(self._ended)
-            self.context.page_wanted.emit(FILES)
+            self.context.recording_requested.emit(self._ended)
+            self.context.page_requested.emit(FILES)
 
     def _mark(self, text: str) -> None:
         if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
@@ -522,10 +522,10 @@ class RunPage(Page):
         self.arm_card.news.connect(lambda: self._parts.side.verticalScrollBar().setValue(0))
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
-        self.watch_card.reject_wanted.connect(self._reject)
+        self.watch_card.reject_requested.connect(self._reject)
         # Otherwise the pictures of a finished run would pass for those of this run until the next tick.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
-        self.watch_card.twin_wanted.connect(self._turn_twin)
+        self.watch_card.twin_requested.connect(self._turn_twin)
         self.look_button.clicked.connect(self._look)
         self.context.recording_made.connect(self._recorded)
         self.context.selection.rig_changed.connect(self._show_channels)
@@ -553,4 +553,4 @@ class RunPage(Page):
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
         self._parts = SideAndPicture(self.context, RUN, left, right, self.arm_card.buttons)
-        filled(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), self._parts)

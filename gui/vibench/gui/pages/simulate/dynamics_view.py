@@ -23,11 +23,11 @@ from vibench.analysis.dynamics import (
 from vibench.analysis.prediction.progress import PartialResult, Trouble
 from vibench.analysis.prediction.worker import Asked
 
-from ...forms.model_form import JudgedForm
+from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext
-from ...page.page import Shown, SideAndPicture
+from ...page.page import DisplayedResult, SideAndPicture
 from ...page.simulator import Simulator
-from ...widgets.boxes import boxed, column, push_button, row
+from ...widgets.boxes import column, push_button, row, titled_box
 from ...widgets.notice import COMPARE, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
 
@@ -80,14 +80,14 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         super().__init__()
         self.context, self.kind, self.picture = context, kind, picture
         self.setAccessibleName(kind.name.capitalize())
-        self.form: JudgedForm[Request] = JudgedForm(kind.request, kind.name, kind.hidden)
+        self.form: ValidatedForm[Request] = ValidatedForm(kind.request, kind.name, kind.hidden)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.answer: Answer | None = None
         self._course: _Course | None = None
         self._is_stale = False
         self._build()
-        self.form.changed.connect(self._judge)
-        self._judge()
+        self.form.changed.connect(self._validate)
+        self._validate()
 
     @property
     def said(self) -> str:
@@ -95,10 +95,10 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return self._state.text()
 
     @property
-    def shown(self) -> Shown:
+    def displayed_results(self) -> DisplayedResult:
         """The plots, with the request as input."""
         asked = None if self._course is None else self._course.request
-        return Shown(self.picture.widget, asked, self.form.value)
+        return DisplayedResult(self.picture.widget, asked, self.form.value)
 
     def refresh(self) -> None:
         """Draw the pieces received since the last tick."""
@@ -116,19 +116,19 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if request is None:
             return
         self._course = _Course(request, time.perf_counter())  # type: ignore[arg-type]
-        self._judge()
+        self._validate()
         self._take(())
         self.simulator.begin(request)  # type: ignore[arg-type]
-        self._say("Computing; the program is being loaded for the first result…")
+        self._show_text("Computing; the program is being loaded for the first result…")
 
     def cancel(self) -> None:
         """Cancel the computation; pieces found so far stay."""
         self.simulator.cancel()
-        self._say("Cancelled; the results so far are shown.")
+        self._show_text("Cancelled; the results so far are shown.")
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         self._take(parts)
-        self._say("Looking…")
+        self._show_text("Looking…")
 
     def _take(self, parts: tuple[PartialResult, ...]) -> None:
         course = self._course
@@ -146,7 +146,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _end(self) -> None:
         self._take(())
-        self._say("Complete.")
+        self._show_text("Complete.")
         if self._course is not None and self._course.troubles:
             self.context.say(Notice(NoticeKind.WARNING, self._course.troubles[0]))
 
@@ -154,16 +154,16 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self.context.say(
             Notice(NoticeKind.FAULT, what, "The results so far are shown.", "Ask again.", "SIMULATOR")
         )
-        self._say("It broke off.")
+        self._show_text("It broke off.")
 
-    def _say(self, text: str) -> None:
+    def _show_text(self, text: str) -> None:
         has_nothing = self.simulator.is_busy and (self._course is None or not self._course.parts)
         cost = "" if self.answer is None or has_nothing else self.kind.cost(self.answer)
         self._state.setText(f"{text} {cost}")
         self._cancel.setEnabled(self.simulator.is_busy)
         self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         self._begin.setEnabled(self.form.value is not None)
         asked = None if self._course is None else self._course.request
         self.picture.widget.setEnabled(self.form.value is not None and asked in (None, self.form.value))
@@ -171,7 +171,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     def _hand_to_compare(self) -> None:
         if self.answer is not None:
             self.context.prediction_made.emit(self.kind.curves(self.answer))
-            self.context.page_wanted.emit(COMPARE)
+            self.context.page_requested.emit(COMPARE)
 
     def _build(self) -> None:
         self._parts = SideAndPicture(
@@ -180,7 +180,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:
-        scene, before = boxed("Scene", self.form), SentenceLabel(self.kind.before, rank="second")
+        scene, before = titled_box("Scene", self.form), SentenceLabel(self.kind.before, rank="second")
         return column(scene, before, 1)
 
     def _buttons(self) -> QLayout:

@@ -15,11 +15,11 @@ from vibench.analysis.prediction.progress import (
     SimulationRequest,
 )
 
-from ...forms.model_form import JudgedForm
-from ...page.app_context import AppContext, Remembered
-from ...page.page import Page, Shown, SideAndPicture
+from ...forms.model_form import ValidatedForm
+from ...page.app_context import AppContext, SettingKey
+from ...page.page import DisplayedResult, Page, SideAndPicture
 from ...page.simulator import Simulator
-from ...widgets.boxes import TimedBar, boxed, column, filled, push_button, row
+from ...widgets.boxes import TimedBar, column, fill_box, push_button, row, titled_box
 from ...widgets.notice import COMPARE, SIMULATE, Notice, NoticeKind
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
@@ -35,7 +35,7 @@ class SimulatePage(Page):
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
-        self.form: JudgedForm[SimulationRequest] = JudgedForm(
+        self.form: ValidatedForm[SimulationRequest] = ValidatedForm(
             SimulationRequest, "simulation", frozenset({"described"})
         )
         self.plots = AnswerPlots(context.theme)
@@ -52,9 +52,9 @@ class SimulatePage(Page):
         self._views = (self.branches, self.spectrum, self.chain)
         self._build()
         self.form.changed.connect(self._say_cost)
-        context.scene_wanted.connect(self.show_scene)
+        context.scene_requested.connect(self.show_scene)
         with suppress(ValueError):  # stored by another version or edited by hand
-            self.form.form.show_content(dict(json.loads(context.settings.text(Remembered.SCENES))))
+            self.form.form.show_content(dict(json.loads(context.settings.text(SettingKey.SCENES))))
         if self.form.value is None:
             self.form.form.show_content({})
         self._say_cost()
@@ -83,17 +83,20 @@ class SimulatePage(Page):
         """Store the position of the divider."""
         self._parts.keep()
         kept = self.form.form.content()
-        self.context.settings.keep_text(Remembered.SCENES, json.dumps(kept))
+        self.context.settings.keep_text(SettingKey.SCENES, json.dumps(kept))
         for view in self._views:
             view.left()
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The curves, with their request as input."""
-        return (Shown(self.plots, self._request, self.form.value), *(view.shown for view in self._views))
+        return (
+            DisplayedResult(self.plots, self._request, self.form.value),
+            *(view.displayed_results for view in self._views),
+        )
 
     @property
-    def styled(self) -> tuple[QWidget, ...]:
+    def styled_parts(self) -> tuple[QWidget, ...]:
         """The tabs, each of which has as many fields as another page."""
         return (self._parts, *self._views)
 
@@ -172,7 +175,7 @@ class SimulatePage(Page):
     def _hand_to_compare(self) -> None:
         if self.progress is not None:
             self.context.prediction_made.emit(self.progress.curves())
-            self.context.page_wanted.emit(COMPARE)
+            self.context.page_requested.emit(COMPARE)
 
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer(), self._buttons())
@@ -183,13 +186,13 @@ class SimulatePage(Page):
         self.tabs.addTab(self.branches, "Branches")
         self.tabs.addTab(self.spectrum, "Exponents")
         self.tabs.addTab(self.chain, "Chain")
-        filled(QVBoxLayout(self), self.tabs)
+        fill_box(QVBoxLayout(self), self.tabs)
 
     def _side(self) -> QWidget:
-        scene = boxed("Scene", self.form)
+        scene = titled_box("Scene", self.form)
         self._cost = SentenceLabel()
         self._cost.setAccessibleName("Cost and error of this accuracy")
-        cost = boxed("Cost and error of this accuracy", self._cost)
+        cost = titled_box("Cost and error of this accuracy", self._cost)
         return column(scene, cost, 1)
 
     def _buttons(self) -> QLayout:

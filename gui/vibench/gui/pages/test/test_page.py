@@ -44,19 +44,19 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 
 from ...background.background import LatestRequest
 from ...forms.editor import Choice
-from ...forms.model_form import GroupEditor, JudgedForm
-from ...page.app_context import AppContext, Remembered
-from ...page.page import FileKind, History, Page, Shown, SideAndPicture
+from ...forms.model_form import GroupEditor, ValidatedForm
+from ...page.app_context import AppContext, SettingKey
+from ...page.page import DisplayedResult, FileKind, History, Page, SideAndPicture
 from ...page.user_actions import UserActions
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
 from ...plots.line_style import Dash, LineStyle, curve_style
 from ...plots.plot import Plot
 from ...plots.signal_curve import SHARE_ROLE, BarDelegate, SignalCurve
-from ...widgets.boxes import boxed, column, filled, push_button, row
+from ...widgets.boxes import column, fill_box, push_button, row, titled_box
 from ...widgets.notice import TEST, Notice, NoticeKind, clock, notice_of
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
-from ...widgets.units import SentenceLabel, fitted_unit
+from ...widgets.units import SentenceLabel, prefixed_unit
 from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
 """Starting values by kind, used in place of the values of the previous kind."""
 
 
-class TestForm(JudgedForm[Measurement]):
+class TestForm(ValidatedForm[Measurement]):
     """Form of a measurement; `value` is None while it is not valid."""
 
     def __init__(self) -> None:
@@ -105,7 +105,7 @@ class TestForm(JudgedForm[Measurement]):
         excitation = self.form.editors["excitation"]
         assert isinstance(excitation, GroupEditor)
         lines = {word: (each.group, each.about) for word, each in EXCITATION_KINDS.items()}
-        excitation.know(USUAL, FRESH, lines)
+        excitation.set_starting_values(USUAL, FRESH, lines)
         choice = excitation.kind_choice
         assert choice is not None
         choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
@@ -157,7 +157,7 @@ def load_test(path: Path) -> Measurement:
     return load_toml(path, Measurement)
 
 
-COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
+COLLISION = LineStyle(lambda theme: theme.traces[3], fill_box=0.18)
 
 
 class PredictionPlot(Plot):
@@ -215,7 +215,7 @@ class PreviewPlots(QWidget):
             plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
         self._signal = SignalCurve(self.time, curve_style(0))
         self._lines = self.spectrum.curve(curve_style(0))
-        filled(QHBoxLayout(self), (self.time, 1), (self.spectrum, 1), margin=0)
+        fill_box(QHBoxLayout(self), (self.time, 1), (self.spectrum, 1), margin=0)
 
     def show_preview(self, seen: MeasurementPreview) -> None:
         """Draw the preview of a test."""
@@ -240,7 +240,7 @@ class LimitTable(ReadTable):
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
         """Show the loads checked against the rig's limits."""
-        units = [fitted_unit(check.unit, check.limit) for check in checks]
+        units = [prefixed_unit(check.unit, check.limit) for check in checks]
         self.show_rows(
             [
                 (
@@ -300,18 +300,18 @@ def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
         )
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
-    said = "   ·   ".join(parts)
+    summary = "   ·   ".join(parts)
     if refusal:
-        return f"✖ {refusal}   ·   {said}"
+        return f"✖ {refusal}   ·   {summary}"
     if not broken:
-        return f"✔ within all limits   ·   {said}"
+        return f"✔ within all limits   ·   {summary}"
     sign = "✖" if broken[0].forbids else "⚠"
     reasons = "   ·   ".join(check.complaint() for check in broken)
-    return f"{sign} {reasons}   ·   {said}"
+    return f"{sign} {reasons}   ·   {summary}"
 
 
 def _load(check: LimitCheck, name: str) -> str:
-    unit = fitted_unit(check.unit, check.limit)
+    unit = prefixed_unit(check.unit, check.limit)
     return f"{name} {unit.text(check.value)} of {unit.text(check.limit)}"
 
 
@@ -390,18 +390,18 @@ class TestPage(Page):
             self.form.show_value(measurement)
 
     @property
-    def shown(self) -> tuple[Shown, ...]:
+    def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """Loads, plots and prediction, each with its test and rig as inputs."""
-        wanted = self._wanted
+        wanted = self._inputs
         return (
-            Shown(self.summary, self._summary_of, wanted),
-            *(Shown(each, self._of, wanted) for each in (self.plots, self.limits)),
-            Shown(self.prediction, self._predicted_of, wanted),
-            Shown(self.prediction_note, self._predicted_of, wanted),
+            DisplayedResult(self.summary, self._summary_of, wanted),
+            *(DisplayedResult(each, self._of, wanted) for each in (self.plots, self.limits)),
+            DisplayedResult(self.prediction, self._predicted_of, wanted),
+            DisplayedResult(self.prediction_note, self._predicted_of, wanted),
         )
 
     @property
-    def _wanted(self) -> tuple[Measurement | None, Rig | None]:
+    def _inputs(self) -> tuple[Measurement | None, Rig | None]:
         value = self.form.value
         nameless = None if value is None else value.model_copy(update=NAMELESS)
         return nameless, self.context.selection.rig
@@ -411,10 +411,10 @@ class TestPage(Page):
         self._parts.keep()
         measurement = self.form.value
         if measurement is not None:
-            self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
+            self.context.settings.keep_text(SettingKey.TEST, toml_text(measurement))
 
     def _changed(self) -> None:
-        measurement, asked = self.form.value, self._wanted
+        measurement, asked = self.form.value, self._inputs
         seen = self.context.selection.prediction
         self.context.selection.choose_measurement(measurement)
         if measurement is not None:
@@ -502,8 +502,8 @@ class TestPage(Page):
             self.form.show_value(self._tests[row - 1].measurement)
 
     def _restore(self) -> None:
-        kept = self.context.settings.text(Remembered.TEST)
-        self.form.show_value(_kept_test(kept) or self._tests[0].measurement)
+        kept = self.context.settings.text(SettingKey.TEST)
+        self.form.show_value(_stored_test(kept) or self._tests[0].measurement)
 
     def _save(self) -> None:
         measurement = self.form.value
@@ -557,10 +557,10 @@ class TestPage(Page):
         grid = QWidget()
         cells = QGridLayout(grid)
         cells.addWidget(self.summary, 0, 0, 1, 2)
-        cells.addWidget(boxed("What will be played", (self.plots, 1)), 1, 0, 1, 2)
-        cells.addWidget(boxed("Against the limits", (self.limits, 1)), 2, 0)
+        cells.addWidget(titled_box("What will be played", (self.plots, 1)), 1, 0, 1, 2)
+        cells.addWidget(titled_box("Against the limits", (self.limits, 1)), 2, 0)
         cells.addWidget(
-            boxed(
+            titled_box(
                 "What the specimen is predicted to do",
                 (self.prediction, 1),
                 self.prediction_note,
@@ -576,10 +576,10 @@ class TestPage(Page):
             # Neither plot may ask for more height than the preview; they share the remaining height.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
-        filled(QVBoxLayout(self), self._parts)
+        fill_box(QVBoxLayout(self), self._parts)
 
 
-def _kept_test(text: str) -> Measurement | None:
+def _stored_test(text: str) -> Measurement | None:
     """Return a stored test; None if an older version stored one that is no longer valid."""
     try:
         return validated(tomllib.loads(text), Measurement, "the last test")
