@@ -1,7 +1,8 @@
-"""Entry point of the `vibench` command: `vibench stop` acts at once, everything else is loaded first.
+"""Entry point of the `vibench` command, with a fast path for `vibench stop`.
 
-The libraries of the other commands take half a second of processor time, in which the drive goes on. Only the
-standard library is imported here. What is not plain, or not as on Linux, is left to the complete command.
+Loading the libraries of the other commands takes half a second of processor time, during which the drive is
+on. Only the standard library is imported here. Special cases, and systems other than Linux, use the complete
+command.
 """
 
 import gc
@@ -15,7 +16,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class Announced:
-    """What the name of an announcement says: number and start of a process of this computer."""
+    """A program's announcement: process id and start time in the file name, further facts in the file."""
 
     def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
         self.path = path
@@ -29,7 +30,7 @@ class Announced:
             self._facts = b""
 
     def name(self) -> str:
-        """Return what it was started for, as `printable` writes it, and its number."""
+        """Return the purpose of the program and its process id, in printable characters."""
         import json
 
         try:
@@ -41,22 +42,22 @@ class Announced:
 
 
 def main() -> None:
-    """Stop, where that is asked for in plain words; run any other command."""
+    """Stop, if the arguments are a simple stop command; otherwise run the complete command."""
     if sys.argv[1:2] == ["stop"] and sys.platform == "linux":
         asked = asked_of(sys.argv[2:])
         code = None if asked is None else stopped(*asked)
         if code is not None:
             sys.exit(code)
-    # To look for plug-ins, pydantic reads the metadata of every installed package; none is used here.
+    # pydantic searches the metadata of every installed package for plug-ins; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # imports leave little garbage: looking for it took a fifth of the start
+    gc.set_threshold(10_000)  # imports leave little garbage; collecting it took a fifth of the start
     from vibench.cli import main as run_command
 
     run_command()
 
 
 def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
-    """Read level, reason and number of a process; None where the complete command must answer."""
+    """Return level, reason and process id of a stop command; None for the complete command."""
     split = [part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])]
     given = dict(zip(split[::2], split[1::2], strict=False))
     if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
@@ -68,7 +69,7 @@ def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
 
 
 def stopped(level: str, reason: str, pid: str) -> int | None:
-    """Stop the programs of this computer that are meant; return the exit code, None to leave it to others."""
+    """Stop the selected programs and return the exit code; None for the complete command."""
     try:
         programs = [each for each in announced() if pid in ("", each.pid)]
         living = [each for each in programs if each.is_alive]
@@ -89,7 +90,7 @@ def stopped(level: str, reason: str, pid: str) -> int | None:
 
 
 def announced() -> Iterator[Announced]:
-    """Find the programs that announced themselves; raise OSError where another computer's is among them."""
+    """Yield the announced programs of this computer; raise OSError if another computer's is among them."""
     folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
     boot, space = _own_place()
     for name in sorted(os.listdir(folder)):  # noqa: PTH208
@@ -104,7 +105,7 @@ def announced() -> Iterator[Announced]:
                 raise OSError("on another computer")
         elif place[1] == space:
             yield Announced(path, pid, start, is_alive=place[2] == _start_of(pid))
-        elif _is_locked(path):  # in a container of this computer
+        elif _is_locked(path):  # in a container on this computer
             yield Announced(path, pid, start, is_alive=True)
 
 
@@ -119,7 +120,7 @@ def _own_place() -> tuple[str, str]:
 
 
 def _start_of(pid: str) -> str:
-    """Return the start of a process that lives, as proc(5) counts it; empty where there is none."""
+    """Return the start time of a running process, from proc(5); empty if it does not run."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
@@ -129,7 +130,7 @@ def _start_of(pid: str) -> str:
 
 
 def _is_locked(path: str) -> bool:
-    """Whether the program that announced itself there lives: it holds a lock."""
+    """Return whether the announcing program runs, in which case it holds a lock."""
     import fcntl
 
     try:

@@ -111,7 +111,7 @@ def test_an_exponent_is_told_with_its_error():
         (("--cells", "1001"), "--cells was given as '1001'; give a whole number from 1 to 1000"),
         (("--cells", "2,,4"), "--cells was given as '2,,4'"),
         (("--amplitude", "1e-6"), "one of --amplitude and --frequency is missing"),
-        (("--amplitude", "1e-6", "--frequency", "200:200"), "200 does not lie below 200"),
+        (("--amplitude", "1e-6", "--frequency", "200:200"), "200 is not below 200"),
         (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is no number"),
         (("--amplitude", "1e-6:2e-6", "--frequency", "200"), "2 numbers are not allowed here"),
         (("--recording", "a.h5", "--frequency", "200"), "a recording has its own base motion"),

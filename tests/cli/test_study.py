@@ -100,7 +100,7 @@ def test_ctrl_c_keeps_what_is_computed_and_resume_goes_on(vibench, tmp_path):
     finally:
         running.kill()
     assert running.returncode == 3
-    assert b"stopped: go on with --resume" in out
+    assert b"stopped: continue with --resume" in out
     kept = open_study(tmp_path / "a.h5").kept
     assert 0 < kept < LONG_POINTS
     resumed = vibench("study", asked, "--out", "a.h5", "--resume", cwd=tmp_path)

@@ -249,5 +249,5 @@ def test_a_name_that_is_no_text_is_refused_in_a_sentence_where_it_would_stand_in
     told = vibench_here("export", name, "--to", "csv", "--out", "x", cwd=folder)
     assert told.returncode == 1
     assert r"\udcff" in told.stderr
-    assert "holds bytes that are no text; rename the file or folder" in told.stderr
+    assert "contains bytes that are not text; rename the file or folder" in told.stderr
     assert "Traceback" not in told.stderr

@@ -1,13 +1,12 @@
 """The `vibench` command: one thin file a command, no logic.
 
-Commands stand in a table in `__main__`, by module and function, and are imported when they are
-called: listing them loads neither numpy nor Qt, and a command loads only what it needs.
-The number of BLAS threads is set before numpy is loaded. People's text goes to the console;
-with `--json` one document goes to standard output and nothing else. An error that a user can
-mend is one sentence on standard error and a non-zero exit.
+A table in `__main__` names each command's module and function. A command is imported when it is called, so
+the list of commands loads neither numpy nor Qt. The number of BLAS threads is set before numpy is loaded.
+Text for people goes to the console; with `--json`, standard output holds one JSON document and nothing else.
+An error that a user can fix is one sentence on standard error and a non-zero exit.
 
-    $ vibench predict --model hertz --amplitude 5e-6 --frequency 260 --json
-    $ vibench measure CAMPAIGN.toml --bench BENCH.toml --out DIR
+$ vibench predict --model hertz --amplitude 5e-6 --frequency 260 --json
+$ vibench measure CAMPAIGN.toml --bench BENCH.toml --out DIR
 """
 
 import lazy_loader

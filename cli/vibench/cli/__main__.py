@@ -1,6 +1,6 @@
-"""The `vibench` command: its list of commands, and the one place where an error becomes a sentence.
+"""The `vibench` command: the table of commands, and the only place where errors become sentences.
 
-Commands by name only: what a command needs is imported when it is called, not to list it.
+Commands are listed by name, and each is imported only when it is called.
 """
 
 import errno
@@ -54,22 +54,22 @@ class Panel(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a command is written, and what it needs."""
+    """Module, function and requirements of a command."""
 
     panel: Panel
     function: str
     """``module:name``."""
     extras: tuple[str, ...] = ()
-    """Extras that it needs before it does anything, the one that brings the others first."""
+    """Extras required before the command starts; an extra that includes the others comes first."""
     space_mb: int = 300
-    """Address space that its libraries and their threads take [MB]."""
+    """Address space of its libraries and threads [MB]."""
     advice: str = ""
-    """What to do where it cannot run."""
+    """What to do if the command cannot run."""
     help: str = ""
     """Help of a group of commands, which has no function with a docstring."""
 
     def load(self) -> typer.Typer:
-        """Import the command, alone in an application of its own."""
+        """Import the command as an application with one command."""
         module, name = self.function.split(":")
         found = getattr(importlib.import_module(f".{module}", __package__), name)
         if isinstance(found, typer.Typer):
@@ -80,7 +80,7 @@ class Place:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from its source: importing it could take seconds."""
+        """First line of the function's docstring, read from the source because imports are slow."""
         module, name = self.function.split(":")
         source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
@@ -88,18 +88,18 @@ class Place:
 
 
 class LateCommand(TyperCommand):
-    """Stands in the list for a command, and hands over to it once it is called."""
+    """A placeholder in the list of commands; the real command is imported when it is called."""
 
     def __init__(self, name: str, place: Place) -> None:
         super().__init__(name, rich_help_panel=place.panel)
         self._place = place
 
     def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the whole line, as it is
-        """Return the line of the list of commands."""
+        """Return the description in the list of commands."""
         return self._place.summary
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
-        """Read the arguments as the command itself does."""
+        """Parse the arguments with the real command."""
         if not named.get("resilient_parsing"):
             need_space(self._place.space_mb, self._place.advice)
         command = typer.main.get_command(self._place.load())
@@ -113,12 +113,12 @@ class LateCommand(TyperCommand):
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""What is wrong with a command line: a class of click, or of the copy of click in newer typer."""
+"""Base class of usage errors, from click or from the copy of click in newer typer."""
 
 
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
-    """Refuse arguments with nothing in them, and say of an option what stands there and what may."""
+    """Refuse empty arguments, and add the given and the allowed value to usage errors."""
     words = ["", *(part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each]))]
     empty = next((before for before, word in pairwise(words) if not word), None)
     if empty is not None:
@@ -132,7 +132,7 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if args:  # without any, the message is the help
+        if args:  # without arguments, the message is the help
             error.message = printable(error.message)
         raise
 
@@ -159,7 +159,7 @@ def _is_number(text: str) -> bool:
 
 
 def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
-    """Make the class of a group of commands, in this order."""
+    """Return the class of a command group with these commands, in this order."""
 
     class LateCommands(SectionedGroup):
         def __init__(self, **settings: Any) -> None:
@@ -174,7 +174,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space of commands that simulate or analyse (measured: 775), and that open a bench (1807) [MB]."""
+"""Address space of commands that simulate or analyse (measured: 775) or open a bench (1807) [MB]."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -211,7 +211,7 @@ COMMANDS = {
 
 app = typer.Typer(
     name="vibench",
-    help="Vibro-impact shaker experiments: run them, record them, and say what they mean.",
+    help="Vibro-impact shaker experiments: measure, analyse and predict.",
     cls=late_commands(COMMANDS),
     no_args_is_help=True,
     add_completion=True,
@@ -221,7 +221,7 @@ app = typer.Typer(
 
 
 def tell_version(*, asked: bool) -> None:
-    """Print the version, as ``--version`` alone asks for it."""
+    """Print the version if ``--version`` was given."""
     if asked:
         from importlib.metadata import version
 
@@ -230,36 +230,36 @@ def tell_version(*, asked: bool) -> None:
 
 
 class LogLevel(StrEnum):
-    """How much of what happens is written on standard error."""
+    """Amount of log output on standard error."""
 
     WARNING = "warning"
     INFO = "info"
-    """What is noted in recordings, too."""
+    """Also what is noted in recordings."""
     DEBUG = "debug"
-    """Messages to instruments and their replies, too."""
+    """Also messages to instruments and their replies."""
 
 
 class OneLine(logging.Formatter):
-    """What is logged may hold names and the words of instruments."""
+    """Formats a log message as one printable line; it may contain names and instrument replies."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
-        """Write a message as one line."""
+        """Return a message as one line."""
         return printable(super().formatMessage(record))
 
 
 class LogBeside(logging.StreamHandler[TextIO]):
-    """Writes log lines in a thread, so that a suspended terminal or an unread pipe delays no run."""
+    """Writes log lines in a thread, so that a suspended terminal or an unread pipe does not delay a run."""
 
     def __init__(self) -> None:
         super().__init__()
         self._beside = Beside("log")
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Let a line be written."""
+        """Queue a line."""
         self._beside.do(lambda: super(LogBeside, self).emit(record))
 
     def close(self) -> None:
-        """Leave the last lines a second."""
+        """Allow one second to write the remaining lines."""
         self._beside.wait(1.0)
         super().close()
 
@@ -269,8 +269,8 @@ def vibench(
     log_level: Annotated[
         LogLevel,
         typer.Option(
-            help="Tell on standard error: info, what is noted in recordings; debug, every message to an "
-            "instrument as well."
+            help="Log on standard error. info: also what recordings note; debug: also every message to an "
+            "instrument."
         ),
     ] = LogLevel.WARNING,
     _version: Annotated[
@@ -283,18 +283,18 @@ def vibench(
         ),
     ] = False,
 ) -> None:
-    """Hold the commands."""
+    """Set up logging for all commands."""
     handler = LogBeside()
     handler.setFormatter(OneLine("%(asctime)s %(name)s: %(message)s"))
-    # Ours alone: other libraries log what a broken message of a client did to them, with a traceback.
+    # Log vibench only: other libraries log a traceback for every broken message of a client.
     ours = logging.getLogger("vibench")
     ours.handlers = [handler]
     ours.setLevel(log_level.upper())
 
 
 def main() -> None:
-    """Run the command line. An error that a user can fix is one sentence and a non-zero exit."""
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read when imported; a killed call is noted otherwise
+    """Run the command line; an error that a user can fix is one sentence and a non-zero exit."""
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {message}\n"
     try:
         app()
@@ -304,13 +304,13 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # of a path: files hold text
+    except UnicodeEncodeError as error:  # raised for paths, because files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         name = shortened(name, NAME_SHOWN)
-        complain(OSError(f"{name} holds bytes that are no text; rename the file or folder"))
+        complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Anyone who looks at a path first meets it: here is the one place that all paths have behind them.
+        # Any command may be the first to use a path, so errors of paths are caught here for all.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -325,7 +325,7 @@ def _disk_trouble(error: Exception) -> str:
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return which limit is behind an error, which libraries may have wrapped; empty if none is."""
+    """Return the exceeded limit behind an error, which libraries may have wrapped; empty without one."""
     if error is None:
         return ""
     text = str(error)
@@ -342,14 +342,14 @@ def _shortage(error: BaseException | None) -> str:
     return _shortage(error.__cause__ or error.__context__)
 
 
-_PLACE = "{name} may not be written or read here; what was written before is kept. Give another place"
-_ROOM = "there is no room for {name}; what was written before is kept. Make room, or give another place"
+_PLACE = "{name} cannot be written or read; data written before are kept. Give another path"
+_ROOM = "there is no space for {name}; data written before are kept. Free some, or give another path"
 DISK_ERRORS = {
-    errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done, give a shorter one",
+    errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done; give a shorter one",
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }
-"""What a person can do something about."""
+"""System errors that a user can fix."""
 _NO_MEMORY = (
     os.strerror(errno.ENOMEM),
     "can't start new thread",
@@ -357,17 +357,17 @@ _NO_MEMORY = (
     "without setting an exception",
     "without exception set",
 )
-"""What the system, Python and the loader of libraries say where memory has run out."""
+"""Messages of the system, Python and the loader when memory is exhausted."""
 
 
 LONGEST_SENTENCE = 1800
-"""Letters: whatever a file holds may stand in a sentence about it."""
+"""Largest length of an error sentence, which may contain text from a file."""
 NAME_SHOWN = 80
-"""Letters of a name that is too long."""
+"""Displayed letters of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:
-    """Show an error on standard error: its sentence, then what else went wrong on the way out."""
+    """Print the sentence of an error, then the errors that followed it."""
     errors.print(Text("error:", style="bold red"), shortened(str(error), LONGEST_SENTENCE))
     for note in getattr(error, "__notes__", ()):
         errors.print(f"  {note}")

@@ -1,4 +1,4 @@
-"""`vibench analyse`: a recording, or a folder of them, becomes figures, tables and a report."""
+"""`vibench analyse`: analyse one recording or a folder, and write figures, tables and a report."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -45,24 +45,24 @@ from .specimen_option import SpecimenOption, read_specimen
 
 
 class DrivenBy(StrEnum):
-    """What moves the simulation that is overlaid on a measurement."""
+    """Input of the simulation that is overlaid on a measurement."""
 
     VOLTAGE = "voltage"
     BASE = "base"
 
     @property
     def simulation(self) -> Simulation:
-        """The same for the analysis."""
+        """The corresponding value for the analysis."""
         return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
 
 
 NOISE = "Transmission of noise"
-"""Heading of the options that no other excitation takes notice of."""
+"""Heading of the options that apply only to noise."""
 OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "overlap", "confidence")
 
 
 class _Hidden(StrEnum):
-    """What becomes of the hidden motion."""
+    """What to do with the hidden motion."""
 
     LEFT_OUT = "left out"
     TOLD = "told"
@@ -79,34 +79,34 @@ def analyse(
     simulate: Annotated[
         bool,
         option(
-            "Lay the simulation over the measurement; takes seconds to minutes more.",
+            "Overlay a simulation on the measurement; takes seconds to minutes.",
             name="--simulate/--no-simulate",
         ),
     ] = True,
     driven_by: Annotated[
         DrivenBy,
         option(
-            "voltage: rig and specimen together, as an ensemble that holds in chaos; base: the specimen "
-            "alone under the recorded base motion."
+            "voltage: rig and specimen, as an ensemble that is valid in chaos; base: the specimen under "
+            "the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
-        int, option("Runs of a colliding motion under the voltage.", "N", min=FEWEST_DRAWS)
+        int, option("Runs of the ensemble for motions with contact.", "N", min=FEWEST_DRAWS)
     ] = DRAWS,
     fit: Annotated[
         bool,
         option(
-            "Fit damping, frequencies and gaps to the recordings first, and lay that specimen over "
-            "them; where no specimen fits, say which assumption would mend it."
+            "Fit damping, frequencies and gaps to the recordings, and overlay the fitted specimen; if none "
+            "fits, report which assumption to change."
         ),
     ] = False,
     free: Annotated[
         list[Parameter] | None,
-        option("With --fit: fit this to noise too; several times for several, one mass at a time.", "NAME"),
+        option("With --fit: also fit this to noise; may be repeated, with one mass at most.", "NAME"),
     ] = None,
     hidden: Annotated[
         bool,
-        option("Tell the hidden motion of m1 too: p between its stops, impacts, gaps, m1 and contact law."),
+        option("Estimate the hidden motion of m1 too: p between its stops, impacts, gaps, m1, contact law."),
     ] = False,
     keep: Annotated[
         bool, option("With --hidden: save that motion in the recording, for vibench export --results.")
@@ -115,27 +115,27 @@ def analyse(
     branches: Annotated[
         list[Path] | None,
         option(
-            "Lay what vibench branches found over stepped sines and sweeps; several times for several.",
+            "Overlay branches from vibench branches on stepped sines and sweeps; may be repeated.",
             "BRANCHES.h5",
         ),
     ] = None,
     maps: Annotated[
         list[Path] | None,
-        option("Lay levels of stepped sines and sweeps over what vibench map made.", "MAP.h5", name="--map"),
+        option("Draw levels of stepped sines and sweeps on a map of vibench map.", "MAP.h5", name="--map"),
     ] = None,
     quantity: Annotated[
         str,
         option(
-            "Motion of m0 over motion of the base, such as velocity/acceleration; one word for both.",
+            "Quantity of m0 over quantity of the base, such as velocity/acceleration; one word means both.",
             "Q[/Q]",
             panel=NOISE,
         ),
     ] = "displacement",
     scale: Annotated[
-        MagnitudeScale, option("Of the magnitudes in figures.", panel=NOISE)
+        MagnitudeScale, option("Scale of magnitudes in figures.", panel=NOISE)
     ] = MagnitudeScale.LOG,
     segment: Annotated[
-        float | None, option("Length of a segment, instead of a resolution.", "S", panel=NOISE)
+        float | None, option("Segment length, in place of a resolution.", "S", panel=NOISE)
     ] = None,
     *,
     options: Annotated[RequestOptions[AnalysisOptions], Fields(OPTIONS, NOISE)],
@@ -147,17 +147,14 @@ def analyse(
     request = replace(request, segment_s=segment, view=quantities_named(quantity, scale))
     if fit and specimen is not None:
         raise InvalidRequest(
-            "--fit and --specimen were given; one of the two says which specimen is laid over"
+            "--fit and --specimen were given; give one of the two to select the specimen to overlay"
         )
     if free and not fit:
         raise InvalidRequest(
-            f"--free {free[0].value} was given without --fit, and only a fit frees anything; give both, "
-            "or neither"
+            f"--free {free[0].value} was given without --fit, which it needs; give both, or neither"
         )
     if keep and not hidden:
-        raise InvalidRequest(
-            "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
-        )
+        raise InvalidRequest("--keep was given without --hidden, which it needs; give both, or neither")
     laid = None if specimen is None else read_specimen(specimen).specimen()
     if hidden and laid is not None:
         tracked_specimen(laid)
@@ -190,7 +187,7 @@ def _analyse(
     as_json: bool,
 ) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
-    # "." has no name of its own.
+    # The path "." has no name.
     place = recording if recording.name.strip(".") else recording.resolve()
     name = place.name.removesuffix(".part").removesuffix(".h5")
     folder = free_path(place.parent / f"{name}_analysis") if out is None else out
@@ -243,7 +240,7 @@ def _analyse(
 def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
-    """Tell the hidden motion of each recording with a result; says on standard error where there is none."""
+    """Yield the hidden motion of each recording with a result; print an error where none can be estimated."""
     for facts in results.facts if hidden is not _Hidden.LEFT_OUT else ():
         with open_recording(facts.path) as recording:
             try:
@@ -258,13 +255,13 @@ def hidden_motions(
 def fit_specimen(
     paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
-    """Fit the specimen to recordings, whatever the report is to show of them."""
+    """Fit the specimen to recordings, independent of the other options of the report."""
     measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)
     return update_model(measured, also_free, observer)
 
 
 def complain_about(results: CampaignResults) -> None:
-    """End with a sentence for each recording without a result, or whose result has no simulation."""
+    """Raise an error with a sentence for each recording without a result or a simulation."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
         errors.print(f"{word}: {_with_recording(failure)}")
@@ -273,5 +270,5 @@ def complain_about(results: CampaignResults) -> None:
 
 
 def _with_recording(failure: AnalysisFailure) -> str:
-    """Return the sentence, with the recording's name where it does not say it itself."""
+    """Return the sentence of a failure, with the recording's name if it is missing."""
     return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

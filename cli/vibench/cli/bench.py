@@ -1,4 +1,4 @@
-"""`vibench bench`: what is there, and is it well."""
+"""`vibench bench`: list instruments, check a bench, set up a new one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -41,11 +41,11 @@ bench = typer.Typer(
 @with_options
 def list_bench(
     bench: Annotated[
-        Path | None, option("Search where this rig's are; this computer if absent.", "BENCH")
+        Path | None, option("Search at this rig's addresses; by default on this computer.", "BENCH")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List every instrument that can be seen, and the installed plug-ins, by name."""
+    """List the connected instruments and the installed plug-ins, by name."""
     found = list_instruments() if bench is None else list_rig_instruments(load_rig(bench))
     devices = [f"{device.name}: {device.product}, serial {device.serial}" for device in found.daq_devices]
     plug_ins = [f"{kind.value}: {', '.join(plug_in_names(kind))}" for kind in PlugInKind]
@@ -63,24 +63,24 @@ def list_bench(
 @with_options
 def check(
     bench: BenchPath = None,
-    out: Annotated[Path, option("Folder that recordings would go to.", "DIR")] = Path(),
+    out: Annotated[Path, option("Folder of the recordings, to check its disk.", "DIR")] = Path(),
     knobs: Annotated[
-        Path | None, option("Keep what is confirmed, for `vibench measure --knobs`.", "SHEET.toml")
+        Path | None, option("Store the confirmations for `vibench measure --knobs`.", "SHEET.toml")
     ] = None,
-    last: Annotated[bool, option("Show what the last check found; touch nothing.")] = False,
+    last: Annotated[bool, option("Show the result of the last check, without using the bench.")] = False,
     new_reference: Annotated[
-        bool, option("Compare with no earlier check: what has changed was meant.")
+        bool, option("Do not compare with an earlier check, because changes were intended.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and what has changed.
+    """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and changes.
 
-    The result is kept: a real bench is armed only on a check that passed lately. Exit code 1 if it fails.
+    The result is stored, because arming a real bench requires a recent passed check. Exit code 1 if it fails.
     """
     if last and (knobs is not None or new_reference):
         raise ConfigurationError(
-            "--last touches nothing, and --knobs and --new-reference are of a check. Nothing was done; leave "
-            "--last out, or the other"
+            "--last makes no check, and --knobs and --new-reference need one. Nothing was done; leave out "
+            "--last or the other option"
         )
     path = bench_path(bench)
     result = _last(load_rig(path)) if last else _now(path, out, knobs, new_reference=new_reference)
@@ -96,15 +96,15 @@ def check(
 @bench.command("new", cls=SectionedCommand)
 @with_options
 def new(
-    target: Annotated[Path, typer.Argument(metavar="BENCH.toml", help="Where the configuration goes.")],
+    target: Annotated[Path, typer.Argument(metavar="BENCH.toml", help="File of the configuration.")],
     template: Annotated[
-        str, option("Configuration whose values are proposed.", "NAME|FILE", name="--from")
+        str, option("Configuration with the proposed values.", "NAME|FILE", name="--from")
     ] = "lab_rig",
-    answers: Annotated[Path | None, option("Answers, where nobody is to be asked.", "FILE.toml")] = None,
+    answers: Annotated[Path | None, option("Answers, in place of questions.", "FILE.toml")] = None,
 ) -> None:
-    """Set up a bench: ask and look, write its file, check wires, noise floor, a first 5 mV, gains and signs.
+    """Set up a bench: ask, write its file, check wires, noise floor, a first 5 mV, gains and signs.
 
-    The page of it is kept beside the file. Exit code 1 if anything forbids to energise.
+    The report is kept beside the file. Exit code 1 if a finding forbids to energise.
     """
     page = new_bench(target, named(template, "hardware_configs"), answers)
     if page.verdict is Verdict.FAIL:

@@ -1,4 +1,4 @@
-"""`vibench bench new`: from nothing to a bench that is checked, with a page that says so."""
+"""`vibench bench new`: set up and check a new bench, and write a report of it."""
 
 import signal
 import sys
@@ -40,28 +40,28 @@ from .paths import free_path
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
-"""Answers to whether a wire is plugged in, false among them, that say that it is not."""
+"""Answers meaning that a wire is not plugged in; false is one of them."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What a file answers: configuration, operator, whether all is wired and every knob as the file says."""
+    """Content of an answer file: values of the configuration, operator, wiring and knobs."""
 
     given: Mapping[str, str]
 
     @classmethod
     def read(cls, path: Path) -> "Answers":
-        """Read a TOML file of answers."""
+        """Return the answers of a TOML file."""
         return cls({key: str(value) for key, value in _flat(toml_table(path))})
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """What is asked, and what else of the template is answered."""
+        """The questions, and other values of the template that the file sets."""
         usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
     def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
-        """Answer a question of the configuration; nothing: as the template has it."""
+        """Return the answer to a question of the configuration; empty keeps the template's value."""
         answer = self.given.get(question.key, "")
         if choices:
             console.print(f"seen: {', '.join(choices)}")
@@ -69,28 +69,28 @@ class Answers:
         return answer
 
     def wired(self, pair: str) -> str:
-        """Return whether a pair of ends is plugged in."""
+        """Return the answer on whether a pair of connectors is wired."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
-        """Confirm every setting made by hand, or none."""
+        """Return the confirmation of all settings made by hand, or none."""
         if self.given.get(_KNOBS) != "as in the file":
             raise CheckFailed(
-                'settings made by hand are not confirmed; give knobs = "as in the file" among the answers '
-                "once you have compared them"
+                "settings made by hand are not confirmed; compare them, then give "
+                'knobs = "as in the file" in the answers'
             )
         return KnobSheet(operator=self.operator, confirmed=datetime.now(UTC), knobs=knobs)
 
     @property
     def operator(self) -> str:
-        """Who answers."""
+        """Name of the operator."""
         return _name_in_a_comment(self.given.get(_OPERATOR, ""))
 
 
 def _name_in_a_comment(answer: str) -> str:
-    """Leave out what would end a line of the configuration, or cannot be written at all."""
+    """Remove characters that would end a line of the configuration or cannot be written."""
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 
@@ -118,7 +118,7 @@ def _allow_interrupt() -> Iterator[None]:
     try:
         yield
     except typer.Abort as stop:
-        raise CheckStopped("the first day was stopped at its questions; nothing is written") from stop
+        raise CheckStopped("the setup was stopped at its questions; nothing is written") from stop
 
 
 @_allow_interrupt()
@@ -136,26 +136,24 @@ def _report_refusal(error: ConfigurationError) -> None:
 
 
 def _confirm_wire(target: Path, pair: str) -> str:
-    """Ask whether a wire is plugged in; nothing plays meanwhile, and Ctrl-C ends the program at once."""
+    """Ask whether a wire is plugged in; the output is off, and Ctrl-C ends the program at once."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
     except (KeyboardInterrupt, typer.Abort) as stop:
         raise CheckStopped(
-            "the first day was stopped at its wires, before anything played; the configuration is written: "
-            f"go on with `vibench bench check --bench {in_a_command(target)}`"
+            "the setup was stopped at its wires, before any output; the configuration is written: continue "
+            f"with `vibench bench check --bench {in_a_command(target)}`"
         ) from stop
     finally:
         signal.signal(signal.SIGINT, before)
 
 
 def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
-    """Ask, write the configuration, go through the first day, and keep its page beside the file."""
+    """Ask the questions, write the configuration, run the first day's checks, and write the report."""
     given = None if answers is None else Answers.read(answers)
     if given is None and not sys.stdin.isatty():
-        raise ConfigurationError(
-            "nobody sits at this terminal, and there are no answers; give --answers FILE.toml"
-        )
+        raise ConfigurationError("this is no terminal, and there are no answers; give --answers FILE.toml")
     seen = list_rig_instruments(load_rig(template))
     for remark in seen.remarks:
         console.print(f"! {remark}")

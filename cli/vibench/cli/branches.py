@@ -37,21 +37,22 @@ OPTIONS = ("method", *SPECIMEN, "harmonics", "places", "starts", "most_periods",
 
 def branches(
     amplitude: Annotated[
-        str | None, option("Of the base displacement; a range to go along it.", "M|START:STOP")
+        str | None,
+        option("Amplitude of the base displacement; a range to follow branches along it.", "M|START:STOP"),
     ] = None,
     frequency: Annotated[
-        str | None, option("Of the drive [Hz]; a range to go along it.", "F|START:STOP")
+        str | None, option("Drive frequency [Hz]; a range to follow branches along it.", "F|START:STOP")
     ] = None,
     like: Annotated[
         Path | None,
         option(
-            "Take range and level from a stepped sine or sweep, and lay the branches over it.", "RECORDING.h5"
+            "Use range and level of a stepped sine or sweep, and overlay the branches on it.", "RECORDING.h5"
         ),
     ] = None,
     resonance: Annotated[
         str | None,
         option(
-            "Follow the phase resonance of the mode between these frequencies [Hz] over the level.",
+            "Follow the phase resonance of the mode between these frequencies [Hz] over the amplitude.",
             "LOW:HIGH",
         ),
     ] = None,
@@ -59,9 +60,7 @@ def branches(
     options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
     holdable: Annotated[
         Path | None,
-        option(
-            "Tell which unstable motions the feedback of this bench is fast enough to hold.", "BENCH.toml"
-        ),
+        option("Report which unstable motions the feedback of this bench can hold.", "BENCH.toml"),
     ] = None,
     out: Annotated[Path | None, option("Folder for branches.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
@@ -84,7 +83,7 @@ def branches(
 
     room_for(FILE, out)
     if not as_json:
-        console.print("Looking for motions; each branch is told as it is found.")
+        console.print("Searching for motions; each branch is printed when it is found.")
 
     def tell(number: int, line: BranchLine) -> None:
         if not as_json:
@@ -108,12 +107,13 @@ def branches(
 def _drive(
     amplitude: str | None, frequency: str | None, like: Path | None
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Read along what the branches go, and at what level."""
+    """Return the curves to overlay, and the range and level of the branches as fields of the request."""
     if like is not None:
         if amplitude is not None:
             raise InvalidRequest(
-                f"--amplitude {amplitude} and --like were both given, and the recording has its own level; "
-                "leave --amplitude out (--frequency START:STOP may stay, within the recording's own range)"
+                f"--amplitude {amplitude} and --like were both given, but the recording defines the "
+                "amplitude; leave --amplitude out (--frequency START:STOP may stay, within the "
+                "recording's own range)"
             )
         curves, level = _recorded_curves(like)
         low, high = level[0][0], level[-1][0]
@@ -137,11 +137,11 @@ def _drive(
 def _resonance(
     amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Read the levels over which a phase resonance is followed."""
+    """Return the range of levels of a phase resonance as fields of the request."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
-            f"--resonance {resonance} goes over the level; give --amplitude START:STOP beside it, and "
-            "neither --frequency nor --like"
+            f"--resonance {resonance} follows the amplitude; give --amplitude START:STOP too, and neither "
+            "--frequency nor --like"
         )
     band = range_of(resonance, Parameter.FREQUENCY, (2,), "resonance")
     levels = range_of(amplitude, Parameter.AMPLITUDE, (2,))

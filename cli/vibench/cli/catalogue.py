@@ -1,4 +1,4 @@
-"""`vibench catalogue`: what lies in a folder of recordings."""
+"""`vibench catalogue`: list the recordings of a folder."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -19,11 +19,11 @@ COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "le
 
 def show_catalogue(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of recordings.")],
-    rebuild: Annotated[bool, option("Read every file again, not only what has changed.")] = False,
+    rebuild: Annotated[bool, option("Read every file again, not only changed ones.")] = False,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """List the recordings of a folder and the folders in it: what, when, how they ended, how large."""
+    """List the recordings of a folder and its subfolders: excitation, date, outcome, size."""
     with external_data(allow_external):
         entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
     if as_json:

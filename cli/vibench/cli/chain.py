@@ -1,4 +1,4 @@
-"""`vibench chain`: cells in a row: waves, gaps, transmission, energy, impacts and exponents."""
+"""`vibench chain`: a row of coupled cells: waves, band gaps, transmission, energy, impacts, exponents."""
 
 import math
 from pathlib import Path
@@ -29,20 +29,20 @@ _SWEEP_ENDS = 2
 
 
 def chain(
-    cells: Annotated[str, option("How many; several for a study over them.", "N|N,N,...")] = "8",
-    amplitude: Annotated[str | None, option("Of the base displacement.", "M")] = None,
+    cells: Annotated[str, option("Number of cells; several numbers for a study.", "N|N,N,...")] = "8",
+    amplitude: Annotated[str | None, option("Amplitude of the base displacement.", "M")] = None,
     frequency: Annotated[
         str | None,
         option(
-            "Steady at one or several [Hz]; START:STOP is a sweep, up or down.",
+            "One or several steady frequencies [Hz]; START:STOP is a sweep, up or down.",
             "F|START:STOP:STEP|START:STOP",
         ),
     ] = None,
-    recording: Annotated[Path | None, option("Drive the chain by its base motion.", "RECORDING.h5")] = None,
+    recording: Annotated[Path | None, option("Drive the chain by a recorded motion.", "RECORDING.h5")] = None,
     specimen: Annotated[
         list[str] | None,
         option(
-            "A specimen's file, or a name that `vibench specimen` lists; given again, cells take turns.",
+            "Specimen file, or a name listed by `vibench specimen`; repeat it for alternating cells.",
             "NAME|FILE.toml",
         ),
     ] = None,
@@ -51,7 +51,7 @@ def chain(
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
+    """Simulate a row of cells: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
     first, *others = specimen or (USUAL_SPECIMEN,)
     asked = specimen_request(
         options,
@@ -95,7 +95,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Read what moves the base; without a frequency or a recording nothing does."""
+    """Return the base motion as fields of the request; empty without a frequency or a recording."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(
@@ -129,7 +129,7 @@ def _is_above(first: str, second: str) -> bool:
 
 
 def _run_in_words(run: ChainRun) -> str:
-    """Say a run in a line: the first and the last cell stand for all."""
+    """Return a run as one line, with the values of the first and the last cell."""
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "

@@ -1,4 +1,4 @@
-"""`vibench demo`: the paper's experiment on the virtual rig, from the first volt to the report."""
+"""`vibench demo`: the paper's experiment on the virtual rig, from measurement to report."""
 
 import json
 import shlex
@@ -37,7 +37,7 @@ LOOK_S = 1.0
 
 
 class Analyst:
-    """Takes recordings as they are finished, and gives their results in the same order."""
+    """Analyses recordings in another process, and returns the results in the same order."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
@@ -46,10 +46,10 @@ class Analyst:
         self._folder = Path()
         self._parts: list[CampaignResults | BaseException] = []
         self.asked = 0
-        """Recordings taken so far."""
+        """Number of recordings submitted."""
 
     def take(self, recording: Path) -> None:
-        """Analyse this one next."""
+        """Submit a recording."""
         self.asked += 1
         self._folder = recording.parent
         take = self._parts.append
@@ -57,9 +57,9 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results one by one; waits for those that are not ready.
+        """Yield the results in order, waiting for those that are not ready.
 
-        Raises AnalysisError when the process ended before it was done.
+        Raises AnalysisError when the process ended early.
         """
         for number in range(self.asked):
             while number == len(self._parts):
@@ -76,13 +76,13 @@ class Analyst:
                     yield results
 
     def together(self) -> CampaignResults:
-        """Return the results as one campaign's."""
+        """Return all results as one campaign."""
         return merged_results(self._name, tuple(self.results()))
 
 
 @contextmanager
 def second_process(name: str, draws: int) -> Iterator[Analyst]:
-    """Keep an analyst at work while inside; what it has not done when an error leaves is dropped."""
+    """Start an analysis process; after an error, unfinished analyses are dropped."""
     pool = Pool(1)
     try:
         yield Analyst(pool, name, draws)
@@ -93,7 +93,7 @@ def second_process(name: str, draws: int) -> Iterator[Analyst]:
 def demo(
     out: Annotated[Path | None, option("New folder for everything; vibench_demo if absent.", "DIR")] = None,
     draws: Annotated[
-        int, option("Runs of each test's simulation, from near starts.", "N", min=FEWEST_DRAWS)
+        int, option("Simulation runs per test, from neighbouring starts.", "N", min=FEWEST_DRAWS)
     ] = DRAWS,
     as_json: AsJson = False,
 ) -> None:

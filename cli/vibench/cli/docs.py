@@ -1,4 +1,4 @@
-"""`vibench docs`: the documentation site on this computer."""
+"""`vibench docs`: build the documentation site on this computer."""
 
 import os
 import shutil
@@ -23,11 +23,9 @@ NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
 
 def docs(
-    out: Annotated[Path | None, option("Build it there; the user's own folder if absent.", "DIR")] = None,
-    rebuild: Annotated[bool, option("Build it although it is there.")] = False,
-    quick: Annotated[
-        bool, option("Leave out the tutorials' results, which take about five minutes.")
-    ] = False,
+    out: Annotated[Path | None, option("Folder of the site; by default the user's own.", "DIR")] = None,
+    rebuild: Annotated[bool, option("Build it again if it exists.")] = False,
+    quick: Annotated[bool, option("Omit the tutorials' results, which take about five minutes.")] = False,
     show: Annotated[bool, option("Open its first page in the browser.", name="--open")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -61,7 +59,8 @@ def build(target: Path, extent: str) -> None:
     room_for_folder(target)
     with tempfile.TemporaryDirectory() as scratch:
         root = Path(scratch)
-        # Pages link to what stands beside their folder; a shipped folder may not be written to.
+        # Pages link to files beside their folder, and a shipped folder may be read-only, so build from a
+        # copy.
         for folder in ("docs", "examples", "campaigns", "studies", "hardware_configs"):
             shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]

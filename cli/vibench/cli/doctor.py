@@ -1,4 +1,4 @@
-"""`vibench doctor`: what a question about this installation has to say, as text to paste."""
+"""`vibench doctor`: facts about this installation, as text to paste into a report."""
 
 import os
 import platform
@@ -25,25 +25,25 @@ from .paths import AsJson
 
 NOT_INSTALLED = "not installed"
 FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
-"""Extras that no question of a user is about."""
+"""Extras that users do not need."""
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = MappingProxyType(
     {
-        STATE_VARIABLE: "folder for locks, bench checks and learnt costs; the user's own if absent",
-        LOCK_VARIABLE: "folder where all users of a computer see which bench is in use; /tmp if absent",
+        STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
+        LOCK_VARIABLE: "folder that shows all users of a computer which bench is in use; by default /tmp",
         TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
-        KEY_VARIABLE: "file with the key that seals of recordings are signed with",
+        KEY_VARIABLE: "key file for signing the seals of recordings",
         "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
         "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
         "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
     }
 )
-"""The environment variables that vibench reads, and what each is for: docs/installation.md."""
+"""The environment variables of vibench and their meaning: docs/installation.md."""
 SECRET = frozenset({TOKEN_VARIABLE})
 
 
 def doctor(as_json: AsJson = False) -> None:
-    """Say what this installation consists of, for a question to others: data only, nothing is changed."""
+    """Report what this installation consists of; nothing is changed."""
     sections = {
         "vibench": installation(),
         "libraries": dict(libraries()),
@@ -67,7 +67,7 @@ def doctor(as_json: AsJson = False) -> None:
 
 
 def installation() -> dict[str, str]:
-    """Return versions and places of vibench, Python and system."""
+    """Return versions and folders of vibench, Python and the system."""
     library = " ".join(platform.libc_ver()).strip()
     return {
         "version": version("vibench"),
@@ -79,7 +79,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield the version of each library that vibench asks for; of one that is missing, who brings it."""
+    """Yield the version of each library; for a missing one, the extra that installs it."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
@@ -87,7 +87,7 @@ def libraries() -> Iterator[tuple[str, str]]:
         asking.setdefault(name, []).append(extra[1] if extra else "")
     sizes = Counter(extra for extras in asking.values() for extra in extras)
     for name, extras in asking.items():
-        # Extras bring others: the one that asks for the fewest libraries brings the least.
+        # Extras include others; propose the one with the fewest libraries.
         smallest = min(set(extras) - FOR_DEVELOPERS, key=sizes.__getitem__, default=None)
         if name == "vibench" or smallest is None:
             continue
@@ -98,7 +98,7 @@ def libraries() -> Iterator[tuple[str, str]]:
 
 
 def engine() -> Iterator[tuple[str, str]]:
-    """Load the native engine, and give its place, its family and whether it answers a known scene."""
+    """Load the native engine; yield its path, its processor family, and whether it solves a known scene."""
     try:
         loaded = native_engine()
     except (EngineError, OSError, subprocess.CalledProcessError) as error:
@@ -110,7 +110,7 @@ def engine() -> Iterator[tuple[str, str]]:
 
 
 def folders() -> Iterator[tuple[str, str]]:
-    """Yield where vibench keeps what it learns, and whether it may write there."""
+    """Yield the folders in which vibench stores data, and whether they are writable."""
     yield "state", _place(state_place())
     yield "this folder", _place(Path.cwd())
 
@@ -122,7 +122,7 @@ def _place(folder: Path) -> str:
 
 
 def instruments() -> Iterator[tuple[str, str]]:
-    """Yield what can be seen of instruments, and what stands in between: libraries, drivers, permissions."""
+    """Yield the visible instruments, with libraries, drivers and permissions."""
     try:
         need_extra("bench")
     except MissingLibrary as error:

@@ -1,4 +1,4 @@
-"""What commands about branches, exponents and chains do alike: compute piece by piece, tell, and keep."""
+"""Shared by the commands on branches, exponents and chains: compute, report and save piece by piece."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 SHOWN = 24
-"""Rows on the terminal; all of them are in the JSON and in the file."""
+"""Rows on the terminal; JSON and file contain all."""
 
 
 def room_for(file: str, out: Path | None) -> None:
-    """Refuse, before anything is computed, a folder that cannot be written to or holds an answer.
+    """Refuse a folder that is not writable or already holds a result, before anything is computed.
 
-    Raises InvalidRequest when the file is there.
+    Raises InvalidRequest when the file exists.
     """
     if out is None:
         return
@@ -39,9 +39,9 @@ def room_for(file: str, out: Path | None) -> None:
 def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
-    """Compute part by part, telling each with its number; Ctrl-C ends after the one under way.
+    """Compute all parts and report each with its number; Ctrl-C ends after the current part.
 
-    Gives the parts, the seconds they took, and whether they are all.
+    Returns the parts, the elapsed seconds, and whether all parts are computed.
     """
     found: list[Part] = []
     began = time.perf_counter()
@@ -62,7 +62,7 @@ def compute_parts(
 def keep(
     out: Path | None, write: Callable[[Path], object], draw: "Callable[[], DrawnFigure]", *, is_told: bool
 ) -> None:
-    """Write the file, its figure and its tables into a folder, if one was asked for."""
+    """Write the file, its figure and its tables into a folder, if one was given."""
     if out is None:
         return
     out.mkdir(parents=True, exist_ok=True)
@@ -73,12 +73,12 @@ def keep(
 
 
 def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
-    """Print an answer as JSON, with what made it."""
+    """Print a result as JSON, with its provenance."""
     print_json({**document, "is_complete": is_complete, "software": software()})
 
 
 def leave(*, is_complete: bool) -> None:
-    """End with the exit code that says whether an answer is whole."""
+    """Exit with the code for a complete or an incomplete result."""
     if not is_complete:
-        errors.print("stopped: the answer holds what was computed until then")
+        errors.print("stopped: the result contains what was computed until then")
         raise typer.Exit(ExitCode.STOPPED)

@@ -1,4 +1,4 @@
-"""Progress bars drawn from what an engine tells: one for the measurement that runs, one for the campaign."""
+"""Progress bars from the engine's status: one for the measurement, one for the campaign."""
 
 from collections.abc import Callable
 from threading import Event, Thread
@@ -22,7 +22,7 @@ from .output import console, errors, words
 from .progress_bars import show_bars
 
 INTERVAL_S = 0.1
-"""How often the terminal is drawn [s]."""
+"""Interval between updates of the terminal [s]."""
 COLUMNS = (
     words("{task.description:<24}"),
     BarColumn(bar_width=30),
@@ -34,7 +34,7 @@ COLUMNS = (
 
 
 class EngineBars:
-    """Draws one status after the other: a bar for each recording, lines for what ended and what happened."""
+    """Draws the engine's status: a bar for the running recording, and lines for results and messages."""
 
     def __init__(self, on: Console = console) -> None:
         self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
@@ -55,7 +55,7 @@ class EngineBars:
         self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
-        """Draw what is new."""
+        """Draw what has changed."""
         for row in status.rows:
             self._row(row)
         for message in status.messages:
@@ -98,7 +98,7 @@ class EngineBars:
 
 
 def sentence(message: EngineMessage) -> str:
-    """Put what happened, what was done and what to do next into one line."""
+    """Return a message as one line: what happened, what was done and what to do next."""
     text = " ".join(part for part in (message.what, message.done, message.next_step) if part)
     return f"{message.kind.value:11} {text}"
 
@@ -106,7 +106,7 @@ def sentence(message: EngineMessage) -> str:
 class Watching:
     """Draws the newest status in a separate thread, so that a blocked terminal blocks nothing else.
 
-    At the end it prints on standard error who stopped the engine, if anybody did, and whether it drives.
+    At the end it prints on standard error who stopped the engine, if anyone did, and whether the drive is on.
     """
 
     def __init__(self, ask: Callable[[], EngineStatus], engine: Engine, on: Console = console) -> None:
@@ -124,7 +124,7 @@ class Watching:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ending.set()
-        # A terminal that takes nothing must not keep the command from ending.
+        # A blocked terminal must not keep the command from ending.
         self._thread.join(timeout=2.0)
 
     def _draw(self) -> None:

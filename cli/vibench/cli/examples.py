@@ -1,4 +1,4 @@
-"""`vibench examples`: what comes with vibench, by name, and copies of it to change."""
+"""`vibench examples`: list the shipped files, or copy them."""
 
 import shutil
 from collections import Counter
@@ -16,10 +16,10 @@ FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
 
 def examples(
-    copy: Annotated[Path | None, option("Copy all of them there; nothing is overwritten.", "DIR")] = None,
+    copy: Annotated[Path | None, option("Copy all files there; nothing is overwritten.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them."""
+    """List the shipped campaigns, rigs, studies and scripts, or copy them to be changed."""
     found = {folder: files_of(shipped_folder(folder)) for folder in FOLDERS}
     if copy is not None:
         copy_all(found, copy)
@@ -34,7 +34,7 @@ def examples(
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Return the files of a shipped folder and its folders, without the scripts of `vibench figure`."""
+    """Return the files of a shipped folder and its subfolders, without the scripts of `vibench figure`."""
     return sorted(
         path
         for path in folder.rglob("*")
@@ -45,7 +45,7 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def names_of(paths: list[Path]) -> list[str]:
-    """Name each file by its stem, and by its folder too where another one has that stem."""
+    """Return the stem of each file, with its folder where two stems are equal."""
     often = Counter(path.stem for path in paths)
     return [path.stem if often[path.stem] == 1 else f"{path.parent.name}/{path.stem}" for path in paths]
 
@@ -53,7 +53,7 @@ def names_of(paths: list[Path]) -> list[str]:
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
     """Copy every file into a folder of the same name under ``target``.
 
-    Raises ConfigurationError before anything is copied, when a file of that name is there.
+    Raises ConfigurationError before anything is copied if a file exists.
     """
     room_for_folder(target)
     copies = {

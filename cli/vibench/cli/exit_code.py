@@ -4,13 +4,13 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What a command says to the shell that called it."""
+    """Exit codes of commands."""
 
     DONE = 0
-    """All that was asked for."""
+    """The command did everything that was requested."""
     FAILED = 1
-    """An error, or a part of what was asked for has failed; a sentence on standard error says which."""
+    """An error, or a part of the request failed; standard error has a sentence about it."""
     MISUSED = 2
-    """The command line itself was not understood."""
+    """The command line is invalid."""
     STOPPED = 3
-    """Not everything was done, and nothing failed: somebody stopped it, and ``--resume`` goes on."""
+    """The command was stopped without a failure; ``--resume`` continues."""

@@ -1,4 +1,4 @@
-"""`vibench export`: a recording, or a part of it, as a file of another program."""
+"""`vibench export`: convert a recording, or a part of it, for other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,33 +23,32 @@ from .progress_bars import transfer_bar
 
 
 def export(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING.h5", help="Finished or still growing.")],
-    to: Annotated[Format, option("What to make of it.")],
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING.h5", help="Complete or still growing.")],
+    to: Annotated[Format, option("Format of the new file.")],
     out: Annotated[
-        Path | None, option("The new file, or a folder for it; beside the recording if absent.", "PATH")
+        Path | None, option("New file, or its folder; by default beside the recording.", "PATH")
     ] = None,
-    channels: Annotated[str, option("Some of its channels, with commas; all if absent.", "NAMES")] = "",
+    channels: Annotated[str, option("Channels, separated by commas; by default all.", "NAMES")] = "",
     from_s: Annotated[float | None, option("Seconds since the first sample.", "S", name="--from")] = None,
     to_s: Annotated[float | None, option("Seconds since the first sample.", "S", name="--until")] = None,
-    results: Annotated[bool, option("Results that were saved in the recording, too.")] = False,
+    results: Annotated[bool, option("Also export results stored in the recording.")] = False,
     spectra: Annotated[
         bool,
         option(
-            "Densities of the channels over what was played, and of noise the frequency response, in "
-            "place of samples (uff)."
+            "Export spectral densities of the channels, and for noise the frequency response, in place of "
+            "samples (uff)."
         ),
     ] = False,
     quantity: Annotated[
-        str | None, option("Of m0 over base, for --spectra: as in 'vibench analyse'; displacement if absent.")
+        str | None,
+        option("For --spectra, as in 'vibench analyse'; by default displacement."),
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Write a recording's samples or spectra, with units, as a file that other programs read."""
+    """Write a recording's samples or spectra, with units, to a file for other programs."""
     if quantity is not None and not spectra:
-        raise InvalidRequest(
-            "--quantity was given without --spectra, and samples are of every channel; give both"
-        )
+        raise InvalidRequest("--quantity was given without --spectra, which it needs; give both, or neither")
     if as_json:
         leave_output_to_json()
     with external_data(allow_external), open_recording(recording) as opened:

@@ -1,4 +1,4 @@
-"""`vibench figure`: a figure of the paper, from our own studies or from recordings."""
+"""`vibench figure`: draw a figure of the paper, from simulations or from recordings."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Figures of the experiment: they need recordings."""
+"""Figures of the experiment, which need recordings."""
 
 
 def figure(
@@ -35,20 +35,21 @@ def figure(
     ] = None,
     damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
     gap: Annotated[float, option("Clearance at both stops.", "M")] = FigureOptions.gap_m,
-    accuracy: Annotated[Accuracy, option("Of every point.")] = FigureOptions.accuracy,
+    accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = FigureOptions.accuracy,
     grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
     workers: Workers = None,
-    kinds: Annotated[
-        list[ImageKind], option("Image formats; give it several times for several.", name="--format")
-    ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
+    kinds: Annotated[list[ImageKind], option("Image format; may be repeated.", name="--format")] = [  # noqa: B006 - typer copies it
+        ImageKind.PNG,
+        ImageKind.SVG,
+    ],
     as_json: AsJson = False,
 ) -> None:
-    """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
+    """Draw a figure of the paper; studies are stored in DIR/studies, and interrupted ones are continued."""
     if as_json:
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
-    # Anyone who asks for all of them learns before the first what one of them cannot be drawn with.
+    # For all figures, check the inputs of each before drawing the first.
     asked = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
@@ -74,11 +75,11 @@ def _numbers(asked: str) -> tuple[int, ...]:
         return tuple(FILES)
     if asked.isdigit() and int(asked) in known:
         return (int(asked),)
-    raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
+    raise InvalidRequest(f"figure {asked!r} was given; give 1 to {known[-1]}, or all")
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
-    """Return what draws the figures of the experiment; the recordings are analysed once."""
+    """Return the function that draws figures of the experiment; the recordings are analysed once."""
     if not wanted:
         return lambda _: iter(())
     if folder is None:

@@ -1,4 +1,4 @@
-"""Which motions a scene came to where its start is forgotten: a table beside that of the responses."""
+"""Table of the motions that depend sensitively on the start, with their shares."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,11 +7,11 @@ from rich.table import Table
 from vibench.sim import Ensemble, FoundMotion, ScenePrediction, StartMemory
 
 _SHOWN = 24
-"""Rows on the terminal; all of them are in the JSON and in the file."""
+"""Rows on the terminal; JSON and file contain all."""
 
 
 def share_text(point: ScenePrediction) -> str:
-    """Return how many starts came to the motion of a point, of how many; nothing where the start decides."""
+    """Return the share of starts that settled on a point's motion; empty if all starts give the same."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
@@ -22,12 +22,12 @@ def share_text(point: ScenePrediction) -> str:
 
 
 def motions_table(points: Sequence[ScenePrediction]) -> Table | None:
-    """Show all motions at the points that came to more than one; None where there is no such point."""
+    """Return a table of the motions at points with more than one; None without such a point."""
     several = list(_several(points))
     if not several:
         return None
     rows = Table(
-        title="Where the start is forgotten: the motions that starts a millionth of a gap apart came to",
+        title="Motions with sensitive dependence on the start: starts differ by a millionth of a gap",
         caption=f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None,
     )
     for heading in ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"):
@@ -45,12 +45,12 @@ def motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def motion_text(motion: FoundMotion) -> str:
-    """Name a motion, with its period."""
+    """Return name and period of a motion."""
     return str(motion.motion) if motion.period is None else f"{motion.motion}, {motion.period}"
 
 
 def forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return where starts were forgotten, and what following others took; nothing where none was."""
+    """Return where motions depended sensitively on the start, and the cost of the additional starts."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

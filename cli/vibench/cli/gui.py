@@ -1,4 +1,4 @@
-"""`vibench gui`: the window, in a process of its own."""
+"""`vibench gui`: open the window in a separate process."""
 
 import subprocess
 import sys
@@ -13,12 +13,12 @@ from .options import option
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
-"""The package that is run; it is never imported here: commands must work where there is no Qt."""
+"""Package to run; it is not imported here, because commands must work without Qt."""
 
 
 def gui(
     bench: BenchPath = None,
-    screenshots: Annotated[Path | None, option("Make a picture of every page there, and end.", "DIR")] = None,
+    screenshots: Annotated[Path | None, option("Save a picture of each page, and exit.", "DIR")] = None,
 ) -> None:
     """Open the window: connect, check, choose, preview, run, watch, compare."""
     command = [sys.executable, "-m", WINDOW]

@@ -1,4 +1,4 @@
-"""`vibench import`: somebody else's file as a recording."""
+"""`vibench import`: convert another program's file to a recording."""
 
 import math
 import shlex
@@ -19,12 +19,12 @@ from .progress_bars import transfer_bar
 
 
 def import_file(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV file.")],
     mapping: Annotated[
-        Path | None, option("What its channels are; lists them if absent.", "MAP.toml")
+        Path | None, option("Mapping of its channels; without it, the channels are listed.", "MAP.toml")
     ] = None,
     out: Annotated[
-        Path | None, option("The new recording, or a folder for it; beside FILE if absent.", "NAME.h5")
+        Path | None, option("New recording, or its folder; by default beside FILE.", "NAME.h5")
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
@@ -37,7 +37,7 @@ def import_file(
 def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool) -> None:
     if mapping is None:
         if out is not None:
-            raise InvalidRequest(f"{out} cannot be made without a mapping; give --mapping MAP.toml")
+            raise InvalidRequest(f"{out} cannot be written without a mapping; give --mapping MAP.toml")
         _tell(file, as_json)
         return
     meaning = load_toml(mapping, ImportMapping)
@@ -60,7 +60,7 @@ def _tell(file: Path, as_json: bool) -> None:
         return
     for each in channels:
         console.print(_line(each))
-    console.print("Say in a mapping what they are (docs/exchange.md), and give it with --mapping.")
+    console.print("Describe them in a mapping (docs/exchange.md), and give it with --mapping.")
 
 
 def _line(channel: SourceChannel) -> str:

@@ -1,4 +1,4 @@
-"""Ctrl-C as a request: what is under way comes to its end and is kept. A second one ends the program."""
+"""Ctrl-C as a request: the current work is finished and saved. A second Ctrl-C ends the program."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ from types import FrameType
 
 @contextmanager
 def watch_interrupt() -> Iterator[Callable[[], bool]]:
-    """Give a question: whether Ctrl-C has been pressed since."""
+    """Yield a function that returns whether Ctrl-C was pressed."""
     before = signal.getsignal(signal.SIGINT)
     pressed: list[int] = []
 

@@ -1,4 +1,4 @@
-"""`vibench map`: what motions there are over two quantities, or along one; computed as a study is."""
+"""`vibench map`: map the kinds of motion over one or two parameters."""
 
 from pathlib import Path
 from typing import Annotated
@@ -38,32 +38,32 @@ def map_motions(
     plan: Annotated[
         Path,
         typer.Argument(
-            metavar="MAP", help="TOML file of what varies, or a shipped name: map, basin, diagram."
+            metavar="MAP", help="TOML file of the parameters, or a shipped name: map, basin, diagram."
         ),
     ],
     out: Annotated[Path, option("Folder for map.h5, figure and table.", "DIR")],
-    resume: Annotated[bool, option("Go on with what DIR/map.h5 does not hold yet.")] = False,
+    resume: Annotated[bool, option("Compute the points missing in DIR/map.h5.")] = False,
     workers: Workers = None,
     cluster: Cluster = None,
     only_estimate: Annotated[
-        bool, option("Say how many points, how long and how large; compute nothing.", name="--estimate")
+        bool, option("Print number of points, time and size without computing.", name="--estimate")
     ] = False,
     show: Annotated[
-        str | None, option(f"Beside the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
+        str | None, option(f"Quantity beside the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
     ] = None,
     branches: Annotated[
-        Path | None, option("Lay branches over a map along one parameter.", "BRANCHES.h5")
+        Path | None, option("Overlay branches on a map along one parameter.", "BRANCHES.h5")
     ] = None,
     like: Annotated[
-        list[Path] | None, option("Lay a recording's level and responses over the map.", "RECORDING.h5")
+        list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int, option("Of a basin map: kick each motion so often, at three sizes.", "N", min=0)
+        int, option("For a basin map: number of kicks of each motion, at three sizes.", "N", min=0)
     ] = 0,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Map the motions over two parameters or two coordinates of the start, or along one parameter."""
+    """Map the motions over two parameters or two start coordinates, or along one parameter."""
     asked = load_toml(named(plan, "studies/maps"), Map)
     gaps_m = asked.specimen.specimen().gaps_m if asked.gap_m is None else _ends(asked.gap_m)
     print_warnings(plausibility_warnings(_ends(asked.amplitude_m), gaps_m))
@@ -114,7 +114,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Say what was found."""
+    """Print the result."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(motion)}")
@@ -124,7 +124,7 @@ def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
         console.print(_boundary_words(results))
     for each in stability:
         console.print(
-            f"Motion {each.motion}, kicked by {each.size:g} gaps: comes back in {each.returned.share:.0%} "
+            f"Motion {each.motion}, kicked by {each.size:g} gaps: returns in {each.returned.share:.0%} "
             f"({each.returned.low:.0%} to {each.returned.high:.0%})"
         )
 
@@ -148,7 +148,7 @@ def _roughness(results: MapResults) -> UncertaintyExponent | None:
 
 
 def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
-    """Return what a map holds, for other programs; its points are in the file."""
+    """Return the summary of a map as JSON; its points are in the file."""
     audit = results.audit
     rough = _roughness(results)
     return {

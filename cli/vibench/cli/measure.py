@@ -1,4 +1,4 @@
-"""`vibench measure`: carry out a campaign, one recording a measurement."""
+"""`vibench measure`: run a campaign, with one recording per measurement."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 
 class Form(StrEnum):
-    """Who reads it."""
+    """Output for people or for programs."""
 
     TEXT = "text"
     JSON = "json"
@@ -68,7 +68,7 @@ def tell_estimate(
     shares: Sequence["TimeShare"] = (),
     ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
-    """Say how many recordings, how long and how large, whether the disk has room, and what they will tell."""
+    """Print number of recordings, time, size, free space, and the expected quality of results."""
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
@@ -91,13 +91,13 @@ def tell_estimate(
 
 
 def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
-    """Say for each measurement of a campaign what it will tell, and how well."""
+    """Return the expected results of each measurement, with their uncertainties."""
     found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
     return {name: each for name, each in found.items() if each}
 
 
 def estimate_text(expected: CampaignEstimate) -> str:
-    """Put an estimate into a few lines."""
+    """Return an estimate as text of a few lines."""
     most = "at most " if expected.searching else ""
     length = f"{most}{timedelta(seconds=round(expected.duration_s))}"
     kept = f" ({expected.kept} kept)" if expected.kept else ""
@@ -110,24 +110,24 @@ def estimate_text(expected: CampaignEstimate) -> str:
         lead_in = timedelta(seconds=round(expected.lead_in_s))
         lines.append(f"{lead_in} of it lead to points along their chains")
     if not expected.fits:
-        lines.append("The disk may be full before the end: make room, or record elsewhere")
+        lines.append("The disk may be full before the end: free disk space, or record elsewhere")
     return "\n".join(lines)
 
 
 def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | None, float]]:
-    """Predict for how long measurements with `until` record; give their longest times too [s]."""
+    """Return expected and longest recording times [s] of measurements with `until`."""
     waiting = [each for each in campaign.measurements if each.until is not None]
     found = vibench.analysis.expected_recorded_s
     return {each.name: (found(each, rig), vibench.analysis.recorded_s(each)) for each in waiting}
 
 
 def duration_s(text: str) -> float:
-    """Read a time like ``30min``, ``1.5 h`` or ``90 s`` [s]."""
+    """Parse a time such as ``30min``, ``1.5 h`` or ``90 s`` [s]."""
     found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*(s|min|h)\s*", text, re.ASCII)
     seconds = float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2]] if found else 0.0
     if not 0.0 < seconds < float("inf"):
         raise typer.BadParameter(
-            f"{text!r} is no time above zero; give a number with s, min or h, like 30min"
+            f"{text!r} is not a time above zero; give a number with s, min or h, such as 30min"
         )
     return seconds
 
@@ -135,7 +135,7 @@ def duration_s(text: str) -> float:
 NotifyCommand = Annotated[
     str | None,
     option(
-        "Run at every fault and at the end, the reason as JSON on its standard input; no shell.",
+        "Command to run at every fault and at the end, without a shell; it reads the reason as JSON.",
         "COMMAND",
         name="--notify",
     ),
@@ -146,7 +146,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the ways to reach somebody that were asked for; raises ConfigurationError."""
+    """Return the requested messengers; raises ConfigurationError."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))
@@ -158,34 +158,34 @@ def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...
 def measure(
     campaign: Annotated[
         Path,
-        typer.Argument(metavar="CAMPAIGN", help="TOML file of what to measure, or a shipped name: quick."),
+        typer.Argument(metavar="CAMPAIGN", help="TOML file of the campaign, or a shipped name: quick."),
     ],
     out: Annotated[Path, option("Folder for the recordings.", "DIR")],
     bench: BenchPath = None,
-    resume: Annotated[bool, option("Keep complete recordings in DIR and make the missing ones.")] = False,
-    after_failure: Annotated[AfterFailure, option("When a point has failed for good.")] = AfterFailure.STOP,
-    accept_changed_bench: Annotated[bool, option("Resume on another bench than it was begun on.")] = False,
+    resume: Annotated[bool, option("Keep complete recordings in DIR and record the missing ones.")] = False,
+    after_failure: Annotated[AfterFailure, option("What to do after a failed point.")] = AfterFailure.STOP,
+    accept_changed_bench: Annotated[bool, option("Resume on a different bench.")] = False,
     faults: FaultsPath = None,
     knobs: Annotated[
-        Path | None, option("Settings confirmed before, by `vibench bench check --knobs`.", "SHEET.toml")
+        Path | None, option("Settings confirmed before with `vibench bench check --knobs`.", "SHEET.toml")
     ] = None,
     check: Annotated[
-        CheckRule, option("A passed check of the bench, of today: ask for it, make it, or not.")
+        CheckRule, option("Whether a passed check of today is required, made, or not needed.")
     ] = CheckRule.FRESH,
     only_estimate: Annotated[
         bool,
         option(
-            "Say how long it takes, how large it becomes, and how well results will be known.",
+            "Print time, size and the expected uncertainty of results, without measuring.",
             name="--estimate",
         ),
     ] = False,
     time_limit: Annotated[
         str | None,
-        option("Distribute this time over measurements by what their until needs.", "TIME", name="--within"),
+        option("Distribute this time over measurements as their until requires.", "TIME", name="--within"),
     ] = None,
     as_json: AsJson = False,
     twin: Annotated[
-        bool, option("Follow the hidden motion beside it; note when the specimen changes.")
+        bool, option("Also estimate the hidden motion, and report changes of the specimen.")
     ] = False,
     notify: NotifyCommand = None,
     mail: MailPath = None,
@@ -237,7 +237,7 @@ def measure(
 
 @contextmanager
 def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[Engine]:
-    """Open a bench in this process, with bars on the terminal and a server for `vibench watch` and `stop`."""
+    """Open a bench in this process, with progress bars and a server for `vibench watch` and `stop`."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     try:

@@ -1,8 +1,8 @@
-"""Options of commands that are fields of a pydantic model, declared there alone.
+"""Command-line options that are fields of a pydantic model.
 
-The field's name, type, default and docstring become an option of the command line, as they become the field
-of a form, a key of JSON and an attribute of HDF5 files. `RequestOptions` stands for them in the signature of
-a command; what only the command line has is declared in the signature itself.
+Name, type, default and docstring of a field define the option, as they define form fields, JSON keys and HDF5
+attributes. `RequestOptions` represents these options in a command's signature, which declares all others
+itself.
 """
 
 import inspect
@@ -34,7 +34,7 @@ _OTHER_NAMES = {
     "gaps_m": "gap",
     "damping_times_s": "damping-time",
 }
-"""Options that are not called as their field."""
+"""Options whose name differs from the field's name."""
 _ALLOWED = {
     "greater_than": "it must be above {gt:g}",
     "greater_than_equal": "it must be {ge:g} or more",
@@ -42,38 +42,38 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""What an option must be, by pydantic's type of fault."""
+"""Allowed values in words, by type of pydantic error."""
 
 
 @dataclass(frozen=True)
 class Fields:
-    """Mark `RequestOptions`, in their ``Annotated`` type, with the fields that become options, in order."""
+    """Annotation of `RequestOptions` with the fields that become options, in order."""
 
     names: tuple[str, ...]
     panel: str | None = None
-    """Heading of these options in the help of the command."""
+    """Heading of these options in the help."""
 
 
 @dataclass(frozen=True)
 class RequestOptions(Generic[Request]):
-    """Options that were typed for fields of a request, which has its own default for every other field."""
+    """The given options of a request; the request has defaults for all other fields."""
 
     model: type[Request]
     typed: Mapping[str, Any]
-    """Types by field."""
+    """Given values by field."""
 
     def request(self, **others: object) -> Request:
-        """Make the request, with other fields as the command has read them.
+        """Return the request, with other fields set by the command.
 
-        Raises InvalidRequest with the option that is not allowed, what was given and what is allowed.
+        Raises InvalidRequest with the invalid option, its value and the allowed values.
         """
         return validated(self.model, {**others, **self.typed})
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Make a request of options, by the names of its fields.
+    """Return a request from options by field name.
 
-    Raises InvalidRequest with the first option that is not allowed, as it was typed.
+    Raises InvalidRequest with the first invalid option, as it was typed.
     """
     from pydantic import ValidationError
 
@@ -90,7 +90,7 @@ def validated(model: type[Request], given: Mapping[str, object]) -> Request:
 
 
 def option_name(field: str) -> str:
-    """Name the option of a field, without dashes: ``duration_s`` is ``duration``."""
+    """Return the option name of a field, without dashes: ``duration_s`` is ``duration``."""
     return _OTHER_NAMES.get(field, _UNIT.sub("", field).replace("_", "-"))
 
 
@@ -102,7 +102,7 @@ def option(
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
 ) -> OptionInfo:
-    """Declare an option of the command line alone: its help, and its name where the parameter has another."""
+    """Return an option that is no field of a model; ``name`` if it differs from the parameter."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, min=min)
     return made
@@ -116,7 +116,7 @@ def _option(model: "type[BaseModel]", name: str, panel: str | None) -> OptionInf
 
 
 def _help(model: "type[BaseModel]", name: str) -> str:
-    """Read the help of a field's option: its docstring, and its default, which the model alone has."""
+    """Return the help of a field's option: its docstring and the model's default."""
     from vibench.analysis.prediction.field_docstrings import field_docstring
 
     default = model.model_fields[name].default
@@ -130,7 +130,7 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Take limits and ``| None`` off a type; a choice between types is text, which the model reads."""
+    """Return a type without limits and ``| None``; a union becomes text, which the model parses."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -140,9 +140,9 @@ def _plain(annotation: Any) -> Any:
 
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command's function the signature that typer reads, with an option for every field it asks for.
+    """Return a command's function with a signature for typer that has an option for every field.
 
-    A switch is typed as its name alone; ``--no-name`` exists only where a declaration says so.
+    A switch has no value; ``--no-name`` exists only where it is declared.
     """
     signature = inspect.signature(function, eval_str=True)
     parameters: list[inspect.Parameter] = []
@@ -190,13 +190,13 @@ def _parameter(model: "type[BaseModel]", name: str, panel: str | None) -> inspec
 
 
 class SectionedCommand(TyperCommand):
-    """Writes its help as plain text, options with a heading of their own below the others.
+    """Prints its help as plain text, with separate sections for options with a heading.
 
-    rich, with which typer would draw boxes, takes 75 ms to load.
+    rich, which typer would use for its boxes, takes 75 ms to load.
     """
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write a section for arguments, for options and for every other heading."""
+        """Write sections for arguments, options and every other heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
         models = getattr(self.callback, "fields", {})
         for each in self.get_params(ctx):
@@ -212,14 +212,14 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Letters of a command's line in a list."""
+"""Largest length of a command's description in a list."""
 
 
 class SectionedGroup(TyperGroup):
-    """Lists commands below their headings, each with the whole first line of its help."""
+    """Lists commands by heading, each with the whole first line of its help."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
-        """Write a section for every heading."""
+        """Write a section for each heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for name, each in self.commands.items():
             heading = getattr(each, "rich_help_panel", None) or "Commands"

@@ -1,4 +1,4 @@
-"""What commands print: people's text on one console, JSON on standard output alone."""
+"""Output of commands: one console for text, JSON on standard output only."""
 
 import json
 import sys
@@ -17,43 +17,43 @@ if TYPE_CHECKING:
 
 
 class PrintableConsole(Console):
-    """Shows control and formatting characters, which any name may hold, as escapes."""
+    """Console that escapes control and formatting characters, which any name may contain."""
 
     def print(self, *objects: Any, **settings: Any) -> None:
-        """Print each string as one line; a text of several lines is a `paragraph`."""
+        """Print each string as one line; use `paragraph` for text of several lines."""
         super().print(*(printable(each) if isinstance(each, str) else each for each in objects), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render tables, bars and lines alike."""
+        """Render tables, bars and lines in the same way."""
         for segment in super().render(renderable, options):
             text = "\n".join(map(printable, segment.text.split("\n")))
             yield segment if segment.control else Segment(text, segment.style)
 
 
-# Neither markup nor emoji: names and paths may hold what looks like some.
+# Markup and emoji are disabled, because names and paths may contain similar text.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def words(text_format: str) -> "TextColumn":
-    """Make a column of progress bars that shows names as they are."""
+    """Return a column of progress bars that shows names unchanged."""
     from rich.progress import TextColumn
 
     return TextColumn(text_format, markup=False)
 
 
 def bold(text: object) -> Text:
-    """Make something stand out on a terminal, whatever brackets it has."""
+    """Return bold text, without interpreting brackets."""
     return Text(printable(str(text)), style="bold")
 
 
 def paragraph(text: str) -> Text:
-    """Return a text of several lines to a console."""
+    """Return text of several lines for the console."""
     return Text(text)
 
 
 def print_table(rows: "Table") -> None:
-    """Print a table that no terminal and no file is too narrow for: words wrap, a number is never cut."""
+    """Print a table of any width: words are wrapped, numbers are never cut."""
     for column in rows.columns:
         words_of = [word for text in (column.header, *column.cells) for word in str(text).split()]
         column.min_width = max((len(word) for word in words_of), default=0)
@@ -61,17 +61,17 @@ def print_table(rows: "Table") -> None:
 
 
 def print_warnings(sentences: Iterable[str]) -> None:
-    """Print what should be looked at on standard error, so that standard output holds only answers."""
+    """Print warnings on standard error, so that standard output holds only results."""
     for sentence in sentences:
         errors.print(f"warning: {sentence}")
 
 
 def leave_output_to_json() -> None:
-    """Write text for people to standard error, so that standard output holds one JSON document."""
+    """Send text for people to standard error, so that standard output holds one JSON document."""
     console.file = sys.stderr
 
 
 def print_json(document: Mapping[str, object]) -> None:
-    """Print one JSON document on standard output, and nothing else."""
+    """Print one JSON document on standard output."""
     json.dump(document, sys.stdout, indent=2, allow_nan=False)
     sys.stdout.write("\n")

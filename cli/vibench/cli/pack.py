@@ -1,4 +1,4 @@
-"""`vibench pack`: a campaign's folder as one zip with a description, to be deposited as it is."""
+"""`vibench pack`: pack a campaign's folder into a zip file with a description, for a repository."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,23 +17,23 @@ from .progress_bars import transfer_bar
 
 
 def pack(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Recordings, and what lies beside them.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with recordings and other files.")],
     licence: Annotated[str, option("https://creativecommons.org/licenses/by/4.0/", "URL", name="--license")],
     out: Annotated[
-        Path | None, option("Or a folder for it; DIR.zip beside it if absent.", "CRATE.zip")
+        Path | None, option("New file, or its folder; by default DIR.zip beside DIR.", "CRATE.zip")
     ] = None,
-    author: Annotated[list[str] | None, option("May be given several times.", "NAME")] = None,
-    title: Annotated[str, option("The folder's name if absent.")] = "",
-    description: Annotated[str, option("A sentence or two.")] = "",
-    organisation: Annotated[str, option("Publishes it; the authors belong to it.", "NAME")] = "",
-    organisation_url: Annotated[str, option("Of its home page, or https://ror.org/...", "URL")] = "",
+    author: Annotated[list[str] | None, option("Author; may be repeated.", "NAME")] = None,
+    title: Annotated[str, option("Title; by default the name of the folder.")] = "",
+    description: Annotated[str, option("Description in one or two sentences.")] = "",
+    organisation: Annotated[str, option("Publisher and affiliation of the authors.", "NAME")] = "",
+    organisation_url: Annotated[str, option("Its home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""
     if as_json:
         leave_output_to_json()
     here = folder.resolve()
-    # Not with_suffix: a folder may be called after a level, "0.5Vpp".
+    # Not with_suffix, because a folder name may contain a dot: "0.5Vpp".
     crate = file_at(out, here.parent / f"{here.name}.zip")
     facts = CrateFacts(licence, tuple(author or ()), title, description, organisation, organisation_url)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
@@ -50,9 +50,9 @@ def pack(
             {"crate": str(crate), "files": len(packed), "unfinished": unfinished, "untrusted": untrusted}
         )
     for name in unfinished:
-        errors.print(f"note: {name} is not finished and was left out; vibench recover finishes it")
+        errors.print(f"note: {name} is not finished and was omitted; vibench recover finishes it")
     for name, why in untrusted.items():
-        way = "the crate says so; restore it and pack again, or deposit the crate as it is"
+        way = "the crate states this; restore it and pack again, or deposit the crate as it is"
         errors.print(f"error: {name} cannot be trusted ({why.rstrip('.')}): {way}")
     if untrusted:
         raise typer.Exit(ExitCode.FAILED)

@@ -15,25 +15,25 @@ if TYPE_CHECKING:
 BenchPath = Annotated[
     Path | None,
     option(
-        "Hardware configuration, a file or a shipped name; virtual_rig if absent.", "BENCH", name="--bench"
+        "Hardware configuration, a file or a shipped name; by default virtual_rig.", "BENCH", name="--bench"
     ),
 ]
 FaultsPath = Annotated[
     Path | None,
-    option("What goes wrong with a virtual rig, and when; a file or night.", "FAULTS", name="--faults"),
+    option("Scheduled faults of a virtual rig; a file, or night.", "FAULTS", name="--faults"),
 ]
 AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
 AllowExternal = Annotated[
     bool,
     option(
-        "Follow an HDF5 file into other files: external storage and links, virtual datasets.",
+        "Read other files to which an HDF5 file refers: external storage and links, virtual datasets.",
         name="--allow-external",
     ),
 ]
 
 
 def external_data(allowed: bool) -> AbstractContextManager[None]:
-    """Allow it while inside, if the user said so."""
+    """Allow external data within the context, if requested."""
     if not allowed:
         return nullcontext()
     from vibench.sim.hdf5_files.door import allow_external_data
@@ -42,12 +42,12 @@ def external_data(allowed: bool) -> AbstractContextManager[None]:
 
 
 def bench_path(given: Path | None) -> Path:
-    """Path of the hardware configuration: what was given, or the virtual rig."""
+    """Return the path of the hardware configuration; by default the virtual rig's."""
     return named("virtual_rig" if given is None else given, "hardware_configs")
 
 
 def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
-    """Read the hardware configuration that was given, or the virtual rig's, with faults if any are given."""
+    """Return the rig of the given configuration, by default the virtual rig, with optional faults."""
     from vibench.acquisition.rig import load_rig, with_faults
 
     rig = load_rig(bench_path(bench))
@@ -55,27 +55,28 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 
 
 def room_for_folder(path: Path) -> None:
-    """Refuse a folder that cannot be written to, before anything is computed for it; leaves none behind.
+    """Refuse a folder that is not writable before anything is computed; a created folder is removed again.
 
-    Raises ConfigurationError when it, or what it would lie in, is a file or may not be written to.
+    Raises ConfigurationError when it or its parent is a file or not writable.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:
-        # Permissions do not say it: who administers a computer has them all, and /proc holds no folders.
+        # Test by writing: administrators pass every permission check, and /proc accepts no folders.
         with tempfile.TemporaryDirectory(dir=standing):
             return
     except OSError as error:
         why = "may not be written to" if standing.is_dir() else "is a file"
         raise ConfigurationError(
-            f"{path} cannot be made a folder: {standing} {why}. Nothing was computed; give a folder that "
+            f"{path} cannot be created as a folder: {standing} {why}. Nothing was computed; give a folder "
+            "that "
             "exists, or the name of a new one"
         ) from error
 
 
 def room_for_page(path: Path) -> None:
-    """Refuse a page that cannot be written, before anything is computed for it.
+    """Refuse a page that is not writable before anything is computed.
 
-    Raises ConfigurationError when it is a folder, or its folder cannot be made.
+    Raises ConfigurationError when it is a folder, or its folder cannot be created.
     """
     if path.is_dir():
         raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a page in it")
@@ -83,9 +84,9 @@ def room_for_page(path: Path) -> None:
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Return the path of a new file: the one that was named, or in a folder that was, by its usual name.
+    """Return the path of a new file: ``out`` itself, or ``usual`` in the folder ``out``.
 
-    What is named without a suffix where nothing is, is a folder that is wanted: it is made.
+    A path without a suffix that does not exist is created as a folder.
     """
     if out is None:
         return usual
@@ -95,7 +96,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
 
 
 def free_path(path: Path) -> Path:
-    """Return a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
+    """Return an unused path: the given one, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

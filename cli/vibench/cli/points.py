@@ -1,4 +1,4 @@
-"""What the commands that compute many points share: who computes, and which points have no answer."""
+"""Shared by commands that compute many points: workers, and errors of points."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -14,25 +14,25 @@ if TYPE_CHECKING:
 
 SHOWN_FAILURES = 5
 
-Workers = Annotated[int | None, option("Threads; one for each processor if absent.", "N", min=1)]
-Cluster = Annotated[str | None, option("Let the workers of this Dask scheduler compute.", "ADDRESS")]
+Workers = Annotated[int | None, option("Threads; by default one per processor.", "N", min=1)]
+Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
-"""Values of the axes at each point without an answer, and why there is none."""
+"""Axis values of each failed point, and the reason."""
 
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
-    """End with sentences for points without an answer, or as a study of which only ``kept`` were answered."""
+    """Raise an error that names failed points, or the number of finished points after a stop."""
     if say_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:
-        errors.print(f"stopped after {kept} of {plan.grid.size} points; a file goes on with --resume")
+        errors.print(f"stopped after {kept} of {plan.grid.size} points; --resume continues a file")
         raise typer.Exit(ExitCode.STOPPED)
 
 
 def say_failures(plan: "GridPlan", failures: Failures) -> int:
-    """Say on standard error which points have no answer, and why; returns how many."""
+    """Print the failed points and the reasons on standard error; return their number."""
     for where, why in failures[:SHOWN_FAILURES]:
-        # An axis of one value tells no point from another.
+        # Omit axes with a single value.
         told = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
         place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
         errors.print(f"error: {place}: {why}")

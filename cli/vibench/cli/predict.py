@@ -38,36 +38,34 @@ from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
-"""Rows of a table on the terminal; all of them are in the JSON and in the file."""
+"""Rows on the terminal; JSON and file contain all."""
 
 
 def predict(
-    amplitude: Annotated[float, option("Of the base displacement.", "M")],
+    amplitude: Annotated[float, option("Amplitude of the base displacement.", "M")],
     frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
     duration: Annotated[
         str | None, option("Length of each run, or until it settles.  [default: 30]", "S|auto")
     ] = None,
-    observe: Annotated[str, option("response; with it lyapunov, scatter.")] = Observable.RESPONSE.value,
+    observe: Annotated[str, option("response, and with it lyapunov, scatter.")] = Observable.RESPONSE.value,
     start: Annotated[
-        Start, option("rest, or continued from the next lower (up) or higher (down).")
+        Start, option("rest, or continued from lower (up) or higher (down) frequencies.")
     ] = Start.REST,
     budget: Annotated[
         str | None,
         option(
-            "Processor time a point for other starts, where the start is forgotten, and to see whether "
-            f"chaos lasts; 0 looks for neither.  [default: {BUDGET_S:g}s]",
+            "Processor time per point for other starts, if the motion depends on the start, and for tests "
+            f"whether chaos lasts; 0 disables both.  [default: {BUDGET_S:g}s]",
             "S",
         ),
     ] = None,
-    error: Annotated[str | None, option("Relative error to reach at each point, as 1%.", "E")] = None,
-    time_limit: Annotated[
-        str | None, option("Time for each point, as 2s: the best answer by then.", "T", name="--time")
-    ] = None,
+    error: Annotated[str | None, option("Relative error to reach at each point, such as 1%.", "E")] = None,
+    time_limit: Annotated[str | None, option("Time for each point, such as 2s.", "T", name="--time")] = None,
     workers: Workers = None,
     cluster: Cluster = None,
-    out: Annotated[Path | None, option("Keep the answers in a file.", "FILE.h5")] = None,
-    resume: Annotated[bool, option("Go on with what FILE.h5 lacks.")] = False,
-    explain: Annotated[bool, option("Say what is computed and why.")] = False,
+    out: Annotated[Path | None, option("Store the results in a file.", "FILE.h5")] = None,
+    resume: Annotated[bool, option("Compute the points missing in FILE.h5.")] = False,
+    explain: Annotated[bool, option("Explain what is computed and why.")] = False,
     as_json: AsJson = False,
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
@@ -75,7 +73,7 @@ def predict(
 ) -> None:
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
-        raise InvalidRequest("--resume was given without --out, and only a file is gone on with; give both")
+        raise InvalidRequest("--resume was given without --out, which it needs; give both")
     given = {"duration_s": duration and _duration(duration), "budget_s": budget and _budget(budget)}
     given |= {"error": error, "time_s": time_limit}
     typed = {name: value for name, value in given.items() if value is not None}
@@ -96,7 +94,7 @@ def predict(
     points: Sequence[ScenePrediction] = []
     with watch_interrupt() as is_stopped, study_bar(asked.grid.size) as observer:
         if asked.grid.size == 1 and out is None and cluster is None and study_solver(asked) is solve_scene:
-            # One point needs neither a queue nor a file.
+            # A single point needs neither workers nor a file.
             taken_s, kept, where = [math.nan], 1, asked.coordinates(0)
             try:
                 scene = asked.scene((0,) * len(asked.axes), Rest())
@@ -134,7 +132,7 @@ def predict(
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
-    """Refuse what a requested error or time decides by itself."""
+    """Refuse options that a requested error or time determines."""
     targets = [name for name in ("error", "time_s") if name in typed]
     others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
     if targets and others:
@@ -145,7 +143,7 @@ def _refuse_beside_target(typed: Collection[str]) -> None:
 
 
 def _refined(scene: Scene) -> ScenePrediction:
-    """Solve one scene with a target, and show every better answer as it comes."""
+    """Solve one scene with a target; print each improved result."""
     from vibench.sim import refine_scene
 
     for found in refine_scene(scene):
@@ -180,7 +178,7 @@ def _budget(text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Return how the points are answered: one passage for each run of points that are answered alike."""
+    """Return how the points are solved, in one paragraph per group of points solved the same way."""
     from vibench.sim import measure_cost, plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -194,9 +192,10 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]]) -> str:
-    """Explain points in a row that are answered alike, by the one nearest to its stops.
+    """Return a paragraph on adjacent points solved the same way, for the point nearest to its stops.
 
-    Each is a frequency [Hz], a plan and the time it took [s]: NaN where a process paid once for something.
+    Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes a cost paid once per
+    process.
     """
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost

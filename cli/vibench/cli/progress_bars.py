@@ -1,4 +1,4 @@
-"""Progress bars on standard error; without a terminal, a line every ten seconds."""
+"""Progress bars on standard error; without a terminal, one line every ten seconds."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -18,12 +18,12 @@ from vibench.sim.background import Observer, Progress
 from .output import console, errors, words
 
 LINE_INTERVAL_S = 10.0
-"""Time between two lines of progress where there is no terminal to draw bars on [s]."""
+"""Interval between progress lines without a terminal [s]."""
 
 
 @contextmanager
 def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
-    """Draw progress bars on a terminal; print a line of them every few seconds into anything else."""
+    """Draw progress bars on a terminal; without one, print lines."""
     if bars.console.is_terminal:
         with bars:
             yield bars
@@ -43,7 +43,7 @@ def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]
 
 
 def progress_line(bars: Bars) -> str:
-    """Put all bars into one line of text."""
+    """Return all bars as one line of text."""
     return "; ".join(
         each.description
         if each.total is None
@@ -58,7 +58,7 @@ MINUTES_OF_AN_HOUR = 60.0
 
 @contextmanager
 def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
-    """Show one bar while inside; gives the function that draws a progress on it."""
+    """Show one bar; yields the function that updates it."""
     with show_bars(bars):
         bar = bars.add_task(what, total=total, left="")
 
@@ -74,20 +74,20 @@ def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
 
 
 def analysis_bar(recordings: int) -> AbstractContextManager[Observer]:
-    """Show how many of the recordings are analysed."""
+    """Show the number of analysed recordings."""
     columns = (words("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
     return _bar(Bars(*columns, TimeElapsedColumn(), console=console), "analysis and simulation", recordings)
 
 
 def study_bar(points: int) -> AbstractContextManager[Observer]:
-    """Show how many points of a study or map have an answer."""
+    """Show the number of finished points of a study or map."""
     left = words("{task.fields[left]}")
     columns = (words("points"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeElapsedColumn(), left)
     return _bar(Bars(*columns, console=errors), "points", points)
 
 
 def reading_bar() -> AbstractContextManager[Observer]:
-    """Show the stage of an analysis, and how much of the recording was read; leave nothing on a terminal."""
+    """Show the stage of an analysis and the share of the recording read; the bar disappears at the end."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     return _bar(Bars(*columns, TimeElapsedColumn(), console=errors, transient=True), "opening", None)
 

@@ -1,4 +1,4 @@
-"""What `--frequency` and `--amplitude` mean: one value, or a range of them."""
+"""Parsing of `--frequency` and `--amplitude`: one value or a range."""
 
 import math
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ _EXAMPLES = {
         3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
     },
 }
-"""What may be given, by the number of its parts."""
+"""Allowed forms, by number of parts."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """One value, or two ends and perhaps a step between points."""
+    """One value, or two limits with an optional step."""
 
     start: float
     stop: float | None = None
@@ -32,11 +32,10 @@ class Range:
 
 
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
-    """Read ``260``, ``50:600`` or ``50:600:1``, whichever numbers of parts are allowed.
+    """Parse ``260``, ``50:600`` or ``50:600:1``; ``parts`` holds the allowed numbers of parts.
 
-    ``option`` names it where it is not called as its parameter.
-
-    Raises InvalidRequest when it is none of them.
+    ``option`` is the name of the option if it differs from the parameter's.
+    Raises InvalidRequest for other text.
     """
     try:
         return Range(*_rising(text, parts))
@@ -54,7 +53,7 @@ def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
     if min(numbers) <= 0.0:
         raise ValueError(f"{min(numbers):g} is not above 0")
     if len(numbers) > 1 and numbers[0] >= numbers[1]:
-        raise ValueError(f"{numbers[0]:g} does not lie below {numbers[1]:g}")
+        raise ValueError(f"{numbers[0]:g} is not below {numbers[1]:g}")
     return numbers
 
 
@@ -73,9 +72,9 @@ _ADVICE = "give one frequency above 0 Hz, or START:STOP:STEP [Hz] such as 10:600
 
 
 def frequencies(text: str) -> tuple[float, ...]:
-    """Read ``260`` or ``10:600:1``.
+    """Parse ``260`` or ``10:600:1``.
 
-    Raises InvalidRequest when it is neither, or lists nothing, or too much.
+    Raises InvalidRequest for other text, an empty list or too many values.
     """
     try:
         numbers = [_number(part) for part in text.split(":")]

@@ -1,4 +1,4 @@
-"""`vibench recover`: finish a recording that was cut off."""
+"""`vibench recover`: finish an interrupted recording."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,11 +12,11 @@ from .paths import AllowExternal, AsJson, external_data
 
 
 def recover_recording(
-    recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="What was left of it.")],
+    recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="Interrupted recording.")],
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Finish a recording that was cut off: all that was committed becomes NAME.h5."""
+    """Finish an interrupted recording: all committed samples become NAME.h5."""
     with external_data(allow_external):
         path = recover(recording)
     if as_json:

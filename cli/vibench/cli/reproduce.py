@@ -1,4 +1,4 @@
-"""`vibench reproduce`: every claim of the paper that can be measured, with a verdict."""
+"""`vibench reproduce`: test every measurable claim of the paper."""
 
 import os
 from pathlib import Path
@@ -27,18 +27,19 @@ IMAGES = "images"
 
 
 def reproduce(
-    out: Annotated[Path, option("Folder for the page and the studies it rests on.", "DIR")],
-    markdown: Annotated[Path | None, option("Write the page here; in DIR if absent.", "FILE.md")] = None,
+    out: Annotated[Path, option("Folder for the page and its studies.", "DIR")],
+    markdown: Annotated[Path | None, option("File of the page; by default in DIR.", "FILE.md")] = None,
     damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
-    accuracy: Annotated[Accuracy, option("Of every point.")] = Accuracy.QUICK,
+    accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = Accuracy.QUICK,
     grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
     said: Annotated[
-        list[str] | None, option(f"What else the paper leaves open: {_FORMS}.", "NAME=VALUE", name="--with")
+        list[str] | None,
+        option(f"Other open choices of the paper: {_FORMS}.", "NAME=VALUE", name="--with"),
     ] = None,
     workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
+    """Test the claims of the paper; studies are stored in DIR/studies, and interrupted ones are continued."""
     from vibench.analysis.report import write_page
 
     from .paper.claims import SECTIONS

@@ -1,4 +1,4 @@
-"""`vibench schema`: the JSON Schema of a kind of TOML file, for editors and other programs."""
+"""`vibench schema`: the JSON Schema of a TOML file, for editors and other programs."""
 
 from typing import Annotated
 
@@ -14,5 +14,5 @@ def schema(
         str, typer.Argument(metavar="KIND", help="campaign, rig, study, map, mapping or specimen.")
     ],
 ) -> None:
-    """Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types."""
+    """Print the JSON Schema (draft 4) of a kind of TOML file, for an editor with validation."""
     print_json(json_schema(kind))

@@ -1,4 +1,4 @@
-"""`vibench serve-rig`: the virtual instruments alone, for other programs."""
+"""`vibench serve-rig`: the virtual instruments for other programs."""
 
 import signal
 import threading
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
 
 
 class ServedPace(StrEnum):
-    """How fast a served rig's time passes."""
+    """Time base of a served rig."""
 
     WALL = "wall"
     FREE = "free"
 
 
 def serve_rig(
-    bench: Annotated[Path | None, option("A rig with a table 'virtual'.", "BENCH")] = None,
+    bench: Annotated[Path | None, option("Rig with a table 'virtual'.", "BENCH")] = None,
     address: Annotated[
-        str, option("Where to listen; beyond this computer, with a token.", "HOST:PORT")
+        str, option("Address to listen at; other computers need a token.", "HOST:PORT")
     ] = "127.0.0.1:31763",
-    scpi_port: Annotated[int, option("Of the generator as a socket; 0 takes a free one.", "N")] = 0,
+    scpi_port: Annotated[int, option("Socket port of the generator; 0 selects a free one.", "N")] = 0,
     pace: Annotated[
-        ServedPace, option("Rig time by the clock, or as fast as somebody samples.")
+        ServedPace, option("Rig time in real time, or as fast as a program samples.")
     ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:
@@ -62,7 +62,7 @@ def serve_rig(
 
 
 def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return how other programs reach it, in lines that work when they are pasted."""
+    """Return instructions for other programs, ready to paste."""
     opened = 'pyvisa.ResourceManager("@py").open_resource'
     usb = f"from vibench.virtual_rig import plug_in_remote; plug_in_remote({rig.daq_address!r})"
     ends = r'read_termination="\n", write_termination="\n"'

@@ -1,4 +1,4 @@
-"""`vibench specimen`: the specimens and contact laws that there are, or what one of them amounts to."""
+"""`vibench specimen`: list specimens and contact laws, or describe one specimen."""
 
 import math
 from dataclasses import asdict
@@ -21,18 +21,17 @@ def show_specimen(
     specimen: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME|FILE.toml", help="One that comes with vibench, or your own; all if absent."
+            metavar="NAME|FILE.toml", help="Shipped specimen or a file; by default all are listed."
         ),
     ] = None,
     forces: Annotated[
-        Path | None, option("Draw the force of its stops over p = y - z, or of every contact law.", "DIR")
+        Path | None,
+        option("Draw the stop force over p = y - z, of the specimen or of every contact law.", "DIR"),
     ] = None,
-    as_toml: Annotated[
-        bool, option("Print it whole, as a file of its own to start from.", name="--toml")
-    ] = False,
+    as_toml: Annotated[bool, option("Print its complete file, as a template.", name="--toml")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """List the specimens and contact laws that there are, or say what one specimen amounts to."""
+    """List the specimens and contact laws, or describe one specimen."""
     if forces is not None:
         _draw(specimen, forces)
         return
@@ -57,7 +56,7 @@ def show_specimen(
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
-    """Return what follows from a specimen's numbers: stiffnesses, resonances, damping ratios."""
+    """Return quantities derived from a specimen: stiffnesses, resonances, damping ratios."""
     return {
         "masses_kg": specimen.masses,
         "stiffnesses_n_per_m": specimen.stiffnesses,
@@ -96,7 +95,7 @@ _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m
 
 
 def _heading(name: str) -> str:
-    """Write a name that carries its unit as in code for people: ``"gaps [m]"``."""
+    """Return the heading of a quantity from its name in code: ``"gaps [m]"``."""
     ending = next((each for each in _UNITS if name.endswith(each)), "")
     words = name.removesuffix(ending).replace("_", " ")
     return f"{words} [{_UNITS[ending]}]" if ending else words

@@ -1,4 +1,4 @@
-"""Which specimen a command is about, and what of it is replaced: options that several commands share."""
+"""Shared options: the specimen and its replaced parameters."""
 
 from typing import Annotated, TypeVar
 
@@ -11,19 +11,19 @@ from .options import RequestOptions, option
 from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
-"""Fields of a request about a specimen that every command has as options."""
+"""Fields of every request about a specimen that become options."""
 AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Axes of one value that a study has in place of what replaces a part of the specimen."""
+"""Axes of a study with one value, by the field that they replace."""
 SpecimenOption = Annotated[
-    str | None, option("A specimen's file, or a name that `vibench specimen` lists.", "NAME|FILE.toml")
+    str | None, option("Specimen file, or a name listed by `vibench specimen`.", "NAME|FILE.toml")
 ]
 Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Read the specimen that an option names, the paper's where it names none.
+    """Return the specimen of an option, by default the paper's.
 
-    Raises InvalidRequest when there is none, or when the file does not describe one.
+    Raises InvalidRequest when it does not exist or the file does not describe one.
     """
     if specimen is None:
         return usual_specimen()
@@ -36,9 +36,9 @@ def read_specimen(specimen: str | None) -> SpecimenTable:
 def specimen_request(
     options: RequestOptions[Choice], specimen: str | None, amplitude: str | None, **others: object
 ) -> Choice:
-    """Make a request about a specimen; warn of amplitudes and gaps that look like a slip.
+    """Return a request about a specimen; warn of amplitudes and gaps that look like mistakes.
 
-    ``amplitude`` is what was typed, read before. Raises InvalidRequest with the option that is not allowed.
+    ``amplitude`` is the typed text, already parsed. Raises InvalidRequest with the invalid option.
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])

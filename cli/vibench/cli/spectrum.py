@@ -24,7 +24,7 @@ OPTIONS = (*SPECIMEN, "duration_s", "settle_s", "accuracy", "confidence")
 
 
 def spectrum(
-    amplitude: Annotated[str, option("Of the base displacement.", "M|START:STOP:STEP")],
+    amplitude: Annotated[str, option("Amplitude of the base displacement.", "M|START:STOP:STEP")],
     frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
     options: Annotated[RequestOptions[SpectrumRequest], Fields(OPTIONS)],
     out: Annotated[Path | None, option("Folder for spectrum.h5, figure and table.", "DIR")] = None,
@@ -54,7 +54,7 @@ def spectrum(
 
 
 def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
-    """Read along what the exponents are computed; one point lies along frequency."""
+    """Return the axis and the fixed value of the drive; a single point counts as a frequency axis."""
     if amplitude.stop is not None and frequency.stop is not None:
         raise InvalidRequest(
             "--amplitude and --frequency were both given as ranges; give one of them as one number"

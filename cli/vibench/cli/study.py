@@ -1,4 +1,4 @@
-"""`vibench study`: every combination of what a TOML file lists, predicted into one HDF5 file."""
+"""`vibench study`: predict every combination of the values in a TOML file, into one HDF5 file."""
 
 import hashlib
 from pathlib import Path
@@ -27,19 +27,19 @@ from .progress_bars import study_bar
 
 def study(
     plan: Annotated[
-        Path, typer.Argument(metavar="STUDY", help="TOML file of what to predict, or a shipped name: paper.")
+        Path, typer.Argument(metavar="STUDY", help="TOML file of the study, or a shipped name: paper.")
     ],
-    out: Annotated[Path, option("File for the answers.", "FILE.h5")],
-    resume: Annotated[bool, option("Go on with what FILE.h5 does not hold yet.")] = False,
+    out: Annotated[Path, option("File for the results.", "FILE.h5")],
+    resume: Annotated[bool, option("Compute the points missing in FILE.h5.")] = False,
     workers: Workers = None,
     cluster: Cluster = None,
     only_estimate: Annotated[
-        bool, option("Say how many points and how much work; compute nothing.", name="--estimate")
+        bool, option("Print number of points and estimated work without computing.", name="--estimate")
     ] = False,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Predict responses for every combination listed in a file, longest first."""
+    """Predict every combination of the values in a file, longest runs first."""
     asked = load_toml(named(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
@@ -62,7 +62,7 @@ def study(
 
 
 def tell_work(study: Study, as_json: bool) -> None:
-    """Say how many points a study has, and what all of them are planned to take."""
+    """Print the number of points and the estimated work."""
     points, work_s = study.grid.size, planned_work_s(study)
     if as_json:
         print_json({"points": points, "work_s": work_s})
@@ -71,7 +71,7 @@ def tell_work(study: Study, as_json: bool) -> None:
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
-    """Return what a file holds, for other programs; the numbers themselves are in it."""
+    """Return the summary of a file as JSON; the values are in the file."""
     return {
         "file": str(out),
         "points": results.study.grid.size,
@@ -84,9 +84,9 @@ def document(results: StudyResults, out: Path) -> dict[str, object]:
 
 
 def tell(results: StudyResults, out: Path) -> None:
-    """Say how far a study is."""
+    """Print the progress of a study."""
     failed = sum(1 for _ in results.failures())
-    state = "complete" if results.is_complete else "stopped: go on with --resume"
+    state = "complete" if results.is_complete else "stopped: continue with --resume"
     console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
 
 
@@ -94,7 +94,7 @@ _DIGEST = 16
 
 
 class KeptStudies:
-    """The studies that a command rests on, in a folder: each file is named by all that it asks."""
+    """Studies stored in a folder; the file name contains a hash of the request."""
 
     def __init__(self, folder: Path, workers: int | None) -> None:
         self._folder = folder
@@ -102,7 +102,7 @@ class KeptStudies:
         self._failed = 0
 
     def __call__(self, study: Study) -> StudyResults:
-        """Solve a study, or what is missing of it."""
+        """Solve the missing points of a study and return its results."""
         self._folder.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
         with watch_interrupt() as is_stopped, study_bar(study.grid.size) as observer:
@@ -123,6 +123,6 @@ class KeptStudies:
         return results
 
     def complain(self) -> None:
-        """End a command whose studies lack an answer; what it made of the others is there."""
+        """Raise an error if any study has failed points; results of the others are kept."""
         if self._failed > 0:
             raise typer.Exit(ExitCode.FAILED)

@@ -35,17 +35,17 @@ _STEPS = len(MOTIONS) + len(LOTTERIES) + len(TRANSIENTS)
 
 
 def tradeoff(
-    amplitude: Annotated[float | None, option("Of the base displacement of your scene.", "M")] = None,
+    amplitude: Annotated[float | None, option("Amplitude of your scene's base displacement.", "M")] = None,
     frequency: Annotated[float | None, option("Drive frequency of your scene [Hz].", "F")] = None,
-    error: Annotated[str | None, option("Error requested for it; 1% if neither is given.", "E")] = None,
-    time_limit: Annotated[str | None, option("Time requested for it, as 2s.", "T", name="--time")] = None,
+    error: Annotated[str | None, option("Requested error; 1% if neither is given.", "E")] = None,
+    time_limit: Annotated[str | None, option("Requested time, such as 2s.", "T", name="--time")] = None,
     out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
     span: Annotated[float, option("Length of the motion compared; the paper's test is 2.", "S")] = 2.0,
     as_json: AsJson = False,
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
 ) -> None:
-    """Measure error over time: of every method for your scene, or of each accuracy in known motions."""
+    """Measure error over time: of every method for your scene, or of each accuracy for known motions."""
     said = {"amplitude": amplitude, "frequency": frequency, "error": error, "time": time_limit}
     said = {name: value for name, value in said.items() if value is not None} | dict(choice.typed)
     if said:
@@ -55,9 +55,9 @@ def tradeoff(
 
 
 def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
-    """Measure every level in motions that are known."""
+    """Measure every accuracy level with motions whose exact solution is known."""
     if not _SHORTEST_S <= span <= _LONGEST_S:
-        raise InvalidRequest(f"a span of {span} s was asked for; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
+        raise InvalidRequest(f"a span of {span} s was given; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
     if out is not None:
         room_for_folder(out)
     columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
@@ -82,7 +82,7 @@ def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
 
 
 def _study(said: Mapping[str, Any]) -> Study:
-    """Read the scene that was asked about, with its target."""
+    """Return the requested scene with its target."""
     if not {"amplitude", "frequency"} <= said.keys():
         raise InvalidRequest("a scene needs both --amplitude and --frequency; one or both are missing")
     target = {field: said[name] for name, field in (("error", "error"), ("time", "time_s")) if name in said}
@@ -99,7 +99,7 @@ def _study(said: Mapping[str, Any]) -> Study:
 
 
 def _tell_scene(study: Study, out: Path | None, as_json: bool) -> None:
-    """Measure and show the curve of one scene."""
+    """Measure and print the curve of one scene."""
     from vibench.analysis.report import curve_figure
 
     if out is not None:
@@ -147,7 +147,7 @@ def _tell(found: MotionBenchmark) -> None:
 
 
 def _tell_lotteries(lotteries: tuple[LotteryFigures, ...]) -> None:
-    rows = Table(title="start forgotten: shares of motions", title_justify="left")
+    rows = Table(title="sensitive to the start: shares of motions", title_justify="left")
     for heading in ("", "Response I", "share stated", "of many starts", "cost over one run"):
         rows.add_column(heading)
     for each in lotteries:

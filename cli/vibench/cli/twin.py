@@ -1,4 +1,4 @@
-"""`vibench twin`: the live twin of a running measurement, a viewer that follows the hidden motion."""
+"""`vibench twin`: the live twin, which estimates the hidden motion of a running measurement."""
 
 import os
 import time
@@ -40,22 +40,22 @@ from .watch import Pid
 
 NICE = 5
 POLL_S = 0.01
-"""Between two looks while nothing new has come [s]."""
+"""Interval between polls during a run [s]."""
 IDLE_S = 0.2
-"""Between two looks while nothing runs [s]."""
+"""Interval between polls without a run [s]."""
 PIECE_S = 0.1
-"""Length of motion that is worked on at once, and told [s]."""
+"""Duration of samples processed and reported at once [s]."""
 LATEST_S = 3.0
-"""Behind the newest sample by more than this, the twin leaves out what it was too slow for [s]."""
+"""With a larger delay than this, the twin skips samples [s]."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
-"""A forecast is shown while its usual error is below this part of the smaller gap."""
+"""Largest displayed error of a forecast, as a share of the smaller gap."""
 
 
 @dataclass
 class _Following:
-    """A twin, and what it has seen of one run."""
+    """A twin and its progress in a run."""
 
     client: EngineClient
     rig: Rig
@@ -71,7 +71,7 @@ class _Following:
     is_kept: bool = False
 
     def look(self) -> float:
-        """Work on what is new and tell it; gives how long to wait before the next look [s]."""
+        """Process and report new samples; return the waiting time before the next call [s]."""
         status = self.client.status()
         if status.state not in DRIVING or status.run is None:
             return IDLE_S
@@ -82,7 +82,7 @@ class _Following:
         if waiting <= 0:
             return POLL_S
         is_late = waiting > LATEST_S * rate_hz
-        # More may have come since the status: what is asked for last is cut off at its beginning.
+        # Samples may arrive after the status; the request drops the oldest if there are too many.
         most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
         piece = self.client.look(self.live.next_sample, most=most)
         if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
@@ -115,7 +115,7 @@ class _Following:
         self.client.tell_twin(self._told(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Keep numbers and usual level when both are known: what comes after is checked against them."""
+        """Store parameters and usual level once known; later values are checked against them."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return
@@ -154,7 +154,7 @@ class _Following:
 
 
 def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return a forecast and its errors as far as it is worth anything, nothing where none was tried yet."""
+    """Return the useful part of a forecast and its errors; empty before the first one was checked."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error
@@ -166,10 +166,10 @@ def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[floa
 def twin(
     pid: Pid = None,
     specimen: SpecimenOption = None,
-    new_baseline: Annotated[bool, option("Forget what the specimen was: it was changed on purpose.")] = False,
+    new_baseline: Annotated[bool, option("New baseline: the specimen was changed on purpose.")] = False,
 ) -> None:
-    """Follow the hidden motion of what an engine measures, and note when the specimen changes."""
-    lower_priority(NICE)  # a window, and the measurement, come first
+    """Estimate the hidden motion of an engine's measurement, and report changes of the specimen."""
+    lower_priority(NICE)  # the window and the measurement have priority
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client, ThreadPoolExecutor(1) as executor:
         try:
@@ -185,7 +185,7 @@ def twin(
             require_ended(engine)
             console.print("The engine has ended.")
         except KeyboardInterrupt:
-            console.print("The engine goes on.")
+            console.print("The engine continues.")
 
 
 def _rig_of(client: EngineClient) -> Rig:
@@ -194,7 +194,7 @@ def _rig_of(client: EngineClient) -> Rig:
             return client.open_rig()
         except EngineGone:
             raise
-        except AcquisitionError:  # the bench is being opened
+        except AcquisitionError:  # the bench is still opening
             time.sleep(IDLE_S)
 
 
@@ -203,7 +203,7 @@ def _following(
 ) -> _Following:
     status = client.status()
     if status.bench is None:
-        raise EngineError("the bench was closed before the twin could look at it; start the twin again")
+        raise EngineError("the bench was closed before the twin could read it; start the twin again")
     known_as = specimen_of(rig) if specimen is None else read_specimen(specimen).specimen()
     baseline = kept_baseline(baseline_path(rig, known_as))
     live = LiveTwin(

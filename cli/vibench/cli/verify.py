@@ -1,4 +1,4 @@
-"""`vibench verify`: whether recordings are what they were when they were sealed."""
+"""`vibench verify`: check recordings against their seals."""
 
 from collections import Counter
 from dataclasses import asdict
@@ -16,22 +16,22 @@ from .output import console, errors, print_json
 from .paths import AllowExternal, AsJson, external_data
 
 MOST_NAMED = 10
-"""Recordings that the sentence at the end names."""
+"""Most recordings named in the final sentence."""
 
 
 def verify(
     place: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder of recordings, or one recording, NAME.h5.")
     ],
-    quick: Annotated[bool, option("Attributes, texts and tables only, not every sample.")] = False,
+    quick: Annotated[bool, option("Check attributes, texts and tables only, not every sample.")] = False,
     key: Annotated[
         Path | None,
-        option("What they should be signed with; if absent, what VIBENCH_SEAL_KEY names.", "FILE"),
+        option("Key file of the signatures; by default the file named by VIBENCH_SEAL_KEY.", "FILE"),
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Hold every recording of a folder against its seal, samples and all, and against journals."""
+    """Check every recording of a folder against its seal, including samples, and against journals."""
     with external_data(allow_external):
         found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
     counts = Counter(each.verdict for each in found)

@@ -1,8 +1,8 @@
-"""`vibench warm`: once compiled the simulation before its first use; scripts may still call it."""
+"""`vibench warm`: obsolete, kept because scripts may call it."""
 
 from .output import console
 
 
 def warm() -> None:
-    """Say that nothing needs compiling: the simulation was compiled when vibench was built."""
+    """Print that nothing needs compiling, because the simulation was compiled with vibench."""
     console.print("Nothing needs compiling: the simulation was compiled when vibench was built.")

@@ -1,4 +1,4 @@
-"""`vibench watch`, `stop` and `release`: look at an engine on this computer, end its run, or let it go on."""
+"""`vibench watch`, `stop` and `release`: watch, stop or resume an engine on this computer."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -28,11 +28,11 @@ from .output import console, print_json
 from .paths import AsJson
 
 NAME = {"pid", "what", "started_utc"}
-Pid = Annotated[int | None, option("Process that is meant; the only one if absent.", "N", name="--pid")]
+Pid = Annotated[int | None, option("Process id; by default the only engine.", "N", name="--pid")]
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
-    """Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be."""
+    """Watch an engine from any terminal of the same user; Ctrl-C does not affect the engine."""
     if as_json:
         engines = [each for each in announced_engines() if pid in (None, each.pid)]
         others = [each for each in programs_without_engine() if pid in (None, each.pid)]
@@ -44,9 +44,7 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
         )
         return
     engine = the_engine(pid)
-    console.print(
-        f"{engine.what}, process {engine.pid}, since {engine.started_utc}; Ctrl-C ends the watching."
-    )
+    console.print(f"{engine.what}, process {engine.pid}, since {engine.started_utc}; Ctrl-C stops watching.")
     try:
         with EngineClient.attach(engine.address) as client, EngineBars() as bars:
             while (status := client.status()).state in DRIVING:
@@ -57,25 +55,26 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
         require_ended(engine)
         console.print("The engine has ended.")
     except KeyboardInterrupt:
-        console.print("The engine goes on.")
+        console.print("The engine continues.")
 
 
 def stop(
-    pid: Annotated[
-        int | None, option("Process that is meant; all if absent, and held: the only one.", "N")
-    ] = None,
+    pid: Annotated[int | None, option("Process id; by default all, with hold the only one.", "N")] = None,
     level: Annotated[
         StopLevel,
-        option("How hard: held until vibench release, the plan's ramp, the shortest ramp, or off at once."),
+        option("Hold until vibench release, the plan's ramp, the shortest ramp, or off at once."),
     ] = StopLevel.RAMP,
-    reason: Annotated[str, option("Stands in the recording.")] = "vibench stop",
+    reason: Annotated[str, option("Reason, stored in the recording.")] = "vibench stop",
 ) -> None:
-    """Stop all that engines, scripts and checks drive on this computer, campaigns and all."""
+    """Stop everything that engines, scripts and checks drive on this computer, including campaigns."""
     programs = programs_to_stop(pid)
     if level is StopLevel.HOLD and len(programs) > 1:
         programs = (the_engine(pid),)
     failures = []
-    with ThreadPoolExecutor(len(programs)) as pool:  # one that hangs must not keep a stop from the others
+    with ThreadPoolExecutor(
+        len(programs)
+        # In parallel, so that a program that hangs does not delay the other stops.
+    ) as pool:
         deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
         for program, delivery in zip(programs, deliveries, strict=True):
             try:
@@ -94,9 +93,9 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
     match delivery:
         case StopDelivery.KEPT:
             raise EngineSilent(
-                f"{name} lives and does not answer: it hangs, or was stopped. The stop ({level.value}) is "
-                "kept, and obeyed when it comes back; what it drives goes on until then: in an emergency "
-                "switch the amplifier off by hand"
+                f"{name} runs but does not answer: it hangs, or was suspended. The stop ({level.value}) is "
+                "stored, and obeyed when it answers again. Its drive continues until then: in an "
+                "emergency switch the amplifier off by hand"
             )
         case StopDelivery.UNHEEDED:
             raise EngineSilent(
@@ -104,7 +103,7 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
                 f"instrument hangs, or the computer does. {SWITCH_OFF}"
             )
         case StopDelivery.TOLD if level is StopLevel.HOLD:
-            return f"{name}: told to hold; 'vibench release' lets it go on."
+            return f"{name}: holds; 'vibench release' resumes it."
         case StopDelivery.TOLD | StopDelivery.TAKEN:
             return f"{name}: has taken the stop ({level.value}); its output is off."
 
@@ -113,9 +112,9 @@ def release(pid: Pid = None) -> None:
     """Continue a run that was held with vibench stop --level hold, or in the window."""
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
-        # A hold may be asked for before there is anything to hold, as in a rest: it is taken back as well.
+        # A hold may be requested before anything can be held, such as during a rest; release it as well.
         client.resume()
-    console.print(f"{engine.what}, process {engine.pid}: told to go on.")
+    console.print(f"{engine.what}, process {engine.pid}: resumes.")
 
 
 def _facts(engine: Announcement) -> dict[str, object]:

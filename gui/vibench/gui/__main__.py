@@ -71,7 +71,7 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
         "--settings", type=Path, metavar="FILE.ini", help="settings file; the user's if absent"
     )
     parser.add_argument(
-        "--screenshots", type=Path, metavar="DIR", help="make a picture of every page there, and end"
+        "--screenshots", type=Path, metavar="DIR", help="save a picture of every page there, and exit"
     )
     return parser.parse_args(arguments)
 

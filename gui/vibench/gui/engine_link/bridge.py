@@ -195,8 +195,7 @@ class Bridge(QObject):
     """The only connection between the window and the engine.
 
     All stored values are what the engine reported last. The window's timer calls `tick`, which fetches
-    answers and
-    sends new requests. The engine takes these requests as the sign that the window is alive.
+    answers and sends new requests. The engine takes these requests as the sign that the window is alive.
     """
 
     noticed = Signal(object)

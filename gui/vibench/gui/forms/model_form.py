@@ -111,7 +111,7 @@ class ModelForm(QWidget):
                 said += row.editor.complain(inner)
                 continue
             text = row.editor.complaint or "; ".join(inner.values())
-            text = f"{row.facts.named}: {_sentence(text, row.facts)}" if text else ""
+            text = f"{row.facts.label_with_unit}: {_sentence(text, row.facts)}" if text else ""
             row.complaint.setText(text)
             row.complaint.setVisible(bool(text))
             said += [text] if text else []

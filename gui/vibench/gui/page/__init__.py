@@ -1,7 +1,6 @@
 """What the pages of the window share.
 
 `Page` is their base class; `AppContext` gives each page the bridge, settings, background work and signals to
-the
-window. `Selection` holds rig, test and campaign while they are edited. `UserActions` carries out commands of
-keys, menus and buttons. Pages know each other by name only.
+the window. `Selection` holds rig, test and campaign while they are edited. `UserActions` carries out commands
+of keys, menus and buttons. Pages know each other by name only.
 """

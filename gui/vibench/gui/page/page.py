@@ -73,8 +73,7 @@ class DisplayedResult:
     """A displayed result, and the inputs from which it was computed.
 
     ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled, so
-    that
-    an outdated result is recognised.
+    that an outdated result is recognised.
     """
 
     widget: QWidget

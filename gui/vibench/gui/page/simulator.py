@@ -5,7 +5,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject
 
 from vibench.analysis.prediction.progress import PartialResult
-from vibench.analysis.prediction.worker import Request, answer
+from vibench.analysis.prediction.worker import Asked, answer
 from vibench.sim.background import Job
 
 from ..background.background import Background
@@ -35,7 +35,7 @@ class Simulator(QObject):
         """Whether an answer is incomplete."""
         return self._job is not None and not self._job.is_over
 
-    def begin(self, request: Request) -> None:
+    def begin(self, request: Asked) -> None:
         """Start a request; the answer to an earlier one is dropped."""
         self.cancel()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)

@@ -1,8 +1,7 @@
 """Displayed units: one choice per quantity for axes, fields, tables and sentences.
 
 Values are SI, and sentences of other packages use the paper's units (µm, m/s²). Only this module converts to
-the
-chosen units; files and reports are not affected.
+the chosen units; files and reports are not affected.
 """
 
 import re

@@ -288,8 +288,7 @@ class MessageStrip(QFrame):
     """The newest message: what happened, what was done, what to do; Details lists the earlier ones.
 
     Its height is constant, so that nothing below moves. Without a message it shows the next step. Details
-    overlap
-    the page.
+    overlap the page.
     """
 
     def __init__(self) -> None:

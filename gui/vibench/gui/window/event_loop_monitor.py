@@ -38,8 +38,7 @@ class EventLoopMonitor(QObject):
     """A timer that measures its own delays.
 
     Work, file access, locks and other Python threads delay the timer. Waiting for a processor is subtracted,
-    so that
-    load by other programs does not count.
+    so that load by other programs does not count.
     """
 
     def __init__(self, about: Callable[[], str], parent: QObject | None = None) -> None:

@@ -198,8 +198,7 @@ class AbortKey(QObject):
     """Receives every key press of the application before any widget.
 
     A shortcut does not act while a modal dialog is open; an event filter of the application does. The key is
-    passed
-    on to the focused widget, so that Esc still closes a dialog.
+    passed on to the focused widget, so that Esc still closes a dialog.
     """
 
     pressed = Signal()

@@ -40,8 +40,7 @@ def with_sweep(
     """Add a sweep of a test along an axis.
 
     Raises ConfigurationError when a point of it is not allowed. Limits that need a simulation (loads of
-    shaker and
-    specimen) are checked when the campaign is armed.
+    shaker and specimen) are checked when the campaign is armed.
     """
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)
