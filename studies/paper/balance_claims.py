@@ -12,10 +12,10 @@ from .reading import CONTINUOUS, STRONG_M, WEAK_M, Reading, Values
 from .responses import Reals
 
 _AGREES = 0.1
-"""Relative: the paper's own measure of similar (its eq. 6) is looser."""
+"""Relative difference that counts as agreement; the paper's criterion of similarity (its eq. 6) is looser."""
 _MOST, _MAJORITY = 0.8, 0.5
 _SMOOTH_PROMINENCE = 1.1
-"""Prominence of a peak of a curve without chaos."""
+"""Smallest prominence of a peak of a curve without chaos."""
 _GRID_HZ, _ROUGH_HZ = 5.0, 10.0
 _BENT = "The force of n = 5 acts at every p, so that a resonance at which p nears the gap is bent upwards."
 
@@ -42,7 +42,7 @@ def continuous_weak_three(r: Reading) -> Values:
     remark=_BENT,
 )
 def continuous_weak_balance(r: Reading) -> Values:
-    """Read strictly: the analytical ones are those of the piece-wise model, 95, 266 and 500 Hz."""
+    """Strictly: the analytical resonances are those of the piece-wise model, 95, 266 and 500 Hz."""
     found = response_peaks(np.asarray(r.case.frequencies_hz), _lowest(r, WEAK_M), _SMOOTH_PROMINENCE)
     return nearest(found, PAPER_RESONANCES_HZ)
 
@@ -55,7 +55,7 @@ def continuous_weak_balance(r: Reading) -> Values:
     remark=_BENT,
 )
 def continuous_weak_i(r: Reading) -> Values:
-    """Read strictly: so are those of Response I."""
+    """Strictly: the resonances of Response I are at 95, 266 and 500 Hz too."""
     curve = r.level(WEAK_M, CONTINUOUS)
     found = response_peaks(curve.frequency_hz, curve.response_i, _SMOOTH_PROMINENCE)
     return nearest(found, PAPER_RESONANCES_HZ)
@@ -73,7 +73,7 @@ def _two_of(what: str) -> tuple[Expectation, ...]:
     *_two_of("Response I"),
 )
 def continuous_strong(r: Reading) -> Values:
-    """At 50 µm both have two resonances, as the piece-wise model has."""
+    """At 50 µm both have two resonances, like the piece-wise model."""
     curve = r.level(STRONG_M, CONTINUOUS)
     return (
         *two_highest(curve.frequency_hz, _lowest(r, STRONG_M)),
@@ -124,7 +124,7 @@ def _lowest(r: Reading, amplitude_m: float) -> Reals:
 
 
 def _agreeing(r: Reading, amplitude_m: float) -> Values:
-    """Share of the frequencies at which a solution of the balance lies within 10 % of each response."""
+    """Return the share of frequencies at which a balance solution is within 10 % of each response."""
     curve, solutions = r.level(amplitude_m, CONTINUOUS), _solutions(r, amplitude_m)
     return tuple(
         np.mean(

@@ -1,4 +1,4 @@
-"""A case: one reading of everything that the paper leaves open, and the alternatives that are tried."""
+"""A case: one choice for everything that the paper leaves open, and the alternatives to test."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -17,14 +17,14 @@ from .options import LOWEST_HZ, FigureOptions
 
 AS_CHOSEN = "the defaults"
 FIT_M = 1e-6
-"""Where continuous models have the stops' force: p = 46 um (section 2)."""
+"""Indentation at which continuous models have the force of the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Of other starts: displacements over the gap, and velocities over those at this frequency."""
+"""Size of other starts: displacements over the gap; velocities over those at this frequency [Hz]."""
 
 
 class ExponentsBy(StrEnum):
-    """How exponents are computed; responses are those of the exact motion."""
+    """Method for exponents; responses always use the exact motion."""
 
     EXACT = "exact"
     ODE45 = "ode45"
@@ -32,7 +32,7 @@ class ExponentsBy(StrEnum):
 
 
 class Direction(StrEnum):
-    """Of the sweep of Fig. 13(d)."""
+    """Direction of the sweep of Fig. 13(d)."""
 
     UP = "up"
     DOWN = "down"
@@ -40,23 +40,23 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True)
 class Case(FigureOptions):
-    """Options under which claims are measured."""
+    """Options for the measurement of claims."""
 
     name: str = AS_CHOSEN
     sweep_amplitude_m: float = 5e-6
-    """At 266 Hz: the amplitude that the paper sets beside 1.5 V."""
+    """Base amplitude at 266 Hz: the value that the paper gives for 1.5 V."""
     sweep_falls: float = 0.0
-    """k of a base amplitude that goes with f^-k: 0 constant displacement, 1 velocity, 2 acceleration."""
+    """k of a base amplitude proportional to f^-k: 0 constant displacement, 1 velocity, 2 acceleration."""
     sweep_goes: Direction = Direction.UP
     fit_m: float = FIT_M
     """Indentation at which continuous models are fitted."""
     sum_model: str = "power:3+5+7"
-    """The model n = 3+5+7, and how its terms share the force, which the paper does not say."""
+    """The model n = 3+5+7 with the shares of its terms, which the paper does not give."""
     exponents_by: ExponentsBy = ExponentsBy.EXACT
     changed: tuple[str, ...] = ()
-    """Options that the defaults of a page differ in from those of the program."""
+    """Options that differ from the program's defaults."""
     draw: int = 0
-    """Start: 0 is rest; every other number is another start, a millionth of the gap away from it."""
+    """Number of the start: 0 is rest; others start a millionth of the gap away."""
 
     def __post_init__(self) -> None:
         for what, value in (("a base amplitude", self.sweep_amplitude_m), ("an indentation", self.fit_m)):
@@ -80,22 +80,22 @@ class Case(FigureOptions):
             raise InvalidRequest(f"the sum cannot be {self.sum_model}: {error}") from error
 
     def fitted(self, model: str) -> str:
-        """Return a model as it is fitted here."""
+        """Return a model with the fit of this case."""
         return model if self.fit_m == FIT_M or not model.startswith("power:") else f"{model}:{self.fit_m:g}"
 
     def specimen(self, contact: str = "hertz") -> Specimen:
-        """Build the paper's specimen as this case has it."""
+        """Return the paper's specimen with the options of this case."""
         return super().specimen(self.fitted(contact))
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
-        """Return a study from the start of this case."""
+        """Return a study with the start of this case."""
         if self.draw:
             replaced["starts"] = (GivenStart(label=f"draw {self.draw}", state=self.start),)
         return super().study(tuple(map(self.fitted, models)), amplitudes_m, **replaced)
 
     @property
     def start(self) -> tuple[float, float, float, float, float, float]:
-        """X, y, z, vx, vy, vz [m, m/s] at the beginning."""
+        """Initial x, y, z, vx, vy, vz [m, m/s]."""
         if self.draw == 0:
             return (0.0,) * 6
         speed = 2.0 * math.pi * PUSHED_HZ
@@ -104,20 +104,20 @@ class Case(FigureOptions):
 
     @property
     def choices(self) -> str:
-        """The defaults of a page as a sentence, and what was changed in them."""
+        """The defaults of a page in words, with changed options."""
         chosen = self.sentence.replace("Options:", "Defaults:")
         return f"{chosen} Changed: {'; '.join(self.changed)}." if self.changed else chosen
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """Options changed, under a name."""
+    """A named change of options."""
 
     name: str
     changes: Mapping[str, Any]
 
     def of(self, case: Case) -> Case:
-        """Return the case with these changes, under this name.
+        """Return the case with these changes and this name.
 
         Raises InvalidRequest for a value that is not allowed.
         """
@@ -125,25 +125,25 @@ class Alternative:
 
 
 def together(*alternatives: Alternative) -> Alternative:
-    """Change several options at once."""
+    """Return an alternative that combines several."""
     changes = {key: value for each in alternatives for key, value in each.changes.items()}
     return Alternative(", ".join(each.name for each in alternatives), changes)
 
 
 def damping(damping_time_s: float) -> Alternative:
-    """Change c_i / k_i."""
+    """Return an alternative with another c_i / k_i."""
     changes = {"damping_time_s": damping_time_s, "damping_ratio": None}
     return Alternative(f"c = {damping_time_s:.3g} s · k", changes)
 
 
 @dataclass(frozen=True)
 class Option:
-    """A setting that the paper leaves open, as it is written: NAME=VALUE."""
+    """A setting that the paper leaves open, in the form NAME=VALUE."""
 
     about: str
     example: str
     field: str
-    """Field of a case."""
+    """Field of the case."""
     read: Callable[[str], Any]
     label: Callable[[Any], str]
 
@@ -198,17 +198,17 @@ OPTIONS: Mapping[str, Option] = MappingProxyType(
         "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "swept {}".format),
     }
 )
-"""What `vibench reproduce --with` takes."""
+"""Settings for `vibench reproduce --with`."""
 
 
 def change(name: str, value: Any) -> Alternative:
-    """Change the option of a name."""
+    """Return the alternative that changes a setting."""
     option = OPTIONS[name]
     return Alternative(option.label(value), {option.field: value})
 
 
 def case_with(options: FigureOptions, given: Sequence[str]) -> Case:
-    """Return the defaults of a page: options, and changes given as NAME=VALUE.
+    """Return the case with these options and the settings NAME=VALUE.
 
     Raises InvalidRequest as `parse_option` does.
     """
@@ -218,9 +218,9 @@ def case_with(options: FigureOptions, given: Sequence[str]) -> Case:
 
 
 def parse_option(text: str) -> Alternative:
-    """Read NAME=VALUE.
+    """Parse NAME=VALUE.
 
-    Raises InvalidRequest for a name that is not in `OPTIONS`, or a value that it does not take.
+    Raises InvalidRequest for an unknown name or a value that is not allowed.
     """
     name, _, value = (part.strip() for part in text.partition("="))
     if name not in OPTIONS:
@@ -240,13 +240,13 @@ def parse_option(text: str) -> Alternative:
 
 
 SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
-"""c_i / k_i: 1e-5 s is the literal reading in mm, g and ms; the chaos that the paper shows ends above."""
+"""c_i / k_i: 1e-5 s is the literal reading in mm, g and ms; the paper's chaos ends at larger values."""
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)
-"""Tried, in this order, where a claim turns on the damping."""
+"""Dampings to test, in this order, for a claim that depends on the damping."""
 NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)
 CLOSEST = together(NARROWER_FIT, SEVENTH_COUNTS, COMPARED_LOWER)
-"""The reading of the continuous models under which most claims hold."""
+"""The options for continuous models with which most claims hold."""

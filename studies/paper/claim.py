@@ -1,4 +1,4 @@
-"""A claim of the paper: a function that measures it, with the bounds of what it wants; and verdicts."""
+"""A claim of the paper: a function that measures it, the required bounds, and verdicts."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from .reading import Evidence, Reading, Values
 
 @dataclass(frozen=True)
 class Expectation:
-    """Bounds, both included, within which one measured number upholds a claim."""
+    """Inclusive bounds of a measured number for which a claim holds."""
 
     name: str
     unit: str
@@ -40,7 +40,7 @@ class Expectation:
         return f"{self.shown(self.low, '')} to {self.shown(self.high)}"
 
     def shown(self, value: float, unit: str | None = None) -> str:
-        """Write a number with its unit."""
+        """Return a number with its unit."""
         if not np.isfinite(value):
             return "none"
         text = f"{100 * value:.0f}" if self.unit == "%" else f"{value:.4g}"
@@ -48,22 +48,22 @@ class Expectation:
 
 
 def about(name: str, unit: str, value: float, within: float) -> Expectation:
-    """Want a number, give or take a tolerance in its unit."""
+    """Require a number within a tolerance in its unit."""
     return Expectation(name, unit, value - within, value + within)
 
 
 def at_least(name: str, unit: str, low: float) -> Expectation:
-    """Want a number no smaller."""
+    """Require a lower bound."""
     return Expectation(name, unit, low, math.inf)
 
 
 def at_most(name: str, unit: str, high: float) -> Expectation:
-    """Want a number no larger."""
+    """Require an upper bound."""
     return Expectation(name, unit, -math.inf, high)
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Want a peak near each frequency."""
+    """Require a peak near each frequency."""
     return tuple(about(f"peak at {each:g} Hz", "Hz", each, within_hz) for each in wanted_hz)
 
 
@@ -72,28 +72,28 @@ NO_THIRD = at_most("next peak over the second", "", 0.5)
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the paper says and that can be measured."""
+    """A measurable claim of the paper."""
 
     key: str
     place: str
-    """Where the paper says it."""
+    """Section or figure of the paper."""
     says: str
     measured_by: str
-    """How we measure it, in one sentence."""
+    """Method of measurement, in one sentence."""
     wanted: tuple[Expectation, ...]
-    """All of them must be met."""
+    """Requirements, all of which must be met."""
     measure: Callable[[Reading], Values]
     tried: tuple[Alternative, ...]
-    """Alternatives where the defaults do not uphold it, in this order."""
+    """Alternatives to test in this order if the claim fails under the defaults."""
     remark: str
-    """What a reader should know where it does not hold; without numbers, which the page measures."""
+    """Comment for a failed claim; without numbers, which the page measures."""
     draws: int
-    """Starts that it is measured from: more where its numbers depend on the motion that chaos ends in."""
+    """Number of starts: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool
     """Whether it is measured again at every damping of the score."""
 
     def is_met_by(self, values: Values) -> bool:
-        """Return whether every number lies within its bounds; nothing (NaN) meets nothing."""
+        """Return whether every number lies within its bounds; NaN does not."""
         return all(each.low <= value <= each.high for each, value in zip(self.wanted, values, strict=True))
 
 
@@ -109,7 +109,7 @@ def claim(
     remark: str = "",
     is_scored: bool = True,
 ) -> Callable[[Measure], Claim]:
-    """Make a claim of the function that measures it; its docstring is what the paper says."""
+    """Return a decorator for a measuring function; its docstring is the paper's statement."""
 
     def made(measure: Measure) -> Claim:
         key, says = measure.__name__.replace("_", "-"), " ".join((measure.__doc__ or "").split())
@@ -119,30 +119,30 @@ def claim(
 
 
 costly_claim = partial(claim, tried=(), is_scored=False)
-"""A claim that would take too long to measure at every damping."""
+"""A claim that takes too long to be measured at every damping."""
 
 
 class Verdict(StrEnum):
-    """What is found of a claim."""
+    """Verdict on a claim."""
 
     HOLDS = "holds"
-    """Under the defaults."""
+    """Holds under the defaults."""
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """Under the defaults, from some of the starts that were tried: which, is chance."""
+    """Holds under the defaults for some of the starts, which is a matter of chance."""
     HOLDS_UNDER = "holds under"
-    """Not under the defaults, but under a named option."""
+    """Holds only under a named option."""
     FAILS = "does not hold"
-    """Under none of the options that were tried."""
+    """Holds under none of the options tested."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The numbers of a claim under one case, from every start, rest first."""
+    """The numbers of a claim under one case, from every start; rest comes first."""
 
     case: Case
     draws: tuple[tuple[float, ...], ...]
     met: int
-    """Starts that uphold the claim."""
+    """Number of starts for which the claim holds."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -156,18 +156,18 @@ class Finding:
 
     @property
     def is_met_in_part(self) -> bool:
-        """By some starts, and not by all."""
+        """Whether the claim holds for some starts, but not for all."""
         return 0 < self.met < len(self.draws)
 
     def spread(self, number: int) -> tuple[float, float]:
-        """Return the smallest and the largest of one number over all starts; NaN where one has none."""
+        """Return smallest and largest value of one number over all starts; NaN if one is missing."""
         values = [draw[number] for draw in self.draws]
         return float(np.min(values)), float(np.max(values))
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim with all that was found of it: the defaults first, then the alternatives tried."""
+    """All findings on a claim: under the defaults, then under the alternatives tested."""
 
     claim: Claim
     findings: tuple[Finding, ...]
@@ -183,15 +183,15 @@ class Judgement:
 
     @property
     def met_under(self) -> Finding | None:
-        """The first finding that upholds the claim."""
+        """The first finding for which the claim holds."""
         return next((each for each in self.findings if each.is_met), None)
 
 
 def finding(asked: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim under one case, from every start.
 
-    From rest alone under an alternative that does not uphold it there: then not every start upholds it.
-    Raises InvalidRequest when the measure returns another count of numbers than the claim wants.
+    An alternative that fails from rest is measured from rest only.
+    Raises InvalidRequest when the number of measured values differs from the number of requirements.
     """
     draws = [_measure(asked, evidence, case)]
     if asked.is_met_by(draws[0]) or case.name == AS_CHOSEN:
@@ -210,7 +210,7 @@ def _measure(asked: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(asked: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim under a case; where it is not upheld, under each of its alternatives until one does."""
+    """Measure a claim under a case; if it fails, under its alternatives until it holds for one."""
     findings = [finding(asked, evidence, case)]
     for alternative in asked.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

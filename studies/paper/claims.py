@@ -21,5 +21,5 @@ SECTIONS: dict[str, tuple[Claim, ...]] = {
         "Similarity of the models": similarity_claims,
     }.items()
 }
-"""By heading; within a section in the order in which its file declares them."""
+"""Claims by heading; within a section in the order of its file."""
 CLAIMS = tuple(claim for claims in SECTIONS.values() for claim in claims)

@@ -1,4 +1,4 @@
-"""Claims on where m1 and m2 collide, and on what damping and drive do to it."""
+"""Claims on the frequencies at which m1 and m2 collide, and the influence of damping and drive."""
 
 import numpy as np
 
@@ -11,16 +11,16 @@ from .reading import MODERATE_M, SECOND_REGION_HZ, Reading, Values
 from .responses import Flags, Responses
 
 _HIGHER_M = 7e-6
-"""The other amplitude of Fig. 5."""
+"""The second amplitude of Fig. 5."""
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_S = 150.0, 350.0, 200.0
-"""Section 5."""
+"""Sweep of section 5."""
 _SAMPLED_HZ = 8192.0
-"""Over 20 samples a cycle, for the spline through them to be true to 1e-4."""
+"""Sample rate of the drive, over 20 samples per cycle, so that its spline is accurate to 1e-4."""
 _AMPLITUDE_AT_HZ = 266.0
 _SWEEP_COLLIDES_HZ = (240.0, 290.0)
 """Section 5: "about"."""
 _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
-"""Of a sweep, and of a region read off a grid of 5 Hz."""
+"""Tolerances of a sweep, and of a region on a grid of 5 Hz."""
 
 
 @claim(
@@ -33,7 +33,7 @@ _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
     at_least("smallest step", "%", 0.0),
 )
 def regions_grow(r: Reading) -> Values:
-    """With more drive the colliding frequencies take over from the others."""
+    """With more drive, m1 and m2 collide at more frequencies."""
     shares = [np.mean(r.level(each).collides) for each in AMPLITUDES_M]
     return (*shares, np.min(np.diff(shares)))
 
@@ -79,7 +79,7 @@ def damping_lowers_i(r: Reading) -> Values:
     at_least("at 7 µm", "%", 0.01),
 )
 def damping_shrinks_regions(r: Reading) -> Values:
-    """Damping shrinks the colliding regions, and so does 5 instead of 7 µm."""
+    """Damping reduces the colliding regions, as does 5 in place of 7 µm."""
     share, undamped, higher = (float(np.mean(each.collides)) for each in _fig_5(r))
     return undamped - share, higher - share
 
@@ -124,7 +124,7 @@ def second_region(r: Reading) -> Values:
         change("sweep", Direction.DOWN),
         *DAMPINGS,
     ),
-    draws=16,  # the last impact of a sweep is when chaos died out
+    draws=16,  # the last impact of a sweep depends on the end of chaos
     remark=(
         "The paper does not give the sweep's base amplitude, nor how it changed with frequency. Motion "
         "that collides goes on colliding beyond where it would begin, so the end depends on the sweep."
@@ -148,7 +148,7 @@ def sweep(r: Reading) -> Values:
 
 
 def sweep_of(case: Case) -> tuple[LinearSweep, LinearSweep | Sampled]:
-    """Return the sweep of Fig. 13(d), and the same with the amplitude that goes with a power of frequency."""
+    """Return the sweep of Fig. 13(d), and the same with an amplitude proportional to a power of frequency."""
     ends_hz = (SWEEP_START_HZ, SWEEP_STOP_HZ)
     start_hz, stop_hz = ends_hz if case.sweep_goes is Direction.UP else ends_hz[::-1]
     even = LinearSweep(start_hz, stop_hz, SWEEP_S, case.sweep_amplitude_m)
@@ -160,7 +160,7 @@ def sweep_of(case: Case) -> tuple[LinearSweep, LinearSweep | Sampled]:
 
 
 def _fig_5(r: Reading) -> tuple[Responses, Responses, Responses]:
-    """Curves at 5 um, at 5 um without damping, and at 7 um."""
+    """Return the curves at 5 um, at 5 um without damping, and at 7 um."""
     return r.level(MODERATE_M), r.curve(MODERATE_M, damping_times_s=(0.0,)), r.curve(_HIGHER_M)
 
 

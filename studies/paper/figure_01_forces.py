@@ -10,13 +10,13 @@ from .options import FigureOptions
 
 _MODELS = ("power:3", "power:5", "power:7", "power:3+5+7", "power:47")
 _REACH = 48.0 / 45.0
-"""Shown up to this multiple of the gap."""
+"""Largest displacement shown, over the gap."""
 _HIGHEST = 1.5
-"""Shown up to this multiple of the largest contact force."""
+"""Largest force shown, over the largest contact force."""
 
 
 def studies(_: FigureOptions) -> tuple[Study, ...]:
-    """Return none: forces need no study."""
+    """Return no studies, because forces need none."""
     return ()
 
 

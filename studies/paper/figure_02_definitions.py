@@ -1,4 +1,4 @@
-"""Fig. 2: what Responses I and II are: a time signal at 200 Hz, its spectrum, and the curves."""
+"""Fig. 2: definition of Responses I and II: a time signal at 200 Hz, its spectrum, and the curves."""
 
 from vibench.analysis import report
 from vibench.sim import Harmonic
@@ -12,7 +12,7 @@ _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 200.0
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Hertz stops at 5 um."""
+    """Return the study of Hertz stops at 5 um."""
     return (options.study(("hertz",), (_AMPLITUDE_M,)),)
 
 

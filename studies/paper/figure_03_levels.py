@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Hertz stops at the paper's four amplitudes."""
+    """Return the study of Hertz stops at the paper's four amplitudes."""
     return (options.study(("hertz",), AMPLITUDES_M),)
 
 
@@ -44,7 +44,7 @@ def four_levels(
     results: StudyResults,
     background: Callable[["Axes", Responses, float], None],
 ) -> report.DrawnFigure:
-    """Draw Responses I and II at each amplitude in a panel, over what belongs behind them."""
+    """Draw Responses I and II at each amplitude in one panel; ``background`` draws behind them."""
     tables: list[report.Table] = []
     with report.styled():
         figure = report.new_figure(6.6)

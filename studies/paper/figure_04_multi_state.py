@@ -1,4 +1,4 @@
-"""Fig. 4: at 5 um, where the motion is linear and where it collides: response, p, exponent, 260 Hz."""
+"""Fig. 4: linear and colliding motion at 5 um: response, p, exponent, and motion at 260 Hz."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 260.0
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Study stops and no stops at 5 um, with the largest exponent."""
+    """Return the study with and without stops at 5 um, with the largest exponent."""
     return (options.study(("hertz", "linear"), (_AMPLITUDE_M,), observe=WITH_EXPONENT),)
 
 

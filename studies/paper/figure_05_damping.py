@@ -1,4 +1,4 @@
-"""Fig. 5: what damping does, and what a larger amplitude does, to Responses I and II."""
+"""Fig. 5: influence of damping and amplitude on Responses I and II."""
 
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,9 @@ _WHAT = ("response_i", "response_ii")
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """With and without damping, at 5 and 7 um.
+    """Return the study with and without damping, at 5 and 7 um.
 
-    Raises InvalidRequest where there is no damping to compare with none.
+    Raises InvalidRequest without damping.
     """
     damped_s = options.only_damping_time_s
     if damped_s == 0.0:

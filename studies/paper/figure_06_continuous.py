@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 _MODEL = "power:5"
 _PLACES = 60
-"""Frequencies at which every first-order solution is found in closed form: each begins a branch."""
+"""Frequencies with closed-form first-order solutions, each of which starts a branch."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Study n = 5 at the paper's four amplitudes."""
+    """Return the study of n = 5 at the paper's four amplitudes."""
     return (options.study((_MODEL,), AMPLITUDES_M),)
 
 
 def draw(options: FigureOptions, results: StudyResults) -> DrawnFigure:
-    """Draw integration over the branches of harmonic balance, with the folds at which they jump."""
+    """Draw simulated responses over harmonic-balance branches, with their folds."""
 
     def background(axes: "Axes", curve: Responses, amplitude_m: float) -> None:
         found = diagram_of(

@@ -17,12 +17,12 @@ _STYLES = {
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Study n = 3 and the stops."""
+    """Return the study of n = 3 and the stops."""
     return (similarity_study(options, (_MODEL,)),)
 
 
 def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
-    """Draw both models at four amplitudes, similar frequencies shaded, the rates in the titles."""
+    """Draw both models at four amplitudes; similar frequencies are shaded, rates are in the titles."""
     columns: dict[str, Reals] = {"frequency_hz": np.asarray(results.study.frequencies_hz)}
     with report.styled():
         figure = report.new_figure(8.6)

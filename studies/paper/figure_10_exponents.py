@@ -21,7 +21,7 @@ _MODERATE_M, _SHOWN_HZ = 5e-6, 260.0
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Both models of panels a to c at four amplitudes, and all models of panel d at 5 um."""
+    """Return the studies of panels a to c (two models, four amplitudes) and d (all models at 5 um)."""
     return (
         options.study((_PIECE_WISE, _CONTINUOUS), AMPLITUDES_M, observe=WITH_EXPONENT),
         options.study(_MODELS, (_MODERATE_M,), observe=WITH_EXPONENT),

@@ -1,4 +1,4 @@
-"""Fig. 11: the gap at equal amplitude: at any gap, two resonances remain."""
+"""Fig. 11: influence of the gap if A0 equals it; two resonances remain at any gap."""
 
 from vibench.analysis import report
 from vibench.sim.study import Study, StudyResults
@@ -7,11 +7,11 @@ from .options import FigureOptions
 from .responses import finish, responses
 
 GAPS_M = (5e-6, 15e-6, 30e-6, 45e-6, 60e-6)
-"""The text copy of the paper does not name its gaps."""
+"""Our choice of gaps; the copy of the paper's text does not give them."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return one study for each gap: the amplitude goes with it."""
+    """Return one study per gap, with the amplitude equal to the gap."""
     return tuple(options.study(("hertz",), (gap_m,), gaps_m=(gap_m,)) for gap_m in GAPS_M)
 
 

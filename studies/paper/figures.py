@@ -1,4 +1,4 @@
-"""The figures of the paper that simulation draws, by number; 12 to 14 show the experiment."""
+"""The simulated figures of the paper, by number; 12 to 14 show the experiment."""
 
 from importlib import import_module
 from pathlib import Path
@@ -7,9 +7,9 @@ from types import ModuleType
 FILES = {
     int(path.stem.split("_")[1]): path.stem for path in sorted(Path(__file__).parent.glob("figure_*.py"))
 }
-"""Files by the paper's number of the figure."""
+"""Module names by number of the figure."""
 
 
 def paper_figure(number: int) -> ModuleType:
-    """Return the file of a figure: `studies(options)` and `draw(options, *results)`."""
+    """Return the module of a figure: `studies(options)` and `draw(options, *results)`."""
     return import_module(f".{FILES[number]}", __package__)

@@ -1,4 +1,4 @@
-"""What the paper leaves open in its figures, named and kept with every one of them."""
+"""Options for everything that the paper leaves open in its figures; stored with each figure."""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
 LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
-"""More than fifteen times critical in the paper's third mode."""
+"""More than fifteen times critical damping in the paper's third mode."""
 _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
-"""From a thousandth of the weakest drive to two hundred times the strongest."""
+"""A thousandth of the weakest drive, and two hundred times the strongest."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 
@@ -24,37 +24,37 @@ class FrequencyGrid(StrEnum):
     """Spacing of the frequencies; the paper does not give it."""
 
     COARSE = "coarse"
-    """Every 5 Hz: about what the paper's curves look like."""
+    """Every 5 Hz, similar to the paper's curves."""
     FINE = "fine"
-    """Every 1 Hz: shows each jump."""
+    """Every 1 Hz, which resolves each jump."""
 
     @property
     def step_hz(self) -> float:
-        """Distance of neighbouring frequencies."""
+        """Frequency spacing."""
         return {FrequencyGrid.COARSE: 5.0, FrequencyGrid.FINE: 1.0}[self]
 
 
 @dataclass(frozen=True)
 class FigureOptions:
-    """Named choices that the paper leaves open."""
+    """Named options for choices that the paper leaves open."""
 
     damping_time_s: float = 2e-5
     """c_i = damping time * k_i."""
     damping_ratio: float | None = None
-    """c_i = 2 * damping ratio * m_i * w_i of each mass on its own spring, in place of the damping time."""
+    """c_i = 2 * damping ratio * m_i * w_i of each mass on its own spring; replaces the damping time."""
     gap_m: float = 45e-6
     accuracy: Accuracy = Accuracy.STANDARD
     grid: FrequencyGrid = FrequencyGrid.COARSE
     highest_hz: float = 600.0
     similarity_highest_hz: float = 500.0
-    """Upper end of the grid on which models are compared: the rates depend on it."""
+    """Upper end of the grid for the comparison of models, on which the rates depend."""
     logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES
     threshold: float = SIMILARITY_THRESHOLD
     duration_s: float = 30.0
     window_s: float = 5.0
-    """The paper's: 30 s from rest, the last 5 s observed."""
+    """The paper's window: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
-    """For other starts: a point of the paper is one run."""
+    """No time for further starts, because a point of the paper is one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:
@@ -73,16 +73,16 @@ class FigureOptions:
 
     @property
     def frequencies_hz(self) -> tuple[float, ...]:
-        """Grid of a response curve."""
+        """Frequencies of a response curve."""
         return frequency_range(LOWEST_HZ, self.highest_hz, self.grid.step_hz)
 
     @property
     def similarity_frequencies_hz(self) -> tuple[float, ...]:
-        """Grid on which models are compared."""
+        """Frequencies for the comparison of models."""
         return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
-        """Return the study of models at amplitudes under these options; its other fields may be replaced."""
+        """Return the study of models at amplitudes under these options; other fields may be replaced."""
         chosen: dict[str, Any] = {
             "gaps_m": (self.gap_m,),
             "specimen": self._described,
@@ -96,15 +96,15 @@ class FigureOptions:
         return Study(models=models, amplitudes_m=amplitudes_m, **(chosen | replaced))
 
     def specimen(self, contact: str = "hertz") -> Specimen:
-        """Build the paper's specimen under these options."""
+        """Return the paper's specimen under these options."""
         damping_time_s = self.damping_time_s if self.damping_ratio is None else None
         return self._described.specimen(contact, damping_time_s, self.gap_m)
 
     @property
     def only_damping_time_s(self) -> float:
-        """Damping time of a figure that has no other damping.
+        """Damping time for a figure without a damping ratio.
 
-        Raises InvalidRequest under a damping ratio.
+        Raises InvalidRequest if a damping ratio is set.
         """
         if self.damping_ratio is not None:
             raise InvalidRequest("this figure takes no damping ratio; give a damping time")

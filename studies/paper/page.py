@@ -1,4 +1,4 @@
-"""The page on what of the paper holds, as Markdown and as a report, made from judgements."""
+"""The page on the claims of the paper, as Markdown and as a report."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,17 +30,17 @@ COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Everything that the page is made of."""
+    """Content of the page."""
 
     sections: Mapping[str, tuple[Judgement, ...]]
     """Judgements by heading, in order."""
     scores: tuple[DampingScore, ...]
     tables: tuple[ReportTable, ...]
-    """At the end of the report."""
+    """Tables at the end of the report."""
     options: str
-    """The defaults, as a sentence."""
+    """The defaults, in words."""
     made_with: str
-    """Versions that computed it, and how long that took."""
+    """Versions and computing time."""
 
     @property
     def judgements(self) -> tuple[Judgement, ...]:
@@ -48,12 +48,12 @@ class Reproduction:
         return tuple(each for section in self.sections.values() for each in section)
 
     def count(self, verdict: Verdict) -> int:
-        """Return how many claims have this verdict."""
+        """Return the number of claims with this verdict."""
         return sum(each.verdict is verdict for each in self.judgements)
 
     @property
     def sentence(self) -> str:
-        """The counts in words."""
+        """The numbers of claims by verdict, in words."""
         return (
             f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
             f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts, "
@@ -65,7 +65,7 @@ class Reproduction:
 def reproduction(
     sections: Mapping[str, tuple[Claim, ...]], evidence: Evidence, case: Case, on_step: Callable[[str], None]
 ) -> Reproduction:
-    """Judge every claim under a case, under its alternatives where it fails, by damping and by setting."""
+    """Measure every claim under a case, its alternatives, every damping and every setting."""
     judgements = {}
     for heading, claims in sections.items():
         found = []
@@ -83,7 +83,7 @@ def reproduction(
 
 
 def _made_with(evidence: Evidence) -> str:
-    """How much was computed, by what; from the studies, however often they were continued."""
+    """Return the number of computed points, processor time and version, from the study files."""
     studies = evidence.studies
     points = sum(each.study.grid.size for each in studies)
     minutes = sum(float(np.nansum(each.values("taken"))) for each in studies) / 60.0
@@ -94,7 +94,7 @@ def _made_with(evidence: Evidence) -> str:
 
 
 def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str]] = ()) -> str:
-    """Write the page as Markdown, with pictures by title and path relative to it."""
+    """Return the page as Markdown; ``pictures`` are titles and paths relative to the page."""
     return "\n".join(_lines(found, pictures)) + "\n"
 
 
@@ -133,7 +133,7 @@ def _cells(judged: Judgement) -> tuple[str, ...]:
 
 
 def verdict_text(judged: Judgement) -> str:
-    """Return the verdict, with the option that it rests on."""
+    """Return the verdict with the option for which it holds."""
     under, first = judged.met_under, judged.findings[0]
     match judged.verdict:
         case Verdict.HOLDS_FOR_SHARE:
@@ -151,18 +151,18 @@ def verdict_text(judged: Judgement) -> str:
 
 
 def wanted_text(claim: Claim) -> str:
-    """Return what a claim wants."""
+    """Return the requirements of a claim."""
     return "; ".join(each.sentence for each in claim.wanted)
 
 
 def _difference(judged: Judgement) -> str:
-    """Return what we find instead, and which options uphold the claim."""
+    """Return our numbers, the requirements, and the options under which the claim holds."""
     found = _values(judged.claim, judged.findings[0])
     return f"We find {found}; wanted {wanted_text(judged.claim)}. {_upheld(judged)}".strip()
 
 
 def _upheld(judged: Judgement) -> str:
-    """Return the options that uphold a claim, with their numbers, and the remark."""
+    """Return the options under which a claim holds, with their numbers, and the comment."""
     claim, alternatives = judged.claim, judged.findings[1:]
     said = [
         f"{'It holds under' if each.is_met else 'Numbers of'} {each.case.name}: {_values(claim, each)}."
@@ -175,7 +175,7 @@ def _upheld(judged: Judgement) -> str:
 
 
 def _except(judged: Judgement) -> str:
-    """Return the options that uphold a claim from some starts, where none does from every start."""
+    """Return the options under which a claim holds for some starts only."""
     return "".join(
         f", except {each.case.name} for {each.met} of {len(each.draws)} starts"
         for each in judged.findings
@@ -189,7 +189,7 @@ def _values(claim: Claim, found: Finding) -> str:
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
-    """One number, and its spread over starts where there are several."""
+    """Return one number, with its range over several starts."""
     value = f"{wanted.name}: {wanted.shown(found.values[number])}"
     low, high = (wanted.shown(each, "") for each in found.spread(number))
     return value if low == high else f"{value} ({low} to {high})"
@@ -203,14 +203,14 @@ def _tried(judged: Judgement) -> Iterator[str]:
 
 
 def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigure) -> Page:
-    """Show the judgements as the report of recordings does: one card for each section of claims.
+    """Return the findings as a report with one card per section of claims.
 
     Parameters
     ----------
     levels
         Responses at every drive level, the first figure.
     score
-        How many claims hold at each damping.
+        Number of claims that hold, over damping.
     """
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
     missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""

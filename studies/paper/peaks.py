@@ -1,4 +1,4 @@
-"""Peaks of a simulated response curve, where chaos makes it rough."""
+"""Peaks of a simulated response curve, which chaos makes irregular."""
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -8,9 +8,9 @@ from vibench.sim import Specimen, bound_matrices
 from .responses import Reals, linear_transmissibility
 
 LEAST_PROMINENCE = 2.0
-"""A peak stands twice above what parts it from a higher one: chaos scatters Response I by some per cent."""
+"""Smallest ratio of a peak to the minimum beside it; chaos scatters Response I by some per cent."""
 _FINE_POINTS = 60_000
-"""0.01 Hz over the band."""
+"""Number of frequencies, 0.01 Hz apart."""
 
 
 def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
@@ -27,7 +27,7 @@ def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Return the frequencies of the same peaks with m1 held on m2, to 0.01 Hz, shape (peaks,)."""
+    """Return the frequencies of the same peaks with m1 fixed to m2, to 0.01 Hz, shape (peaks,)."""
     mass, damping, stiffness = bound_matrices(specimen)
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     omega = 2.0 * np.pi * fine[:, None, None]
@@ -38,7 +38,7 @@ def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
-    """Return the two highest peaks, ascending [Hz], and the next over the second; NaN if there is one."""
+    """Return the two highest peaks in ascending order [Hz], and the ratio of the third to the second."""
     found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
     if found.size < 2:
         return np.nan, np.nan, np.nan
@@ -49,7 +49,7 @@ def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, flo
 
 
 def nearest(found: Reals, wanted_hz: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the peak nearest to each wanted frequency; NaN where there is none at all."""
+    """Return the peak nearest to each frequency; NaN without any peak."""
     if found.size == 0:
         return tuple(np.nan for _ in wanted_hz)
     return tuple(float(found[np.argmin(np.abs(found - wanted))]) for wanted in wanted_hz)

@@ -1,4 +1,4 @@
-"""What claims are measured on: studies, signals and sweeps under one case, each computed once."""
+"""Data for the claims: studies, signals and sweeps under one case, each computed once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -17,31 +17,31 @@ from .textbook_methods import ode45, textbook_exponents
 PIECE_WISE, CONTINUOUS = "hertz", "power:5"
 WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
 SECOND_REGION_HZ = (220.0, 320.0)
-"""Around the second linear resonance, between the two terminal ones."""
+"""Range around the second linear resonance, between the two terminal ones."""
 Computed = TypeVar("Computed")
 Values = tuple[float | np.floating[Any], ...]
-"""The numbers of a claim: one for each expectation, NaN where there is none."""
+"""The numbers of a claim: one per requirement; NaN for a missing value."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Computes what is asked for, and remembers it for the next claim that asks."""
+    """Computes studies and other results, and caches them for all claims."""
 
     solve: Callable[[Study], StudyResults]
-    """Answers a study, from its file where there is one; raises rather than give half of it."""
+    """Solves a study or reads its file; raises an error if it is incomplete."""
     _remembered: dict[object, object] = field(default_factory=dict)
 
     def study(self, study: Study) -> StudyResults:
-        """Answer a study; equal studies are answered once."""
+        """Return the results of a study; equal studies are solved once."""
         return self.remembered(study, lambda: self.solve(study))
 
     @property
     def studies(self) -> tuple[StudyResults, ...]:
-        """All that were answered so far."""
+        """All studies solved so far."""
         return tuple(each for each in self._remembered.values() if isinstance(each, StudyResults))
 
     def remembered(self, key: object, compute: Callable[[], Computed]) -> Computed:
-        """Compute something under a key that names everything that it depends on."""
+        """Return a cached result; the key must name all its inputs."""
         if key not in self._remembered:
             self._remembered[key] = compute()
         return self._remembered[key]  # type: ignore[return-value]
@@ -55,20 +55,20 @@ class Reading:
     case: Case
 
     def specimen(self, model: str = PIECE_WISE) -> Specimen:
-        """Return the specimen with a model of the contact."""
+        """Return the specimen with a contact model."""
         return self.case.specimen(model)
 
     def curve(self, amplitude_m: float, model: str = PIECE_WISE, **replaced: Any) -> Responses:
-        """Return a curve at any amplitude; fields of its study may be replaced."""
+        """Return the curve at any amplitude; fields of its study may be replaced."""
         return responses(self.evidence.study(self.case.study((model,), (amplitude_m,), **replaced)))
 
     def level(self, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
-        """Return a curve at one of the paper's amplitudes."""
+        """Return the curve at one of the paper's amplitudes."""
         curve = responses(self.evidence.study(self.levels(model)), amplitude=amplitude_m)
         return replace(curve, exponent_per_s=self.exponents_of(curve, amplitude_m, model))
 
     def levels(self, model: str = PIECE_WISE) -> Study:
-        """Return the study at the paper's amplitudes, with exponents of the models that Fig. 10 shows."""
+        """Return the study at the paper's amplitudes, with exponents for the models of Fig. 10."""
         shown = model in (PIECE_WISE, CONTINUOUS)
         return self.case.study(
             (model,), AMPLITUDES_M, observe=WITH_EXPONENT if shown else (Observable.RESPONSE,)
@@ -81,7 +81,7 @@ class Reading:
         return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
 
     def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
-        """Return the exponents of a curve as the case has them; where nothing collides, the exact ones."""
+        """Return the exponents by the method of the case; exact ones where nothing collides."""
         if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
             return curve.exponent_per_s
         specimen, settle_s = self.specimen(model), self.case.window_s

@@ -11,9 +11,9 @@ from .reading import STRONG_M, WEAK_M, Reading, Values
 from .responses import linear_transmissibility, responses
 
 _WHOLE_HZ = 1.0
-"""The paper gives whole hertz."""
+"""Tolerance of resonances that the paper gives in whole hertz."""
 _GRID_HZ = 5.0
-"""Tolerance of a peak read off a curve every 5 Hz."""
+"""Tolerance of a peak on a grid of 5 Hz."""
 _ROUGH_HZ = 10.0
 """Tolerance of a peak of Response I in chaos: two steps of the coarse grid."""
 _AT_GAPS = f"The two highest peaks at {len(GAPS_M)} gaps, 5 to 60 µm, each at that A0; the worst of them."
@@ -142,7 +142,7 @@ def any_gap_ii(r: Reading) -> Values:
 
 
 def _worst_gap(r: Reading, what: str) -> Values:
-    """Furthest that the two highest peaks lie from the terminal ones over all gaps, and the highest next."""
+    """Return the largest deviation of the peaks from the terminal resonances, and the next peak."""
     furthest, following = 0.0, 0.0
     for study in clearance_studies(r.case):
         curve = responses(r.evidence.study(study))

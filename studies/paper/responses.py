@@ -1,4 +1,4 @@
-"""Response curves from a study, and how every figure of the paper draws them."""
+"""Response curves from a study, and functions to draw them."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -19,20 +19,20 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """One model at one amplitude; arrays of shape (points,)."""
+    """Curve of one model at one amplitude; arrays of shape (points,)."""
 
     frequency_hz: Reals
     response_i: Reals
     response_ii: Reals
     relative_i: Reals
     exponent_per_s: Reals
-    """NaN where none was asked for."""
+    """NaN if not computed."""
     collides: Flags
-    """Where m1 and m2 struck each other within the window."""
+    """Whether m1 and m2 collided within the window."""
 
 
 def responses(results: StudyResults, **fixed: float | str) -> Responses:
-    """Read one curve of a study; every axis but frequency is fixed, or has one value."""
+    """Return one curve of a study; each axis except frequency is fixed or has one value."""
     only = {axis.name: axis.values[0] for axis in results.axes if len(axis.values) == 1}
     at = {name: value for name, value in {**only, **fixed}.items() if name != "frequency"}
     return Responses(
@@ -51,13 +51,13 @@ def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
 
 
 def stretches(flags: Flags) -> NDArray[np.intp]:
-    """Return first index and end of every run of flagged neighbours, shape (runs, 2)."""
+    """Return first index and end of each run of consecutive flags, shape (runs, 2)."""
     changes = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
     return np.flatnonzero(changes).reshape(-1, 2)
 
 
 def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
-    """Shade the frequencies that are flagged, each to halfway to its neighbours."""
+    """Shade the flagged frequencies, each halfway to its neighbours."""
     between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
     for number, (first, end) in enumerate(stretches(flags)):
@@ -66,7 +66,7 @@ def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
 
 
 def draw_linear(axes: "Axes", frequency_hz: Reals, specimen: Specimen) -> None:
-    """Draw the response without contact, on a finer grid that shows its peaks."""
+    """Draw the response without contact, on a grid fine enough for its peaks."""
     fine = np.linspace(frequency_hz[0], frequency_hz[-1], 4 * frequency_hz.size)
     linear = linear_transmissibility(specimen, fine)
     axes.plot(fine, linear, color=report.LINEAR, linestyle="--", linewidth=1.0, label="without contact")

@@ -1,4 +1,4 @@
-"""Which claims hold under which setting: a table by named settings, and a score by damping."""
+"""Claims by setting: a table over named settings, and a score over damping."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,14 +14,14 @@ from .exponent_claims import NEAR_ZERO_PER_S, SEVERE_PER_S
 from .reading import MODERATE_M, WEAK_M, Evidence, Reading
 
 SETTINGS = (damping(1e-5), damping(4e-5), ALIKE, BY_ODE45, together(damping(4e-5), BY_ODE45))
-"""Beside the defaults."""
+"""Named settings, in addition to the defaults."""
 _LINEAR_PER_S = 10.0
-"""The axis of exponents is linear around zero, up to here."""
+"""Linear range of the exponent axis around zero."""
 
 
 @dataclass(frozen=True)
 class DampingScore:
-    """What holds at one damping."""
+    """The claims that hold at one damping."""
 
     damping_time_s: float
     """c_i / k_i."""
@@ -29,18 +29,18 @@ class DampingScore:
     """Keys of the claims that hold."""
     failed: tuple[str, ...]
     weak_exponent_per_s: float
-    """Largest exponent over frequency at 1 um, which the paper has near zero."""
+    """Largest exponent over frequency at 1 um; near zero in the paper."""
     moderate_exponent_per_s: float
-    """Largest exponent over frequency at 5 um, which the paper has above 100."""
+    """Largest exponent over frequency at 5 um; above 100 in the paper."""
 
 
 def holds_from_rest(claim: Claim, evidence: Evidence, case: Case) -> bool:
-    """Return whether a claim holds from rest, whatever other starts do."""
+    """Return whether a claim holds from rest."""
     return finding(replace(claim, draws=1), evidence, case).is_met
 
 
 def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[DampingScore, ...]:
-    """Measure every scored claim at every damping, all else as in the case."""
+    """Measure every scored claim at every damping, with all other options of the case."""
     found = []
     for damping_time_s in SCORED_S:
         at = damping(damping_time_s).of(case)
@@ -55,7 +55,7 @@ def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[Dam
 
 
 def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
-    """Return the score by damping, with the claims that do not hold."""
+    """Return the score over damping, with the claims that do not hold."""
     first, second, third = (f"{each:.2g}" for each in gong2025(0.01).damping_ratios)
     most = max(len(each.held) for each in scores)
     best = ", ".join(f"{each.damping_time_s:.3g} s" for each in scores if len(each.held) == most)
@@ -79,7 +79,7 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
 
 
 def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
-    """Draw the score, and the largest exponents at 1 and 5 um, over the damping."""
+    """Draw the score, and the largest exponents at 1 and 5 um, over damping."""
     damping_s = np.array([each.damping_time_s for each in scores])
     held = np.array([len(each.held) for each in scores])
     asked = len(scores[0].held) + len(scores[0].failed)
@@ -91,7 +91,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")
         top.set_ylim(0, asked)
         top.set_ylabel(f"claims that hold, of {asked}")
-        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # first: margins are those of the scale
+        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # first, as margins depend on the scale
         for values, label, colour, marker in (
             (weak, "1 µm: near zero in the paper", report.LEVELS[0], "o"),
             (moderate, "5 µm: above 100 in the paper", report.SIMULATED, "s"),
@@ -113,11 +113,11 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
 
 
 def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -> report.ReportTable:
-    """Return which claims hold under which setting, from rest: those that do not hold under all."""
+    """Return the claims that hold under each setting, from rest, without those that hold under all."""
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
     for claim in claims:
-        # Claims on continuous models take too long under the settings in between.
+        # Claims on continuous models take too long to be computed under the settings in between.
         asked = settings if claim.is_scored else [settings[0], settings[-1]]
         held = {each.name: "holds" if holds_from_rest(claim, evidence, each) else "fails" for each in asked}
         rows.append([held.get(each.name, "") for each in settings])

@@ -1,4 +1,4 @@
-"""Claims on how alike the continuous models are to the piece-wise one (Figs. 1(c) and 7 to 9)."""
+"""Claims on the similarity of the continuous models and the piece-wise one (Figs. 1(c) and 7 to 9)."""
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from .responses import Reals
 CUBIC, FIFTH, SEVENTH = "power:3", "power:5", "power:7"
 FIRST, SECOND = "response_i", "response_ii"
 _READ_OFF = 0.05
-"""The rates move by some per cent with the grid of frequencies, which the paper does not give."""
+"""Tolerance: the rates change by some per cent with the frequency grid, which the paper does not give."""
 _HIGH_RATE = 0.8
 """Section 4: "more than 80 %"."""
 _CURVE_POINTS = 200
 _DRAWS = 4
-"""Rates compare responses in chaos, on either of several motions: each start follows every model again."""
+"""Starts: the rates depend on the chaotic motion of every model, which differs from start to start."""
 FITTED = (
     COMPARED_LOWER,
     change("compared", 600.0),
@@ -28,7 +28,7 @@ FITTED = (
     NARROWER_FIT,
     CLOSEST,
 )
-"""What eq. 6 leaves open, which needs no further simulation, and where the models are fitted."""
+"""Choices of eq. 6, which need no further simulation, and the indentation of the fit."""
 _NAMES = ("n = 3", "n = 5", "n = 7", "n = 3+5+7")
 _BOTH = (at_least("Response I", "%", 0.0), at_least("Response II", "%", 0.0))
 
@@ -205,7 +205,7 @@ def _all_rates(r: Reading, what: str) -> list[Reals]:
 
 
 def _seventh_above(r: Reading, model: str) -> Values:
-    """Mean rate of n = 7 less that of a model, of both responses."""
+    """Return the mean rate of n = 7 minus that of a model, for both responses."""
     return tuple(
         np.mean(rates(r, SEVENTH, what)) - np.mean(rates(r, model, what)) for what in (FIRST, SECOND)
     )

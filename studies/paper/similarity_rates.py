@@ -1,4 +1,4 @@
-"""How similar the continuous models are to the piece-wise one (eqs. 6 and 7): what Figs. 7 to 9 share."""
+"""Similarity of the continuous models and the piece-wise one (eqs. 6 and 7), for Figs. 7 to 9."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ RESPONSES = {"response_i": "Response I", "response_ii": "Response II"}
 
 
 def similarity_study(options: FigureOptions, models: tuple[str, ...]) -> Study:
-    """Return the study of the stops and of models at the four amplitudes, where they are compared."""
+    """Return the study of stops and models at the four amplitudes, on the grid for comparison."""
     return options.study(("hertz", *models), AMPLITUDES_M, frequencies_hz=options.similarity_frequencies_hz)
 
 
@@ -36,7 +36,7 @@ def compare_model(
 def rates_figure(
     name: str, title: str, models: Sequence[str], options: FigureOptions, results: StudyResults
 ) -> report.DrawnFigure:
-    """Draw the rates of several models over the amplitude."""
+    """Draw the rates of several models over amplitude."""
     columns: dict[str, Reals] = {"amplitude_m": np.asarray(AMPLITUDES_M)}
     with report.styled():
         figure = report.new_figure(3.3)
@@ -78,7 +78,7 @@ def _draw_rates(
 
 
 def definition(options: FigureOptions) -> str:
-    """Return what counts as similar, in a sentence."""
+    """Return the criterion of similarity in words."""
     low_hz, *_, high_hz = options.similarity_frequencies_hz
     return (
         f"Similar: log10 of the response [{options.logarithm_of.value}] differs by at most "

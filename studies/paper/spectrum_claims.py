@@ -1,4 +1,4 @@
-"""Claims on the motion at 260 Hz: chaos moves it towards the terminal resonances (Figs. 4, 10 and 14)."""
+"""Claims on the motion at 260 Hz: chaos moves energy to the terminal resonances (Figs. 4, 10 and 14)."""
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from .time_signal import TimeSignal, time_signal
 SHOWN_HZ = 260.0
 _HALF_BAND_HZ = 10.0
 _LOOKED_HZ = ((150.0, 245.0), (350.0, 500.0))
-"""Where the two humps are looked for: around each terminal resonance, clear of the drive."""
+"""Search ranges of the two broad peaks: around each terminal resonance, away from the drive."""
 _ABSENT, _PRESENT = 0.01, 0.1
-"""Of the level at the drive's frequency."""
+"""Bounds of absent and present lines, over the level at the drive frequency."""
 _NEAR_HZ = 20.0
-"""Chaos makes broad humps; so near is at a terminal resonance and at none of the linear ones."""
+"""Tolerance of the broad peaks, close enough to exclude the linear resonances."""
 _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")
 
 
@@ -97,12 +97,12 @@ def _signal(r: Reading, amplitude_m: float) -> TimeSignal:
 
 
 def _band(signal: TimeSignal, middle_hz: float) -> float:
-    """Root sum of squares of the lines around a frequency, over A0."""
+    """Return the root sum of squares of the lines around a frequency, over A0."""
     inside = np.abs(signal.frequency_hz - middle_hz) <= _HALF_BAND_HZ
     return float(np.sqrt(np.sum(signal.amplitude[inside] ** 2)))
 
 
 def _by_level(r: Reading, what: str) -> Reals:
-    """Return one quantity at 260 Hz at each amplitude."""
+    """Return one quantity at 260 Hz for each amplitude."""
     curves = [r.level(each) for each in AMPLITUDES_M]
     return np.array([getattr(each, what)[np.argmin(np.abs(each.frequency_hz - SHOWN_HZ))] for each in curves])

@@ -1,8 +1,8 @@
-"""What explicit methods of Runge and Kutta make of a motion when no event stops them. SI units.
+"""Explicit Runge-Kutta methods without detection of contacts, for comparison. SI units.
 
-Their steps fall on a contact wherever they happen to: what is wrong in it adds to or takes from the energy of
-every impact, and to the exponent of chaos. Dormand and Prince's pair is controlled as `ode45` of MATLAB does
-(Shampine and Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), at its default tolerances.
+Their steps cross a contact at arbitrary points; the error changes the energy of every impact, and the
+exponent of chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
+MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
 """
 
 import math
@@ -20,37 +20,37 @@ from vibench.sim.accuracy_benchmark.independent_solution import Place, law_of, n
 from .responses import Reals
 
 APART_M = 1e-11
-"""Distance of the neighbour that gives an exponent; far below any indentation, far above rounding."""
+"""Distance of the neighbour for an exponent; far below any indentation, far above rounding errors."""
 READING_S = 1e-3
-"""Time between two readings of that distance."""
+"""Interval between measurements of that distance."""
 LOST_M = 1.0
 """Displacement beyond which a motion has diverged."""
 SLOWEST_PER_S = 1e-9
-"""A state that does not move at first."""
+"""Reference speed of a state initially at rest."""
 
 
 class Tableau(NamedTuple):
-    """Numbers of a method (Hairer, Norsett and Wanner, Solving ODEs I, sections II.1 and II.5)."""
+    """Coefficients of a method (Hairer, Norsett and Wanner, Solving ODEs I, sections II.1 and II.5)."""
 
     nodes: Reals
     stages: Reals
     """Shape (stages, stages), strictly lower."""
     result: Reals
     error: Reals
-    """Zero where the method states none."""
+    """Error coefficients; zero for a method without error estimate."""
 
 
 @dataclass(frozen=True)
 class TextbookMethod:
-    """A method with its steps: of fixed length, or as long as a tolerance lets them be."""
+    """A method with fixed steps or with steps controlled by tolerances."""
 
     name: str
     tableau: Tableau
     longest_s: float
-    """Every step, where no error is stated."""
+    """Longest step; every step without an error estimate."""
     relative: float = math.inf
     absolute: float = 1.0
-    """Allowed error of a component, in metres and in metres per second alike."""
+    """Absolute tolerance, both in metres and in metres per second."""
 
 
 _RUNGE_KUTTA = Tableau(
@@ -66,7 +66,7 @@ _DORMAND_PRINCE = Tableau(
 
 
 def runge_kutta(step_s: float) -> TextbookMethod:
-    """Return the classical method of fourth order in steps of fixed length.
+    """Return the classical fourth-order method with fixed steps.
 
     Raises ValueError when the step is not positive and finite.
     """
@@ -77,7 +77,7 @@ def runge_kutta(step_s: float) -> TextbookMethod:
 
 
 def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0) -> TextbookMethod:
-    """Return Dormand and Prince's pair, controlled as MATLAB does; the defaults are MATLAB's for 30 s.
+    """Return Dormand and Prince's pair, controlled as in MATLAB; the defaults are MATLAB's for 30 s.
 
     Raises ValueError when a tolerance or the longest step is not positive and finite.
     """
@@ -94,7 +94,7 @@ def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0
 def textbook_states(
     specimen: Specimen, drive: Harmonic, method: TextbookMethod, duration_s: float, initial_states: ArrayLike
 ) -> Reals:
-    """Follow motions from time zero and return their states at the end, shape (n, 6); NaN when one is lost.
+    """Integrate motions from time zero and return their final states, shape (n, 6); NaN after divergence.
 
     ``initial_states`` has shape (n, 6): x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid
     stops.
@@ -112,11 +112,12 @@ def textbook_exponents(
     duration_s: float = 25.0,
     settle_s: float = 5.0,
 ) -> Reals:
-    """Return the largest exponents of what a method makes of motions from rest [1/s]; NaN when one is lost.
+    """Return the largest Lyapunov exponents of a method for motions from rest [1/s]; NaN after divergence.
 
-    The mean rate over ``duration_s``, after ``settle_s``, at which a neighbour parts that takes the very same
-    steps. Regular motions have it to about 1 / ``duration_s``. Shape (n,), one for each drive; all motions
-    are followed together. Raises ValueError for rigid stops.
+    Mean divergence rate of a neighbour with the same steps, over ``duration_s`` after ``settle_s``. The
+    resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per drive; all motions are
+    integrated together.
+    Raises ValueError for rigid stops.
     """
     states = np.zeros((6, 2, len(drives)))
     states[:, 1] = APART_M / math.sqrt(6.0) * _scales(drives)
@@ -129,16 +130,16 @@ def _scales(drives: Sequence[Harmonic]) -> Reals:
 
 
 def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
-    """Size of changes beside the larger of two states, component by component."""
+    """Return changes relative to the larger of two states, by component."""
     beside = np.maximum(np.maximum(np.abs(one), np.abs(other)), floor)
     return np.asarray(np.max(np.abs(change) / beside, axis=0))
 
 
 def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMethod) -> Reals:
-    """Return the lengths to try after a step, as `ode45` does; ``failures`` came one after the other."""
+    """Return the next step lengths as `ode45` does; ``failures`` is the number of consecutive failures."""
     if method.relative == math.inf:
         return np.full_like(step_s, method.longest_s)
-    # A step without error grows by the most; after one whose error is no number follows a tenth.
+    # A step without error grows by the largest factor; after a non-finite error the next step is a tenth.
     part = 1.25 * (error / method.relative) ** 0.2
     shorter = np.where(failures > 0, 0.5, np.fmax(0.1, 1.0 / np.maximum(part, 0.2)))
     longer = np.where(failures > 0, step_s, np.minimum(method.longest_s, step_s / np.maximum(part, 0.2)))
@@ -153,9 +154,9 @@ def _march(
     drives: Sequence[Harmonic],
     method: TextbookMethod,
 ) -> tuple[Reals, Reals]:
-    """Take states, and neighbours if there are any, to a time; return them and the rates at which they part.
+    """Integrate states, and optional neighbours, to a time; return them and the divergence rates.
 
-    ``states`` has shape (6, 1 or 2, motions); the second of two is the neighbour.
+    ``states`` has shape (6, 1 or 2, motions); the second entry is the neighbour.
     """
     tableau, law, scales = method.tableau, law_of(specimen), _scales(drives)
     numbers = np.transpose([numbers_of(specimen, drive) for drive in drives])

@@ -1,4 +1,4 @@
-"""A simulated dwell as the paper shows it: 30 s of motion, and the spectrum of the last 5 s."""
+"""A simulated dwell in the paper's form: 30 s of motion, and the spectrum of the last 5 s."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 SPECTRUM_HZ = 600.0
 _RATE_HZ = 8192.0
 _STRETCHES = 600
-"""Number of stretches of the outline; each has its smallest and largest value."""
+"""Number of outline sections, each with its smallest and largest value."""
 _DECADES = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class TimeSignal:
-    """The motion of m0 under a sine, over the drive amplitude."""
+    """Motion of m0 under a sine, over the drive amplitude."""
 
     time_s: Reals
-    """Middle of each stretch of the outline, shape (stretches,)."""
+    """Middle of each outline section, shape (sections,)."""
     lower: Reals
     upper: Reals
     frequency_hz: Reals
@@ -35,7 +35,7 @@ class TimeSignal:
 
 
 def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> TimeSignal:
-    """Follow a dwell from rest and take the spectrum of its end."""
+    """Simulate a dwell from rest and return its outline and the spectrum of its end."""
     run = integrate(specimen, drive, options.duration_s, options.accuracy, sample_rate_hz=_RATE_HZ)
     motion = run.states[:, 0] / drive.amplitude_m
     count = round(options.window_s * _RATE_HZ)
@@ -52,7 +52,7 @@ def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> 
 
 
 def draw_outline(axes: "Axes", signal: TimeSignal, options: FigureOptions) -> None:
-    """Draw the outline over time, with the window that is observed in grey."""
+    """Draw the outline over time; the evaluated window is grey."""
     axes.axvspan(options.duration_s - options.window_s, options.duration_s, color=report.COLLIDING, zorder=0)
     axes.fill_between(signal.time_s, signal.lower, signal.upper, color=report.MEASURED, linewidth=0)
     axes.set_xlim(0, options.duration_s)

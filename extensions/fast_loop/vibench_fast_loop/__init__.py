@@ -1,12 +1,12 @@
-"""The fast loop: branches of periodic motions, stable or not, that a real-time controller holds.
+"""The fast loop: a real-time controller that holds branches of periodic motions, stable or not.
 
-An extension of vibench, found by the entry points of its ``pyproject.toml``: a kind of excitation with its
-controller, analysis, figure and form, the drive that plays it, and the simulated instrument behind it.
+An extension of vibench, found by the entry points of its ``pyproject.toml``. It adds a kind of excitation
+with its controller, analysis, figure and form, the drive that plays it, and the simulated instrument.
 
-A controller samples base and m0, and sets the voltage at the amplifier some latency later. `plant` says what
-a step of it makes of table, specimen and volts on their way; `law` gives the linear law (a Kalman filter and
-the feedback of its estimate) that damps the specimen, and says whether a periodic motion is stable under it;
-`open_loop_multiplier` tells from samples of a perturbed motion whether it would be stable without. The
-harmonic content of the drive is no part of the law: where the base moves as a sine, the motion held is one of
-the specimen alone, whatever the law is. SI units.
+A controller samples base and m0, and sets the amplifier voltage after a latency. `plant` models one control
+step of table, specimen and delayed voltages. `law` designs the linear law (a Kalman filter and feedback of
+its estimate) that damps the specimen, and computes whether a periodic motion is stable under it.
+`open_loop_multiplier` estimates stability without feedback from samples of a perturbed motion. The law is
+independent of the harmonics of the drive: if the base moves as a sine, the held motion is one of the specimen
+alone, for any law. SI units.
 """

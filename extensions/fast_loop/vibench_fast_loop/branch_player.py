@@ -1,4 +1,4 @@
-"""Playing one setting of a fast loop, and looking at base and m0 until both are known well enough."""
+"""Plays settings of a fast loop, and measures base and m0 until both are known well enough."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -22,27 +22,27 @@ Vector = NDArray[np.float64]
 _BLOCK_PERIODS = 10
 _GLIDE_S = 0.1
 _HIGHEST = 9
-"""Harmonic that is looked at."""
+"""Highest harmonic measured."""
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
-"""A look may end when the standard errors of the base's fundamental and harmonics are these parts of the
-tolerance, and that of m0 this part of itself;"""
+"""Largest standard errors at the end of a measurement: of the base's fundamental and harmonics, as parts of
+the tolerance, and of m0 relative to itself."""
 _ROUGHLY = 0.15
-"""far from the level this part of the way there will do for the base."""
+"""Largest standard error of the base, as a part of its distance from the level, far from it."""
 _DRIFT = 3.0
-"""A first half that differs from the second by this many standard errors had not settled."""
+"""The first half has not settled if it differs from the second by more than this many standard errors."""
 _REMEMBERED = 0.8
-"""What the scatter in a look weighs in the next one: the few blocks of one look may agree by chance."""
+"""Weight of the scatter of earlier measurements, because the few blocks of one may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopLook:
-    """What base and m0 did under a setting: means over blocks of periods, from the first harmonic on."""
+    """Response of base and m0 to a setting: means over blocks of periods, from the first harmonic on."""
 
     base_m: Coefficients
     m0_m: Coefficients
     base_u: Vector
-    """Standard error of each coefficient's parts [m]."""
+    """Standard error of the real and imaginary part of each coefficient [m]."""
     m0_u: Vector
 
     @property
@@ -52,13 +52,13 @@ class LoopLook:
 
     @property
     def ratio_u(self) -> float:
-        """Standard error of each of its parts."""
+        """Standard error of its real and imaginary part."""
         shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
         return float(abs(self.ratio) * np.hypot(*shares))
 
 
 class BranchPlayer:
-    """Plays settings, and looks at what they make of base and m0."""
+    """Plays settings and measures the response of base and m0."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan
@@ -67,9 +67,9 @@ class BranchPlayer:
         self._most_vpp = loop.most_vpp
         self._feedback = fast.feedback
         self._blocks: list[LoopBlock] = []
-        """Of the setting that is played, since it has settled."""
+        """Blocks of the current setting since it settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
-        """Of deviations of blocks from their means in earlier looks, and how many there were."""
+        """Sum of squares of block deviations in earlier measurements, and their degrees of freedom."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
         """Return the program of the controller."""
@@ -87,7 +87,7 @@ class BranchPlayer:
     def looked(
         self, setting: LoopSetting, level_m: float
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Play a setting, and average for as long as its noise asks for."""
+        """Play a setting and average until the noise is low enough."""
         tone, frequency_hz = self.tone(setting), setting.frequency_hz
         look_s = self.plan.look_periods / frequency_hz
         samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
@@ -108,7 +108,7 @@ class BranchPlayer:
     def recorded(
         self, setting: LoopSetting, segment: Segment
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Record a setting that is played, and average over what was looked at before as well."""
+        """Record the current setting, and average over the recording and the preceding measurement."""
         tone = self.tone(setting)
         samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
         self._blocks += samples.coefficients
@@ -127,10 +127,10 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Leave out the first half of the blocks for as long as it differs from the second."""
+    """Omit the first half of the blocks as long as it differs from the second."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
-        # Between neighbours: a drift makes little of it.
+        # Use differences between neighbours, which a drift hardly changes.
         scatter = np.sqrt(0.5 * np.mean(np.abs(np.diff(seen, axis=0)) ** 2, axis=0))
         moved = np.abs(first.mean(axis=0) - second.mean(axis=0))
         error = scatter * np.sqrt(1 / len(first) + 1 / len(second))
@@ -142,7 +142,7 @@ def _settled_part(seen: Coefficients) -> Coefficients:
 
 
 def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
-    """Whether the errors of a look are small beside what they are to tell."""
+    """Return whether the errors of a measurement are small enough for its purpose."""
     share = look.base_u[: plan.harmonics] / level_m
     wrong = abs(abs(look.base_m[0]) / level_m - 1)
     return bool(

@@ -1,4 +1,4 @@
-"""A branch as equations: what is played, what of the base is wrong, how the one follows from the other."""
+"""The equations of a branch: drive settings as unknowns, deviations of the base as residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,81 +10,82 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""A change of the unknowns shorter than this tells nothing."""
+"""Smallest change of the unknowns from which the derivative is updated."""
 _DOUBTED = 0.05
-"""How far the derivative may be from what is believed of it: against this the noise of a look counts."""
+"""Assumed standard error of the derivative, against which the measurement noise is weighted."""
 _REFERENCE_STEP = 0.15
-"""Change of the first coefficient, over itself, that counts as one step."""
+"""Relative change of the first coefficient that counts as one step."""
 _RATIO_STEP = 1.0
-"""Change of m0 over the base that counts as one step."""
+"""Change of m0 over base that counts as one step."""
 _RATIO = 2
-"""Rows of m0 over the base, behind what is wrong of the base."""
+"""Rows for m0 over base, after the residual of the base."""
 _NEW = 0.3
-"""Part of a step that must have been gone for a point to be a new one."""
+"""Smallest share of a step after which a point counts as new."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
-"""Points give a direction when they lie this many steps apart (what the tolerance moves a point by counts
-less beside that) and this many of their standard errors."""
+"""Smallest distance of two points that define a direction: in steps (the effect of the tolerance is less) and
+in standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopSetting:
-    """Program of a controller: the unknowns of the equations."""
+    """Setting of a controller: the unknowns of the equations."""
 
     frequency_hz: float
     reference_v: Coefficients
-    """From the first harmonic on, shape (harmonics,); the first is real, which anchors the phase [V]."""
+    """Coefficients from the first harmonic on, shape (harmonics,); the first is real, which fixes the phase
+    [V]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A setting and what it made of base and m0, as numbers of the equations."""
+    """A setting and its measured response, as numbers of the equations."""
 
     unknowns: Vector
     residual: Vector
-    """What of the base is wrong, over its level."""
+    """Deviation of the base, over its level."""
     ratio: complex
     """Fundamental of m0 over that of the base."""
     noise: Vector
-    """Standard error of each number of the residual, and of both parts of the ratio."""
+    """Standard errors of the residual, and of both parts of the ratio."""
 
     @property
     def place(self) -> Vector:
-        """Where it lies in the space in which the branch is an arc: frequency and ratio, in steps."""
+        """Coordinates of the arc: frequency and ratio, in steps."""
         return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
 
 
 @dataclass(frozen=True, eq=False)
 class Foreseen:
-    """Where the next point should lie, and the way there."""
+    """Prediction of the next point."""
 
     unknowns: Vector
     place: Vector
     along: Vector
-    """Of length one."""
+    """Unit vector along the arc."""
     length: float
-    """0 at the first point."""
+    """Arc length; 0 at the first point."""
 
 
 class BranchSolver:
-    """Newton's method whose derivative is learnt (Broyden, Math. Comp. 19 (1965) 577), along an arc.
+    """Newton's method with a derivative updated from measurements (Broyden, Math. Comp. 19 (1965) 577).
 
-    The equations: the base's fundamental has its amplitude, each harmonic is zero; all over that amplitude.
-    Unknowns are frequency and coefficients, so that there is one more than equations. The arc runs through
-    frequency and ratio of m0 to base: at a fold of a light damping the coefficients hardly change, and m0
-    turns by half a turn.
+    Equations: the base's fundamental has its amplitude and each harmonic is zero, all over that amplitude.
+    Unknowns are frequency and coefficients, one more than equations. The arc length uses frequency and ratio
+    of m0 to base, because at a fold with low damping the coefficients hardly change while the phase of m0
+    turns by 180 degrees.
 
     Parameters
     ----------
     start
-        Where the branch begins.
+        First setting of the branch.
     gains
-        Base displacement over volts at each harmonic there, by the model [m/V], shape (harmonics,).
+        Base displacement per volt for each harmonic, from the model [m/V], shape (harmonics,).
     bend
-        Relative change of the first gain's magnitude by the frequency, by the model [1/Hz].
+        Relative change of the first gain's magnitude with frequency, from the model [1/Hz].
     level_m
         Amplitude of the base's displacement, at the start.
     step_hz
-        A step of one.
+        Length of one step.
     """
 
     def __init__(
@@ -103,12 +104,12 @@ class BranchSolver:
         self._begin = self._packed(start)
 
     def first(self) -> Foreseen:
-        """Return the start, whose frequency stays."""
+        """Return the first prediction, whose frequency is fixed."""
         along = np.array([1.0, 0.0, 0.0])
         return Foreseen(self._begin, along * self._begin[0], along, 0.0)
 
     def next(self, points: Sequence[Seen], length: float, way: float) -> Foreseen:
-        """Go on from the last point by ``length``, from the first one up (1) or down (-1) in frequency."""
+        """Return a prediction at a distance ``length``; ``way`` is the initial direction in frequency."""
         here = points[-1]
         if len(points) == 1:
             along = np.array([way, 0.0, 0.0])
@@ -122,7 +123,7 @@ class BranchSolver:
         return Foreseen(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
-        """Return what is played."""
+        """Return the setting of these unknowns."""
         volts = np.exp(_REFERENCE_STEP * unknowns[1]) * self._volts[0]
         rest = (unknowns[2::2] + 1j * unknowns[3::2]) * self._volts[1:]
         return LoopSetting(
@@ -130,7 +131,7 @@ class BranchSolver:
         )
 
     def learn(self, seen: Seen) -> None:
-        """Take what was measured into the derivative."""
+        """Update the derivative with a measurement."""
         if self._last is not None:
             moved = seen.unknowns - self._last.unknowns
             changed = _outputs(seen) - _outputs(self._last)
@@ -141,7 +142,7 @@ class BranchSolver:
         self._last = seen
 
     def probe(self, column: int, here: Seen, beside: Seen) -> None:
-        """Take what one unknown does, alone, from two looks."""
+        """Update the column of one unknown from two measurements."""
         moved = beside.unknowns[column] - here.unknowns[column]
         found = (_outputs(beside) - _outputs(here)) / moved
         noise = np.hypot(beside.noise, here.noise) / moved
@@ -151,7 +152,7 @@ class BranchSolver:
         self._last = beside
 
     def corrected(self, seen: Seen, foreseen: Foreseen) -> Vector:
-        """Give the next try: nearer to the branch, in the plane across the arc through what was foreseen."""
+        """Return the next iterate, in the plane through the prediction perpendicular to the arc."""
         along = foreseen.along
         row = along[1:] @ self._slope[-_RATIO:]
         row[0] += along[0]
@@ -169,20 +170,20 @@ class BranchSolver:
 
 
 def is_new(seen: Seen, foreseen: Foreseen) -> bool:
-    """Whether enough of the way was gone, and not back."""
+    """Return whether a point is far enough from the last one, in forward direction."""
     short = float(foreseen.along @ (foreseen.place - seen.place))
     return foreseen.length == 0.0 or short <= (1 - _NEW) * foreseen.length
 
 
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:
-    """Return what of the base is wrong, over its level: amplitude of the fundamental, then each harmonic.
+    """Return the residual of the base over its level: amplitude of the fundamental, then each harmonic.
 
     Parameters
     ----------
     base_m
-        Displacement of the base from the first harmonic on, phases against the first coefficient [m].
+        Displacement of the base from the first harmonic on, phases relative to the first coefficient [m].
     level_m
-        What it should be [m].
+        Required amplitude [m].
     """
     rest = base_m[1:] / level_m
     return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])
@@ -194,7 +195,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
 
 
 def _behind(points: Sequence[Seen]) -> Seen:
-    """Return the latest point from which the chord to the last one is a direction, else the first."""
+    """Return the latest point far enough from the last one to define a direction, else the first."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

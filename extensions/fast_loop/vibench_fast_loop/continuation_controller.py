@@ -1,6 +1,6 @@
-"""Following a branch with a fast loop: predicted along the arc, corrected until the base is a sine.
+"""Follows a branch with a fast loop: prediction along the arc, correction until the base is a sine.
 
-Small changes of what holds a motion tell whether it would be stable without its feedback.
+Small perturbations of the drive show whether the motion would be stable without feedback.
 """
 
 from dataclasses import replace
@@ -46,35 +46,35 @@ from .open_loop_multiplier import (
 
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
-"""Of the first point, which the model without stops may be far from."""
+"""Tries for the first point, where the model without stops may be inaccurate."""
 _NEAR = 0.3
-"""Part of the level by which the first motion may be wrong when its unknowns are probed each alone."""
+"""Largest relative error of the level at which the unknowns of the first motion are varied one by one."""
 _SHORTEST_STEP = 1 / 64
-"""Of the plan's step."""
+"""Shortest step, as a part of the plan's step."""
 _GROWTH, _EASY = 1.5, 3
-"""A step grows by this factor where a point took this many tries or fewer."""
+"""Growth factor of a step, if the last point took at most this many tries."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
-"""Changes by which unknowns are probed: two in steps, harmonics over the level."""
+"""Variations of the unknowns: the first two in steps, harmonics over the level."""
 _BELOW = 5.0
-"""Steps of the first coefficient below the model's from which it is raised."""
+"""Start of the first coefficient below the model's value, in steps."""
 _ABOVE = 8.0
-"""Those above it from which it is lowered: a factor of three."""
+"""Start above the model's value, in steps: a factor of three."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Steps by which it is lowered at most, and harmonics of the base, over its level, above which it is not:
-a motion with impacts is soon lost."""
+"""Largest decrease, in steps, and largest base harmonics over the level at which it continues, because a
+motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Least and largest change of the base's level in a step of the first coefficient, while it is raised."""
+"""Bounds on the change of the base level per step of the first coefficient during the increase."""
 _TOLD = 0.01
-"""Shortest change of it that tells the slope, in steps."""
+"""Smallest change in steps from which the slope is computed."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Parts of the tolerance that a point must keep when it is found: a fold moves with the level."""
+"""Parts of the tolerance that a point must meet when it is found, because a fold moves with the level."""
 _BEND_HZ = 0.05
 
 
 def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
-    """Begin from rest, follow the branch until it ends or leaves its range, ramp down.
+    """Start from rest, follow the branch until it ends or leaves its range, and ramp down.
 
-    Raises LimitExceeded at once where the loop would not hold the branch: before anything is yielded.
+    Raises LimitExceeded before anything is yielded if the loop would not hold the branch.
     """
     fast = fast_loop(loop.rig)
     require_held(fast, plan)
@@ -129,7 +129,7 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
 
 
 def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
-    """Raise what is played until the base has its level: the first motion that is met from rest."""
+    """Increase the drive until the base has its level; return the first motion reached from rest."""
     foreseen = solver.first()
     unknowns = foreseen.unknowns.copy()
     above = player.plan.begin_from == "above"
@@ -144,22 +144,22 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
         before, unknowns = seen, solver.corrected(harmonics, foreseen)
-        # A secant of its own: harmonics that are not yet zero move the level too, and no bracket lasts.
+        # Use a secant here: nonzero harmonics change the level too, so that no bracket stays valid.
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
             unknowns[1] -= min(max(wrong / slope, -most), most)
     if abs(wrong) > _NEAR:
         return None
-    # Level and harmonics that move each other settle slowly by what changes of all of them have told.
+    # Level and harmonics interact, and converge slowly if the derivative stems from joint changes only.
     yield from _probe(player, solver, seen, len(seen.unknowns))
     return (yield from _correct(player, solver, replace(foreseen, unknowns=seen.unknowns)))
 
 
 def _probe(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
-    """Go back to the last point, and learn again what the first of the unknowns do, each alone.
+    """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
-    Frequency and first coefficient are what usually changed. What is believed of the harmonics was learnt
-    on the way, from changes of all at once, and can leave equations that near a fold have no solution.
+    The derivatives of frequency and first coefficient change most. Those of the harmonics come from joint
+    changes, and can make the equations near a fold unsolvable.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -172,7 +172,7 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int)
 def _correct(
     player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen
 ) -> Controller[tuple[Seen, int] | None]:
-    """Find the point of the branch beside a foreseen one; gives it and how many settings were tried."""
+    """Find the point of the branch near a prediction; return it and the number of tries."""
     unknowns = foreseen.unknowns
     for tries in range(1, _MOST_TRIES + 1):
         seen = yield from _look_at(player, solver, unknowns)
@@ -220,31 +220,30 @@ def _record(
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:
-    """Whether the base moves as it should: its fundamental, and each harmonic."""
+    """Return whether fundamental and harmonics of the base are within the tolerance."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
 
 
 _EACH = 5
-"""Periods of a change: short beside growth, long beside what the upper modes need to follow."""
+"""Periods per change: short compared with the growth, long compared with the upper modes."""
 _LEAD, _TRIAL = 3, 8
-"""Changes before those that count, and changes by which their size is found."""
+"""Changes before those that are evaluated, and changes of the trial that finds their size."""
 _CHANGED = (0, 2)
-"""Coefficients that are changed: the first, and the third, at which the specimen pushes the table."""
+"""Perturbed coefficients: the first, and the third, at which the specimen also drives the table."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
-"""Of the first coefficient: the change of the trial, and the largest."""
+"""Size of the trial's change, and largest size, over the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion that differs by this part, and this many standard errors, from what it was is another one."""
+"""A motion differs from the one before beyond this share and this many standard errors."""
 _NEVER = 1e-9
 
 
 def perturbed_stability(
     player: BranchPlayer, channels: FeedbackChannels, setting: LoopSetting, number: int, before: LoopLook
 ) -> Controller[BranchStabilityNote]:
-    """Go through small changes of what is played twice, the second time with the other sign, and back.
+    """Play small changes of the drive, then the same with opposite sign; measure the motion before and after.
 
-    Their size, by a trial, is such that base and m0 change by as much as the plan says at most; the held
-    motion is looked at afterwards.
+    A trial sets their size to the plan's limit for the changes of base and m0.
     """
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz
@@ -262,7 +261,7 @@ def perturbed_stability(
 
 
 def _changes(count: int, seed: int) -> Coefficients:
-    """Return corners of a square at random, shape (count, coefficients)."""
+    """Return random signs, shape (count, coefficients)."""
     corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
@@ -270,7 +269,7 @@ def _changes(count: int, seed: int) -> Coefficients:
 def _play_changes(
     player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
 ) -> Controller[list[PhaseSamples]]:
-    """Go from change to change along half cosines, without a step."""
+    """Play the changes one after another, connected by half cosines."""
     told = []
     state = RunState.SETTLING if segment is None else RunState.RECORDING
     length_s = _EACH / setting.frequency_hz
@@ -291,7 +290,7 @@ def _join(told: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples
 def _fit(
     told: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
-    """Fit what was recorded; nothing is known where samples are missing between phases (a run was held)."""
+    """Fit the recorded motion; undetermined if samples between phases are missing (a held run)."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(told)):
         return OpenLoopMultiplier(nan, nan)
     base, m0 = _join(told, channels)
@@ -303,13 +302,13 @@ def _fit(
 def stability_note(
     found: OpenLoopMultiplier, number: int, asked: float, before: LoopLook, after: LoopLook
 ) -> BranchStabilityNote:
-    """Judge a fit; a motion that is another one afterwards was not the one that it is about."""
+    """Return the note on a fit; undetermined if the held motion has changed meanwhile."""
     error = float(np.hypot(before.m0_u[0], after.m0_u[0]) / abs(before.m0_m[0]))
     moved = float(abs(abs(after.m0_m[0] / before.m0_m[0]) - 1))
     low, high = found.bounds
     stability = Stability.OPEN
     if moved <= max(_SAME, _ERRORS * error):
-        # Comparisons with what is not a number are false: not determined.
+        # Comparisons with NaN are false, which means not determined.
         stability = Stability.STABLE if high < 1 else Stability.UNSTABLE if low > 1 else Stability.OPEN
     known = isfinite(found.size) and isfinite(found.error)
     return BranchStabilityNote(

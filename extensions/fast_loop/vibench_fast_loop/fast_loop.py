@@ -1,4 +1,4 @@
-"""The law of a fast loop for a rig, what its coefficients mean, and how it holds a branch by the model."""
+"""The law of a rig's fast loop, the calibration of its coefficients, and its predicted hold of a branch."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -35,12 +35,12 @@ from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Of the loop along a branch that is allowed: a departure falls to a third in a hundred periods."""
+"""Largest loop multiplier allowed along a branch: deviations fall to a third within a hundred periods."""
 
 
 @dataclass(frozen=True, eq=False)
 class FastLoop:
-    """The plant of a rig as its configuration describes it, and the law that was designed from it."""
+    """The plant of a rig according to its configuration, and its law."""
 
     rig: Rig
     plant: SampledPlant
@@ -48,7 +48,7 @@ class FastLoop:
 
     @property
     def feedback(self) -> LoopFeedback:
-        """The law as a controller takes it: of volts."""
+        """The law in volts, as a controller uses it."""
         units = np.array(_units_per_volt(self.rig))
         return LoopFeedback(
             step=_rows(self.law.step),
@@ -58,14 +58,16 @@ class FastLoop:
         )
 
     def gains(self, frequency_hz: float, harmonics: int) -> Coefficients:
-        """Return base displacement over volts at each harmonic, by the model [m/V], shape (harmonics,)."""
+        """Return base displacement per volt for each harmonic, from the model [m/V], shape (harmonics,)."""
         orders = range(1, harmonics + 1)
         return np.array([loop_transfer(self.plant, self.law, k * frequency_hz) for k in orders])
 
     def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
-        """Displacements of base and m0 in each block, from the first harmonic on [m], shape (blocks, orders).
+        """Return displacements of base and m0 per block, from the first harmonic on [m], shape (blocks,
+        orders).
 
-        A sample is the mean since the one before: half a step late, and a little small.
+        A sample is the mean since the previous one, which causes half a step of delay and a slight
+        attenuation.
         """
         orders, rate_hz = np.arange(1, len(blocks[0].base)), self.plant.timing.rate_hz
         turning = 2j * pi * frequency_hz * orders
@@ -78,7 +80,7 @@ class FastLoop:
 
 
 def fast_loop(rig: Rig) -> FastLoop:
-    """Design the law of a rig's controller; raises ConfigurationError where it has none."""
+    """Return the law of the rig's controller; raises ConfigurationError without a controller."""
     controller = rig.controller
     if controller is None:
         raise ConfigurationError(
@@ -92,13 +94,13 @@ def fast_loop(rig: Rig) -> FastLoop:
 
 
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
-    """Refuse a branch that the loop does not hold, by the model.
+    """Refuse a branch that the loop does not hold according to the model.
 
     Raises
     ------
     LimitExceeded
-        With the largest multiplier of the loop and how far it would hold, or with why that is not known.
-        Nothing was played.
+        With the largest multiplier and the range that would be held, or why they are unknown. Nothing was
+        played.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "whether the fast loop holds the branch is not known: "
@@ -141,7 +143,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
 
 
 def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
-    """Return the amplitude of the base's displacement that is held [m]."""
+    """Return the controlled amplitude of the base's displacement [m]."""
     return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2
 
 
@@ -157,31 +159,31 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Motions of a branch that are looked at, stable ones too: a late law may lose what needs none."""
+"""Number of motions of a branch to check; stable ones too, because a late law may destabilise them."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Of a motion that are gone through: as few as take a whole number of samples within this part of it."""
+"""Numbers of periods to try: the fewest with a whole number of samples within this tolerance."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Samples of a period by which the slope of the spring is known along it."""
+"""Samples per period for the slope of the spring; more with stops."""
 _PART_S = 1e-6
-"""Part of a sample for which the slope of stops is taken: a contact lasts a hundred of them."""
+"""Part of a sample for which the slope of stops is evaluated; a contact lasts a hundred parts."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
-"""Levels, over the one that is asked for, along which motions among stops are led down to it."""
+"""Decreasing levels, over the required one, that lead to a motion with impacts."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """What a law makes of the motions of a branch, from its start on."""
+    """Effect of a law on the motions of a branch, from its start on."""
 
     multiplier: float
-    """The largest over a period with the law acting."""
+    """Largest multiplier over a period with the law."""
     at_hz: float
-    """Where that is [Hz]."""
+    """Frequency of that multiplier [Hz]."""
     held_hz: float | None
-    """Up to where every motion is held; None where not even the first is [Hz]."""
+    """End of the range in which every motion is held [Hz]; None if the first is not."""
     folds: int
-    """That lie before."""
+    """Number of folds in that range."""
     end: ArcEnd | None
-    """Why the model left the branch."""
+    """Why the model's branch ended."""
 
 
 def branch_hold(
@@ -194,27 +196,27 @@ def branch_hold(
     way: Literal["up", "down"] = "up",
     allowed: float = 1.0,
 ) -> BranchHold | None:
-    """Follow the model's branch under one level of the base, and see how a law holds it.
+    """Follow the model's branch at one base level, and evaluate its stability under a law.
 
     Parameters
     ----------
     plant, law
-        As the host knows them; of a specimen without rigid stops.
+        Plant and law as known to the host; the specimen has no rigid stops.
     level_m
         Amplitude of the base's displacement [m].
     start_hz, range_hz
-        Where the branch begins, and where it is left [Hz].
+        Start and range of the branch [Hz].
     begin
-        From which side the level is met there: from rest, or from three times the level, which is where
-        motions with impacts are found; where there are no stops, from rest.
+        Approach to the level: from rest, or from three times the level, where motions with impacts are found;
+        always from rest without stops.
     way
-        Which way the branch is started.
+        Initial direction of frequency.
     allowed
-        Multiplier up to which a motion counts as held.
+        Largest multiplier of a held motion.
 
     Returns
     -------
-    None where the model has no motion to begin with.
+    None if the model has no motion at the start.
     """
     spring = spring_of(plant.specimen)
     if spring.kinks:
@@ -250,7 +252,7 @@ def impact_branch(
     range_hz: tuple[float, float],
     begin: Begin,
 ) -> Branch | None:
-    """Follow the branch that a loop would begin among stops; None where no motion repeats at its start."""
+    """Return the branch with impacts that a loop would follow; None if no motion repeats at its start."""
     state = None
     for factor in (1.0,) if begin == "rest" else _FROM_ABOVE:
         orbit = periodic_orbit(specimen, Harmonic(start_hz, factor * level_m), start=state)
@@ -263,7 +265,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Return the last motion of a branch up to which a law holds every one; None where it loses the first."""
+    """Return the last motion up to which a law holds all; None if it does not hold the first."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])
@@ -280,16 +282,16 @@ def _last_held(
 
 
 def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
-    """Return the largest multiplier over a period of motions of a branch, with the law acting.
+    """Return the largest multiplier over a period for motions of a branch under a law.
 
     Parameters
     ----------
     plant, law
-        `loop_multiplier`.
+        See `loop_multiplier`.
     branch
-        Of the plant's specimen.
+        Branch of the plant's specimen.
     points
-        Which of its motions.
+        Indices of its motions.
 
     Returns
     -------
@@ -303,20 +305,20 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
 def motion_slopes(
     specimen: Specimen, branch: Branch, point: int, rate_hz: float
 ) -> tuple[Floats, Floats, int, int]:
-    """Return the slopes of the spring's force along one motion of a branch, with all its harmonics.
+    """Return the slopes of the spring force along one motion of a branch, with all harmonics.
 
     Parameters
     ----------
     specimen, branch
-        The branch is the specimen's.
+        The branch of the specimen.
     point
-        Which of its motions.
+        Index of the motion.
     rate_hz
-        Samples a second.
+        Sample rate.
 
     Returns
     -------
-    Stiffness, damping, periods and parts, as `loop_multiplier` takes them.
+    Stiffness, damping, periods and parts for `loop_multiplier`.
     """
     spring = spring_of(specimen)
     drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))

@@ -1,4 +1,4 @@
-"""A branch that a fast loop held: its points in the order held, and their figure over the model's branch."""
+"""A branch held by a fast loop: its points in recorded order, and their figure with the model's branch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -41,33 +41,33 @@ from vibench.sim import (
 )
 
 _LEAST = 3
-"""Points that a turn needs."""
+"""Fewest points for a turn of the frequency."""
 
 
 @dataclass(frozen=True)
 class HeldBranch(Labelled):
-    """Motions of one branch; arrays of shape (points,), in the order in which they were held."""
+    """Motions of one branch in recorded order; arrays of shape (points,)."""
 
     frequency_hz: Reals
     base_m: Reals
     """Amplitude of the base's fundamental."""
     m0_m: Reals
-    """That of m0."""
+    """Amplitude of m0's fundamental."""
     phase_deg: Reals
-    """Phase of m0 over the base, as displacements."""
+    """Phase of m0 relative to the base, for displacements."""
     residue: Reals
-    """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
+    """Rms of the base's displacement harmonics from the second on, over its fundamental."""
     residue_acceleration: Reals
     stability: tuple[str, ...]
-    """Without feedback, under a base that moves as it should: a word of `Stability`; empty where unasked."""
+    """Stability without feedback under a sinusoidal base: a value of `Stability`; empty if not measured."""
     multiplier: Reals
-    """Largest over a period, as small changes told it; NaN where they told nothing."""
+    """Largest multiplier over a period, from small perturbations; NaN if undetermined."""
     multiplier_u: Reals
-    """Its standard uncertainty."""
+    """Standard uncertainty of the multiplier."""
 
     @property
     def folds(self) -> tuple[int, ...]:
-        """Points at which the frequency turned: motions between two of them lie on the way back."""
+        """Points at which the frequency turned; the branch runs backwards between two of them."""
         if self.frequency_hz.size < _LEAST:
             return ()
         ways = np.sign(np.diff(self.frequency_hz))
@@ -75,7 +75,7 @@ class HeldBranch(Labelled):
 
 
 def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
-    """Collect what a fast loop noted; empty where it held nothing."""
+    """Return the points that a fast loop noted; empty without any."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
     told = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
     asked = [told.get(each.point) for each in points]
@@ -95,7 +95,7 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
 
 
 def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
-    """Return how far a branch was followed, and what it turned at."""
+    """Return the extent of a branch and its turning points, in sentences."""
     found, ends = held_branch(notes), [each for each in notes if isinstance(each, BranchEndNote)]
     if not found.frequency_hz.size:
         return ("No motion of the branch was held.",)
@@ -118,11 +118,11 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
 
 _HEIGHT_IN = 4.4
 _ROOM_HZ = 1.0
-"""Range of the model's branch beyond the points held."""
+"""Range of the model's branch beyond the held points."""
 
 
 def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
-    """Draw amplitude and phase of m0 over frequency, in the order held, on the model's branch."""
+    """Draw amplitude and phase of m0 over frequency, in recorded order, with the model's branch."""
     found = held_branch(analysis.facts.feedback)
     scale, unit = prefixed(float(np.max(found.m0_m, initial=1e-9)), "m")
     with styled():
@@ -151,7 +151,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
 
 
 def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
-    """Sort points, with their marks: by their stability where it was asked for, else by the turns."""
+    """Group the points by stability if measured, else by direction of frequency, with plot styles."""
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):
@@ -169,7 +169,7 @@ def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, 
 
 
 def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:
-    """Follow the model's branch through the range of the points held; None where it has no start there."""
+    """Return the model's branch through the range of the held points; None without a motion at its start."""
     if not found.frequency_hz.size:
         return None
     amplitude_m = float(np.median(found.base_m))
@@ -200,4 +200,4 @@ HELD_BRANCH = replace(
     figures=lambda branch: iter((held_branch_figure(branch.analysis),)),
     findings=lambda branch: iter(branch_sentences(branch.analysis.facts.feedback)),
 )
-"""What a report shows of a branch."""
+"""Content of the report on a branch."""

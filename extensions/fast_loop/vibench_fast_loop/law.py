@@ -1,7 +1,7 @@
-"""The linear law of a controller: a Kalman filter of the sampled plant, and the feedback of its estimate.
+"""The linear law of a controller: a Kalman filter of the sampled plant, and feedback of its estimate.
 
-For a controller that takes no such law there is one of two gains. Multipliers of plant and law together tell
-whether a motion is stable under it.
+A controller that cannot run it uses a law of two gains. Multipliers of plant and law together show whether a
+motion is stable.
 """
 
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ from .plant import SampledPlant
 
 @dataclass(frozen=True)
 class LawWeights:
-    """What a law shall weigh; sizes of motion that go with a volt."""
+    """Weights of the design: sizes of motion, voltage and noise."""
 
     relative_m: float = 3e-5
-    """Motion of p that is worth a tenth of a volt of control."""
+    """Motion of p that is weighted like a tenth of a volt of control."""
     push_n: float = 3e-3
-    """Force between m1 and m2 that the filter expects without knowing it, rms over a step [N]."""
+    """Unknown force between m1 and m2 assumed by the filter, rms over a step [N]."""
     volt: float = 1e-2
-    """Unknown voltage, likewise [V]."""
+    """Unknown voltage assumed by the filter [V]."""
     acceleration: float = 0.2
-    """Noise of a sample of the base's acceleration [m/s2]."""
+    """Noise of a base acceleration sample [m/s2]."""
     velocity: float = 1e-4
-    """Noise of a sample of m0's velocity [m/s]."""
+    """Noise of an m0 velocity sample [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
-    """Volts u of samples s: u = output @ memory + direct @ s, then memory = step @ memory + inlet @ s."""
+    """Voltage u from samples s: u = output @ memory + direct @ s, then memory = step @ memory + inlet @ s."""
 
     step: Table
     """Shape (n, n)."""
@@ -49,17 +49,17 @@ class LinearLaw:
 
 
 def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
-    """Design the law that takes motion out of the spring between m1 and m2.
+    """Return the law that damps the spring between m1 and m2.
 
-    Linear-quadratic Gaussian (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch. 9), the
-    estimate being that of the moment of the sample.
+    Linear-quadratic Gaussian control (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch.
+    9), with the estimate at the time of the sample.
 
     Parameters
     ----------
     plant
-        As far as it is known; the law is made for its latency.
+        The known plant; the law includes its latency.
     weights
-        What is weighed.
+        Weights of the design.
     """
     step, volt, shown, cost, unknown, noise = _weigh(plant, weights)
     gain = _gain(step, volt[:, None], cost, np.eye(1))
@@ -71,20 +71,20 @@ def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Linea
 
 
 def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
-    """Design a law of two gains, by the measure of `design_law`: for a controller that takes no other.
+    """Return a law of two gains with the lowest cost of `design_law`, for a controller that takes no other.
 
-    ``u = -(kp s + kd d)`` of one sample s, its rate of change behind a low-pass ``d += a ((s - before) / step
-    - d)``, ``a = step / (tau + step)``. Both gains and tau are those of the least expected cost (W. S. Levine
-    and M. Athans, IEEE Trans. Autom. Control 15 (1970) 44).
+    ``u = -(kp s + kd d)`` of one sample s and its rate of change behind a low-pass ``d += a ((s - before) /
+    step - d)``, ``a = step / (tau + step)``. The gains and tau minimise the expected cost (W. S. Levine and
+    M. Athans, IEEE Trans. Autom. Control 15 (1970) 44).
 
     Parameters
     ----------
     plant
-        As far as it is known; the law is made for its latency.
+        The known plant; the law includes its latency.
     sample
-        Which is answered: 0 the base's acceleration, 1 m0's velocity.
+        Sample that is fed back: 0 the base's acceleration, 1 m0's velocity.
     weights
-        What is weighed.
+        Weights of the design.
     """
     problem, step_s = _weigh(plant, weights), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
@@ -107,7 +107,7 @@ def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights())
 
 
 class _Weighed(NamedTuple):
-    """A plant in the sizes of its motions, and what is weighed in it."""
+    """A plant scaled to the sizes of its motions, with the cost matrices."""
 
     step: Table
     volt: Vector
@@ -134,7 +134,7 @@ def _weigh(plant: SampledPlant, weights: LawWeights) -> _Weighed:
 
 
 def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
-    """Return what motion and volts cost a sample on average, under noise; infinite where they grow."""
+    """Return the mean cost per sample under noise; infinite for an unstable loop."""
     answer = np.hstack([law.direct @ problem.shown, law.output])[0]
     own = len(problem.step)
     closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
@@ -163,21 +163,21 @@ def loop_multiplier(
     periods: int = 1,
     parts: int = 1,
 ) -> float:
-    """Return the largest multiplier over a period of a motion, with the law acting: below 1 it is held.
+    """Return the largest multiplier of a motion over a period under a law; below 1 the motion is held.
 
     Parameters
     ----------
     plant
-        What is driven; not the one of the design where that was not exact.
+        The driven plant, which may differ from that of the design.
     law
-        Designed for the same latency, or another.
+        A law designed for this or another latency.
     stiffness, damping
         Slopes dF/dp [N/m] and dF/d(dp/dt) [N s/m] of the stops' force along the motion, in the middle of each
         part of each sample, shape (samples * parts,).
     periods
-        Over how many periods the slopes go; as many as take a whole number of samples, or nearly so.
+        Periods covered by the slopes; the number of samples must be whole, or nearly so.
     parts
-        Of a sample: contacts are shorter.
+        Parts per sample, because contacts are shorter than a sample.
     """
     stretches = _tables_of_step(plant, law, parts)
     into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)
@@ -198,9 +198,9 @@ def loop_multiplier(
 
 
 def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:
-    """Return the base's displacement per volt of what is played beside the law's answer [m/V].
+    """Return the base's displacement per volt of the program, with the law active [m/V].
 
-    The phases are those at the moments of the samples; the motion is that without stops.
+    Phases refer to the sample times; the motion is the one without stops.
     """
     before, after = _tables_of_step(plant, law, 1)
     played = np.concatenate([plant.stretches()[0][1], np.zeros(len(law.step)), [1.0]])
@@ -209,7 +209,7 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 
 
 def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
-    """Stretches of a step of plant, memory of the law, and the volt it gives, which all of them need."""
+    """Return matrices for the sections of a step: plant, memory of the law, and the voltage common to all."""
     own, memory = plant.size, len(law.step)
     answer = np.hstack([law.direct @ plant.shown, law.output])
     (first, of_first), *others = plant.stretches(parts)

@@ -1,4 +1,4 @@
-"""A real-time controller that speaks lines of JSON over a socket (`vibench_fast_loop.protocol`)."""
+"""A real-time controller with lines of JSON over a socket (`vibench_fast_loop.protocol`)."""
 
 import json
 from typing import Self, TypeVar
@@ -14,13 +14,13 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import LoopFacts, LoopProgram, LoopReport, LoopRequest
 
 _PART = 0.01
-"""How far a rate may be from what the configuration says."""
+"""Largest relative deviation of a rate from the configuration."""
 _LEAVING_S = 0.1
 Answer = TypeVar("Answer", bound=BaseModel)
 
 
 class LineController:
-    """The host's end of a connection to a real-time controller."""
+    """The host's side of a connection to a real-time controller."""
 
     def __init__(self, link: Link, config: ControllerConfig) -> None:
         self._link = link
@@ -31,7 +31,7 @@ class LineController:
 
     @classmethod
     def open(cls, config: ControllerConfig) -> Self:
-        """Connect, silence whatever plays, and compare the controller with its configuration."""
+        """Connect, silence the output, and compare the controller with its configuration."""
         if not config.resource:
             raise ConfigurationError(
                 "controller.resource is empty, and only a virtual rig knows where its controller is; give "
@@ -56,24 +56,24 @@ class LineController:
 
     @property
     def identity(self) -> Identity:
-        """Who answered."""
+        """Identity of the controller."""
         facts = self.facts
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Go over to a program."""
+        """Change to a program."""
         return self._asked(LoopRequest(ask="play", program=program), LoopReport)
 
     def report(self) -> LoopReport:
-        """Hand over what has been measured since the last report."""
+        """Return the blocks measured since the last report."""
         return self._asked(LoopRequest(ask="report"), LoopReport)
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down and be silent."""
+        """Ramp down to silence."""
         return self._asked(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
 
     def close(self) -> None:
-        """Silence, and end the connection; where it is gone already, its watchdog silences it."""
+        """Silence the output and close the connection; if it is lost, the watchdog silences the output."""
         if self._is_open:
             try:
                 self.silence(_LEAVING_S)

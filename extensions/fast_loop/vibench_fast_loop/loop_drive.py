@@ -1,4 +1,4 @@
-"""A real-time controller as a drive: programs go down, and it is talked to as long as it plays."""
+"""A real-time controller as a drive: sends programs, and requests reports while it plays."""
 
 from collections.abc import Iterable, Iterator
 
@@ -11,9 +11,9 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import ControllerDriver, LoopBlock, LoopController, LoopProgram, LoopState, ProgramTone
 
 TALK = 0.25
-"""It is talked to after this part of its watchdog's time at the latest."""
+"""Longest interval between requests, as a part of the watchdog's time."""
 QUICK_S = 0.1
-"""Ramp of the ways out on which no samples can be counted [s]."""
+"""Ramp duration when no samples are counted [s]."""
 _ROUNDING_S = 1e-9
 
 
@@ -24,7 +24,7 @@ class LoopDrive:
     is_commanded = False
     pause_s = 0.0
     can_hold = False
-    """What it plays must be talked to."""
+    """It cannot hold unattended, because the watchdog needs requests."""
 
     def __init__(self, controller: LoopController, measurement: Measurement) -> None:
         self._controller = controller
@@ -34,7 +34,7 @@ class LoopDrive:
 
     @staticmethod
     def open(config: ControllerConfig) -> LoopController:
-        """Connect to the controller of a hardware configuration, silent."""
+        """Connect to the controller of a hardware configuration and silence it."""
         driver: ControllerDriver = driver_of(PlugInKind.CONTROLLER, config.driver, ControllerDriver)
         return driver.open(config)
 
@@ -45,22 +45,22 @@ class LoopDrive:
 
     @property
     def is_playing(self) -> bool:
-        """Whether there is anything to ramp down."""
+        """Whether a program is playing."""
         return self._program is not None
 
     @property
     def coefficients(self) -> tuple[LoopBlock, ...]:
-        """What was measured since the phase began."""
+        """Coefficients measured since the start of the phase."""
         return tuple(self._blocks)
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Nothing to get ready: it is silent."""
+        """Do nothing; the controller is silent already."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Nothing to prepare."""
+        """Do nothing."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Tell it what to play, and talk to it while it does; yields how long to read between [s]."""
+        """Play a phase with regular requests; yields the reading time until the next one [s]."""
         self._blocks = []
         if phase.state is RunState.RAMPING_DOWN:
             self._silence(phase.duration_s)
@@ -71,16 +71,16 @@ class LoopDrive:
         yield from self._talking(phase.duration_s)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Let it ramp down from what it plays."""
+        """Ramp down."""
         self._silence(ramp_s)
         yield from self._talking(ramp_s)
 
     def cut(self) -> None:
-        """Silence it, with a step."""
+        """Silence the output at once."""
         self._silence(0.0)
 
     def silence(self) -> None:
-        """Silence it, whatever happens."""
+        """Silence the output, whatever the state."""
         self._silence(QUICK_S)
 
     def _play(self, play: Play, ramp_s: float | None) -> None:
@@ -98,9 +98,9 @@ class LoopDrive:
         if ramp_s is not None:
             told = told.model_copy(update={"glide_s": ramp_s})
         if told != self._program:
-            # Before the command: should it fail half-way, it counts as playing.
+            # Set before the command, so that a failed command counts as playing.
             self._program = told
-            self._controller.play(told)  # what it measured of the program before is dropped
+            self._controller.play(told)  # discards the blocks of the previous program
 
     def _talking(self, duration_s: float) -> Iterator[float]:
         longest_s = TALK * self._controller.facts.watchdog_s

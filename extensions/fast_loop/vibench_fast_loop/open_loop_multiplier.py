@@ -1,29 +1,28 @@
-"""Whether a motion that feedback holds would be stable without it: told by small changes of what is played.
+"""Stability of a held motion without feedback, estimated from small perturbations of the drive.
 
-Near a motion of period T the specimen obeys a linear equation with coefficients of that period, driven by
-what the base does besides its sine. Controller, amplifier, shaker and the specimen's push on the table act on
-the specimen through the base alone. The base is measured: with it as the input, the fit is one of the open
-loop, and its multipliers are those under a base that moves as prescribed, whatever law held the motion and
-however little is known of it. D. A. W. Barton, Mech. Syst. Signal Process. 84 (2017) 54, fits a periodic
-autoregression with inputs for the same purpose.
+Near a motion of period T the specimen obeys a linear equation with T-periodic coefficients, driven by the
+deviations of the base from its sine. Controller, amplifier, shaker and the reaction of the specimen on the
+table act on the specimen through the base alone. The base is measured and used as the input, so the fit
+describes the open loop: its multipliers are those under a prescribed base motion, for any law, known or not.
+D. A. W. Barton, Mech. Syst. Signal Process. 84 (2017) 54, fits a periodic autoregression with inputs for the
+same purpose.
 
-Small deviations are slow beside the drive where a multiplier lies near 1, so that complex envelopes tell
-them: z of m0 at the drive's frequency, b1 and b3 of the base at one and three times that. What is fast (the
-upper modes, the third harmonic of m0) follows them, and is expanded in derivatives of the input:
+Where a multiplier is near 1, small deviations are slow compared with the drive, and complex envelopes
+describe them: z of m0 at the drive frequency, b1 and b3 of the base at one and three times that. Fast parts
+(the upper modes, the third harmonic of m0) follow them, and are expanded in derivatives of the input:
 
-    dz/dt = A z + B0 b1 + B1 db1/dt + B2 d2b1/dt2 + C0 b3 + C1 db3/dt,
+dz/dt = A z + B0 b1 + B1 db1/dt + B2 d2b1/dt2 + C0 b3 + C1 db3/dt,
 
 each letter a real 2 x 2 matrix on real and imaginary part, since springs that change twice a period couple a
-deviation to its conjugate. Multipliers: exp(T eig A). Both harmonics must be changed independently of each
-other: the specimen pushes the table at three times the frequency as well, and b3 would else follow from z.
+deviation to its conjugate. Multipliers: exp(T eig A). Both harmonics must be perturbed independently, because
+the specimen also drives the table at three times the frequency, and b3 would otherwise follow from z.
 
-Noise of the sensors in z and b biases least squares towards stability. What is played goes through its
-changes twice, the second time with the other sign, and each repeat is the instrument of the other
-(T. Soderstrom, Automatica 43 (2007) 939): their noises are independent, and what is even in the changes,
-curvature of the branch above all, has opposite signs and drops out as well.
+Sensor noise in z and b biases least squares towards stability. Therefore the changes are played twice, the
+second time with opposite sign, and each half is the instrument of the other (T. Soderstrom, Automatica 43
+(2007) 939). Their noises are independent, and even effects, above all the curvature of the branch, cancel.
 
-Not seen: growth that changes sign from period to period (a multiplier near -1), and, in motions without the
-symmetry of two equal stops, the second harmonic of the base.
+Not detected: growth with alternating sign (a multiplier near -1), and the second harmonic of the base in
+motions without the symmetry of two equal stops.
 """
 
 from dataclasses import dataclass
@@ -36,22 +35,22 @@ from vibench.sim.specimen.state import Table, Vector
 
 Complexes = NDArray[np.complex128]
 _HALF = 4
-"""Half the length of the window of an envelope [periods]."""
+"""Half length of an envelope's window [periods]."""
 _EACH = 4
-"""Envelopes a period."""
+"""Envelope values per period."""
 _INPUTS = {1: 2, 3: 1}
-"""Harmonics of the base, and the highest derivative that is taken of each."""
+"""Harmonics of the base, and the highest derivative used of each."""
 _BLOCK = 8
-"""Periods after which what is left over counts as independent."""
+"""Periods per block; residuals of different blocks count as independent."""
 _MODEL = 0.01
-"""What the expansion leaves out, as a standard error: bias of noiseless motions (docs/decisions/0069)."""
+"""Standard error from the truncated expansion: bias of noiseless motions (docs/decisions/0069)."""
 _QUANTILE = 2.1
-"""Quantile of Student's distribution at 95 % with the twenty degrees of freedom of as many blocks."""
+"""95 % quantile of Student's distribution for about twenty blocks."""
 
 
 @dataclass(frozen=True, eq=False)
 class PerturbedMotion:
-    """Base and m0 while what is played is changed a little."""
+    """Base and m0 during small changes of the drive."""
 
     base: Vector
     """Acceleration, in any unit, shape (samples,)."""
@@ -60,14 +59,14 @@ class PerturbedMotion:
     period: float
     """Period of the drive [samples]."""
     first: int
-    """Sample at which the changes begin to be gone through; before it lies the end of their second half."""
+    """First sample of the changes; the end of their second half precedes it."""
     periods: int
-    """That they take; then they are gone through once more with the other sign."""
+    """Periods of the changes; the same number follows with opposite sign."""
 
 
 @dataclass(frozen=True)
 class OpenLoopMultiplier:
-    """The largest multiplier over a period of a motion under a base that moves as prescribed."""
+    """Largest multiplier over a period of a motion under a prescribed base motion."""
 
     size: float
     error: float
@@ -75,21 +74,21 @@ class OpenLoopMultiplier:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Interval of 95 %."""
+        """95 % interval."""
         return self.size - _QUANTILE * self.error, self.size + _QUANTILE * self.error
 
 
 def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
-    """Fit the equation of slow deviations to a perturbed motion, and give its largest multiplier.
+    """Return the largest multiplier, by a fit of the equation of slow deviations to a perturbed motion.
 
     Parameters
     ----------
     motion
-        At least some thirty periods of changes, each a few periods long.
+        At least about thirty periods of changes, each several periods long.
 
     Returns
     -------
-    An error that is not finite where the changes tell nothing.
+    A result with a non-finite error if the changes are insufficient.
     """
     rows = 2 * motion.periods * _EACH
     steps = motion.period / _EACH
@@ -112,14 +111,14 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
 
 
 def envelope_deviation(signal: Vector, period: float) -> float:
-    """Return the rms deviation of a signal's fundamental from its mean and drift, over that mean.
+    """Return the relative rms deviation of a signal's fundamental from its mean and drift.
 
     Parameters
     ----------
     signal
-        At least some twenty periods, shape (samples,).
+        At least about twenty periods, shape (samples,).
     period
-        Of the drive [samples].
+        Period of the drive [samples].
     """
     half = round(_HALF * period)
     turn = np.exp(-2j * np.pi * np.arange(len(signal)) / period)
@@ -129,7 +128,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
 
 
 def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
-    """Give the largest multiplier, and its error by what is left over in blocks of periods (delta method)."""
+    """Return the largest multiplier and its error from residuals in blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]
@@ -144,7 +143,7 @@ def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vecto
 
 
 def _turn(motion: PerturbedMotion) -> Complexes:
-    """Give the carrier at the drive's frequency as the base shows it: clocks differ by parts in a million."""
+    """Return the carrier at the drive frequency, estimated from the base because clocks differ."""
     turn = np.exp(-2j * np.pi * np.arange(len(motion.base)) / motion.period)
     inside = slice(motion.first, motion.first + round(2 * motion.periods * motion.period))
     phase = np.unwrap(np.angle(_envelope(motion.base, turn, motion.period, 0)[inside]))
@@ -153,7 +152,7 @@ def _turn(motion: PerturbedMotion) -> Complexes:
 
 
 def _envelope(signal: Vector, turn: Complexes, period: float, order: int) -> Complexes:
-    """Return a derivative of an envelope, per period, under a window cos^4 of several periods."""
+    """Return a derivative of an envelope, per period, with a cos^4 window of several periods."""
     half = round(_HALF * period)
     place = np.arange(-half, half + 1) / half * np.pi / 2
     per_period = np.pi / 2 * period / half
@@ -171,6 +170,6 @@ def _parts(columns: list[Complexes]) -> Table:
 
 
 def _detrend(table: Table) -> Table:
-    """Take mean and drift out."""
+    """Remove mean and drift."""
     line = np.column_stack([np.ones(len(table)), np.linspace(-1, 1, len(table))])
     return np.asarray(table - line @ np.linalg.lstsq(line, table, rcond=None)[0])

@@ -1,4 +1,4 @@
-"""Amplifier, shaker and specimen between two samples of a controller, as linear equations. SI units."""
+"""Linear equations of amplifier, shaker and specimen between two controller samples. SI units."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,19 +13,19 @@ from vibench.sim.specimen.specimen import Specimen
 from vibench.sim.specimen.state import Table, Vector
 
 TABLE_V, M0_X = 1, 3
-"""Rows of the table's velocity and of m0's displacement in the state of table and specimen."""
+"""Rows of the table velocity and the m0 displacement in the state of table and specimen."""
 SHOWN = 2
-"""Base acceleration and m0 velocity."""
+"""Number of measured quantities: base acceleration and m0 velocity."""
 
 
 @dataclass(frozen=True)
 class LoopTiming:
-    """When a controller samples, and when what it sampled is answered."""
+    """Sample rate and latency of a controller."""
 
     rate_hz: float
-    """Samples a second; each is the mean since the one before."""
+    """Samples per second; each is the mean since the previous one."""
     latency_s: float
-    """Latency from a sample to the voltage that depends on it [s]."""
+    """Time from a sample to the voltage that depends on it [s]."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):
@@ -40,23 +40,23 @@ class LoopTiming:
 
 @dataclass(frozen=True, eq=False)
 class SampledPlant:
-    """What one step of a controller makes of everything that it drives.
+    """Discrete-time model of the plant for one control step.
 
-    Its state: table (displacement, velocity, current), specimen (x, y, z and velocities), what was sampled
-    last (table velocity, m0 displacement), and the volts that are on their way, newest first.
+    State: table (displacement, velocity, current), specimen (x, y, z and velocities), the last samples (table
+    velocity, m0 displacement), and the delayed voltages, newest first.
     """
 
     amplifier: Amplifier
-    """Its lower band edge is left out: it lies far below what is held."""
+    """Its lower band edge is neglected, because it lies far below the drive."""
     shaker: Shaker
     specimen: Specimen
     timing: LoopTiming
     stiffness: float = 0.0
-    """Added to the spring between m1 and m2: what a motion makes of the stops on average [N/m]."""
+    """Added to the spring between m1 and m2: mean effect of the stops on a motion [N/m]."""
 
     @cached_property
     def equations(self) -> tuple[Table, Vector]:
-        """Rates of table and specimen, shape (9, 9), and what a volt at the amplifier's input adds, (9,)."""
+        """System matrix of table and specimen, (9, 9), and the effect of a volt at the amplifier, (9,)."""
         table = self.shaker.equations()
         specimen, mass = self.specimen, np.asarray(self.specimen.masses)
         along = np.array([0.0, 1.0, -1.0])
@@ -77,7 +77,7 @@ class SampledPlant:
 
     @cached_property
     def spring(self) -> tuple[Vector, Vector]:
-        """What a force between m1 and m2 adds to the rates of the whole state, and p in it, (n,) each."""
+        """Effect of a force between m1 and m2 on the state's rates, and the row that gives p, (n,) each."""
         into, relative = np.zeros(self.size), np.zeros(self.size)
         into[7], into[8] = -1.0 / self.specimen.masses[1], 1.0 / self.specimen.masses[2]
         relative[4], relative[5] = 1.0, -1.0
@@ -85,25 +85,25 @@ class SampledPlant:
 
     @property
     def waiting(self) -> int:
-        """Volts on their way."""
+        """Number of delayed voltages."""
         return ceil(self.timing.latency_s * self.timing.rate_hz * (1.0 - 1e-9))
 
     @property
     def size(self) -> int:
-        """Numbers in the state."""
+        """Length of the state vector."""
         return 9 + SHOWN + self.waiting
 
     @cached_property
     def scales(self) -> Vector:
-        """Sizes of the state's parts in motions of micrometres, shape (n,)."""
+        """Sizes of the state's entries in motions of micrometres, shape (n,)."""
         specimen = [1e-6] * 3 + [1e-3] * 3
         return np.array([1e-6, 1e-3, 1e-2, *specimen, 1e-3, 1e-6, *[1e-2] * self.waiting])
 
     def stretches(self, parts: int = 1) -> tuple[tuple[Table, Vector], ...]:
-        """Give the stretches of a step between the middles of its parts, ends included, one more than parts.
+        """Return the transitions between the middles of a step's parts, ends included, one more than parts.
 
-        Each is state before to state after, (n, n), and what the new volt adds, (n,). The spring between m1
-        and m2 acts between them (Strang splitting).
+        Each is a state transition, (n, n), and the effect of the new voltage, (n,). The spring between m1 and
+        m2 acts between them (Strang splitting).
         """
         step, size = self.timing.step_s, self.size
         sampled = np.eye(size)
@@ -121,24 +121,24 @@ class SampledPlant:
 
     @cached_property
     def step(self) -> tuple[Table, Vector]:
-        """State and new volt before to the state after a whole step, shapes (n, n) and (n,)."""
+        """Transition of a whole step: matrices of state and new voltage, shapes (n, n) and (n,)."""
         (first, volt), (second, more) = self.stretches()
         return second @ first, second @ volt + more
 
     @cached_property
     def shown(self) -> Table:
-        """Base acceleration and m0 velocity of a state, means since the last sample, shape (2, n)."""
+        """Matrix of base acceleration and m0 velocity, as means since the last sample, shape (2, n)."""
         rows = np.zeros((SHOWN, self.size))
         rows[0, [TABLE_V, 9]] = self.timing.rate_hz, -self.timing.rate_hz
         rows[1, [M0_X, 10]] = self.timing.rate_hz, -self.timing.rate_hz
         return rows
 
     def _stretch(self, start_s: float, stop_s: float) -> tuple[Table, Vector]:
-        """Move table and specimen through a part of a step, under the oldest volt and then the next."""
+        """Return the transition of a part of a step, under the oldest voltage and then the next."""
         late_s = self.timing.latency_s - max(self.waiting - 1, 0) * self.timing.step_s
         change_s = min(max(late_s, start_s), stop_s)
         matrix, newest = np.eye(self.size), np.zeros(self.size)
-        # The volts on their way end with the oldest; the newest, which this step begins, comes before them.
+        # The list of delayed voltages ends with the oldest; the new voltage precedes them.
         columns = [*range(11, self.size)][::-1]
         for place, (begin_s, end_s) in enumerate(((start_s, change_s), (change_s, stop_s))):
             moved, gain = _driven(*self.equations, end_s - begin_s)

@@ -1,4 +1,4 @@
-"""What passes between a host and a real-time controller: programs go down, Fourier coefficients come back.
+"""Messages between a host and a real-time controller: programs down, Fourier coefficients back.
 
 Version 1 of the protocol. Each message is one line of JSON, answered by one line; the host always begins.
 ``{"vibench_loop": 1, "ask": "hello" | "play" | "report" | "silence", ...}``; docs/feedback.md has the rest.
@@ -18,7 +18,7 @@ from vibench.sim import FrozenModel
 LOOP_PROTOCOL: Final = 1
 MOST_HARMONICS = 20
 MOST_MEMORY = 64
-"""Numbers that a feedback may remember."""
+"""Largest size of a feedback's memory."""
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, ...]
 Pair = tuple[Finite, Finite]
@@ -50,27 +50,27 @@ class LoopFeedback(FrozenModel):
 
 
 class LoopProgram(FrozenModel):
-    """What a controller plays: a Fourier series, and the answer of a law to what it samples.
+    """What a controller plays: a Fourier series plus the output of a law.
 
-    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, theta the controller's own phase, which goes
-    on without a jump from program to program.
+    ``v(t) = sum Re(reference_k exp(i k theta)) + u``; theta is the controller's phase, which is continuous
+    from program to program.
     """
 
     frequency_hz: PositiveFloat
     reference_v: tuple[Pair, ...] = Field(min_length=1, max_length=MOST_HARMONICS)
     """Coefficients from the first harmonic on, as pairs [V]."""
     feedback: LoopFeedback | None = None
-    """None for none; a law that is the same as before keeps its memory."""
+    """None for no feedback; an unchanged law keeps its memory."""
     glide_s: NonNegativeFloat = 0.1
-    """Time in which frequency and coefficients go over to those of now, along a half cosine [s]."""
+    """Duration of the change to this program's frequency and coefficients, along a half cosine [s]."""
     block_periods: int = Field(default=10, ge=2, le=1000)
-    """Periods over which the coefficients that come back are taken, under a Hann window."""
+    """Periods of a block of measured coefficients, with a Hann window."""
     harmonics: int = Field(default=9, ge=1, le=MOST_HARMONICS)
-    """Highest harmonic that comes back."""
+    """Highest measured harmonic."""
 
 
 class LoopState(StrEnum):
-    """What a controller does."""
+    """State of a controller."""
 
     SILENT = "silent"
     PLAYING = "playing"
@@ -79,31 +79,31 @@ class LoopState(StrEnum):
 
 
 class LoopBlock(FrozenModel):
-    """Fourier coefficients over one block of periods, from the mean on, as pairs in volts."""
+    """Fourier coefficients of one block of periods, from the mean on, as pairs in volts."""
 
     end_s: float
-    """End by the controller's clock [s]."""
+    """End of the block by the controller's clock [s]."""
     steady: bool
-    """Whether nothing was changed while it lasted."""
+    """Whether nothing changed during the block."""
     output: tuple[Pair, ...]
-    """Output of what is played."""
+    """Output of the program."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
 
 class LoopReport(FrozenModel):
-    """What a controller says of itself; blocks are handed over once."""
+    """Report of a controller; each block is reported once."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     state: LoopState
     reason: str = ""
-    """Why it is ending, or silent, if it was not told to."""
+    """Why it is ending or silent without a command."""
     time_s: float
     blocks: tuple[LoopBlock, ...] = ()
 
 
 class LoopFacts(FrozenModel):
-    """Who a controller is, and what it can do."""
+    """Identity and capabilities of a controller."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     name: str
@@ -115,11 +115,11 @@ class LoopFacts(FrozenModel):
     watchdog_s: PositiveFloat
     """Time without a request after which it ramps down [s]."""
     pd_of: LoopInput | None = None
-    """Of which input alone it takes a law, proportional and derivative; None: any linear law."""
+    """The only input on which it takes a proportional-derivative law; None: any linear law."""
 
 
 class LoopRequest(FrozenModel):
-    """One question or command of the host."""
+    """A request of the host."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     ask: Literal["hello", "play", "report", "silence"]
@@ -131,36 +131,36 @@ class LoopRequest(FrozenModel):
 
 @dataclass(frozen=True)
 class ProgramTone(LoopTone):
-    """A sine with the program by which a controller plays it."""
+    """A sine with the controller's program that plays it."""
 
     program: LoopProgram | None = None
 
 
 class LoopController(RealTimeController, Protocol):
-    """A loop of its own from two sensors to the amplifier, which a host tells what to play."""
+    """A control loop from two sensors to the amplifier, with programs from a host."""
 
     @property
     def facts(self) -> LoopFacts:
         """Rate, latency, limit and watchdog."""
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Go over to a program, along its glide."""
+        """Change to a program, along its glide."""
 
     def report(self) -> LoopReport:
-        """Hand over what has been measured since the last report; its watchdog hears it.
+        """Return the blocks measured since the last report, and restart the watchdog.
 
         Raises
         ------
         InstrumentLost
-            When nobody answers.
+            When the controller does not answer.
         """
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down and be silent. Legal at any time."""
+        """Ramp down to silence; allowed at any time."""
 
 
 class ControllerDriver(Protocol):
-    """What an entry point of ``vibench.controllers`` is."""
+    """Type of an entry point of ``vibench.controllers``."""
 
     def open(self, config: ControllerConfig) -> LoopController:
-        """Connect to a controller, silent; raises InstrumentError where none answers, or another one."""
+        """Connect to a controller and silence it; raises InstrumentError if none or another one answers."""

@@ -1,8 +1,8 @@
 """The simulated real-time controller: a law and a Fourier series, sample by sample, and lines of JSON.
 
-It speaks version 1 of the protocol of `vibench_fast_loop.protocol`. Its watchdog counts its own samples:
-when no host has said anything for so long it ramps down, and needs nobody for that. Between the world and
-the controller: its samples are means over its step, its volts come late.
+It implements version 1 of `vibench_fast_loop.protocol`. Its watchdog counts its own samples and ramps down by
+itself when no host has sent a request for too long. Samples are means over a control step, and voltages are
+delayed.
 """
 
 import json
@@ -36,24 +36,24 @@ from .protocol import (
 
 FloatArray = NDArray[np.float64]
 RAMP_S = 0.05
-"""How fast it ramps down by itself [s]."""
+"""Ramp duration when it ends by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
-"""Time at the output's limit after which the law counts as failed and the output ramps down [s]."""
+"""Time at the output limit after which the law counts as failed and the output ramps down [s]."""
 MOST_BLOCKS = 2000
-"""Blocks kept for a host that does not ask for them."""
+"""Most blocks kept for a host that does not fetch them."""
 
 
 class VirtualController:
-    """A real-time controller between two sensors and the amplifier; any thread may call it.
+    """A real-time controller between two sensors and the amplifier; calls are thread-safe.
 
     Parameters
     ----------
     facts
-        Who it is, and what it can do.
+        Identity and capabilities.
     clock
         Rig time [s].
     grid_rate_hz
-        Steps a second of the world that it samples; a whole number of them from sample to sample.
+        Steps per second of the simulated world; a whole number per sample.
     """
 
     def __init__(self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float) -> None:
@@ -68,16 +68,16 @@ class VirtualController:
         self._program: LoopProgram | None = None
         self._now = self._new()
         self.cables = LoopCables(self)
-        """Between it and the world."""
+        """Connects it to the simulated world."""
 
     @property
     def is_on(self) -> bool:
-        """Whether anything is played."""
+        """Whether a program is playing."""
         return self._state is not LoopState.SILENT
 
     @contextmanager
     def answering(self) -> Iterator[Structure]:
-        """Hand out what samples are answered with; nothing is changed by its host meanwhile.
+        """Yield the state used to process samples, locked against changes by the host.
 
         A `Controller` of native/structures.hpp.
         """
@@ -85,7 +85,7 @@ class VirtualController:
             yield self._now
 
     def attend(self, time_s: float) -> None:
-        """Keep a block, end, or be silent, as the samples up to a rig time ask for."""
+        """Store a block, ramp down or fall silent, as required by the samples up to a rig time."""
         with self._turn:
             if self._now["done"]:
                 self._keep_block(time_s)
@@ -99,7 +99,7 @@ class VirtualController:
                 now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def execute(self, message: bytes) -> Reply:
-        """Carry out one line of the protocol, and give the line that answers it."""
+        """Execute one line of the protocol and return the line that answers it."""
         try:
             request = LoopRequest.model_validate_json(message)
         except ValidationError as error:
@@ -175,7 +175,7 @@ class VirtualController:
 
 
 class _LoopEnd(IntEnum):
-    """How the engine ends a call; `LoopEnd` in native/world.hpp."""
+    """How a native call ends; `LoopEnd` in native/world.hpp."""
 
     COMPLETE = 0
     NEEDS_ATTENTION = 1
@@ -183,9 +183,9 @@ class _LoopEnd(IntEnum):
 
 
 class LoopCables:
-    """Hands a controller its samples, on a grid since the world began, and plays its volts.
+    """Passes samples to a controller and plays its voltages, on a fixed time grid.
 
-    While it is silent the world does not stop for it.
+    The simulated world continues while the controller is silent.
     """
 
     def __init__(self, loop: VirtualController) -> None:
@@ -196,7 +196,7 @@ class LoopCables:
 
     @property
     def is_on(self) -> bool:
-        """Whether the controller plays, or volts are still on their way."""
+        """Whether the controller plays or delayed voltages remain."""
         return self._loop.is_on or bool(self._late.any())
 
     def move(
@@ -209,7 +209,7 @@ class LoopCables:
         motion: ShakenMotion,
         signals: FloatArray,
     ) -> int:
-        """Move the shaker as `ClosedLoop` says."""
+        """Advance the shaker as defined in `ClosedLoop`."""
         cables, drive = self._cables, signals[Signal.DRIVE]
         cables["first"], cables["begin"] = first, 0
         base = sensors[0].showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
@@ -230,7 +230,7 @@ class LoopCables:
 def controller_of(
     config: ControllerConfig, grid_rate_hz: float, clock: Callable[[], float]
 ) -> VirtualController:
-    """Make the controller that a hardware configuration describes."""
+    """Return the controller described by a hardware configuration."""
     told = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
     facts = LoopFacts(name="simulated controller", serial="virtual", **told)
     return VirtualController(facts, clock, grid_rate_hz)

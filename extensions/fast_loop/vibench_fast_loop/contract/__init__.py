@@ -1,1 +1,1 @@
-"""Contract tests of real-time controllers: whether a driver keeps the promises of `LoopController`."""
+"""Contract tests of real-time controllers: does a driver fulfil `LoopController`?"""

@@ -1,4 +1,4 @@
-"""The bench and the options are those of the contract tests of vibench."""
+"""Uses bench and options of vibench's contract tests."""
 
 from vibench.acquisition.contract.conftest import bench, pytest_collection_modifyitems, rig
 

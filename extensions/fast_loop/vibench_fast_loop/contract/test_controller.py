@@ -1,4 +1,4 @@
-"""What every real-time controller must do: play its program, report its inputs, end by itself."""
+"""Requirements on every real-time controller: it plays its program, reports its inputs, ends by itself."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -16,9 +16,9 @@ from ..protocol import LoopBlock, LoopController, LoopFeedback, LoopProgram, Loo
 KIND = PlugInKind.CONTROLLER
 TONE_HZ = 160.0
 TALK_S = 0.1
-"""Between two reports: shorter than any watchdog."""
+"""Interval between reports, shorter than any watchdog."""
 LAW = 0.05
-"""Of what is played: what the law adds to it."""
+"""Contribution of the law, relative to the program."""
 
 
 def controller_of(bench: Bench) -> LoopController:
@@ -38,7 +38,7 @@ def series(bench: Bench, feedback: LoopFeedback | None = None) -> LoopProgram:
 
 
 def listened(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
-    """Read for a time, and send requests to the controller meanwhile."""
+    """Read samples for a time, and send requests to the controller meanwhile."""
     stretch = int(TALK_S * bench.digitizer.sample_rate_hz)
     parts, blocks = [], list[LoopBlock]()
     for _ in range(round(duration_s / TALK_S)):
@@ -100,7 +100,7 @@ def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
     _, blocks = listened(bench, 0.8)
     of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
     gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
-    # The memory is the sample before, and the law the mean of both: of proportional and derivative form.
+    # The memory holds the previous sample, and the law averages both: a proportional-derivative form.
     into = (1.0, 0.0) if of_base else (0.0, 1.0)
     direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
     law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
