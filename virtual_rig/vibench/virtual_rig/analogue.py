@@ -1,4 +1,4 @@
-"""The sockets of the virtual rig: where a simulated converter and the analogue world are wired together."""
+"""Interfaces between the simulated converter and the analogue world."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,25 +17,25 @@ class Coupling(StrEnum):
 
 @dataclass(frozen=True)
 class Input:
-    """One converter input as a task has configured it."""
+    """Configuration of one converter input in a task."""
 
     physical_channel: str
-    """``"cDAQ1Mod1/ai0"``: the name the converter uses, which the wiring maps to a signal."""
+    """``"cDAQ1Mod1/ai0"``: name of the input at the converter, which the wiring maps to a signal."""
     range_v: float
     """Full scale, plus and minus [V]."""
     coupling: Coupling
     iepe_current_a: float = 0.0
-    """Excitation current of an IEPE sensor [A]; a sensor that needs it and gets none shows nothing."""
+    """Excitation current of an IEPE sensor [A]; a sensor that needs it gives no signal without it."""
 
 
 class Sampler(Protocol):
-    """A running conversion: hands out the next samples in the order of time."""
+    """A running conversion; returns consecutive samples."""
 
     def read(self, count: int) -> NDArray[np.float64]:
-        """Next ``count`` samples, shape (inputs, count) [V], quantised and clipped at the range."""
+        """Return the next ``count`` samples, shape (inputs, count) [V], quantised and clipped."""
 
     def overloaded(self) -> NDArray[np.bool_]:
-        """Which inputs have clipped since the last call."""
+        """Return which inputs have clipped since the last call."""
 
     def close(self) -> None:
         """Stop converting."""
@@ -49,16 +49,16 @@ class AnalogueWorld(Protocol):
         """Rig time: how far the world has been computed [s]."""
 
     def advance(self, duration_s: float) -> None:
-        """Let rig time pass while nobody samples."""
+        """Advance rig time without a conversion."""
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Sampler:
-        """Begin a conversion now, at a rate the converter supports (on the converter's own clock)."""
+        """Start a conversion now, at a rate that the converter supports (by its own clock)."""
 
     def play(self, physical_channel: str, volts: NDArray[np.float64], sample_rate_hz: float) -> None:
-        """Queue samples of an analogue output behind what it still has to play; they start now if idle."""
+        """Append samples to the queue of an analogue output; an idle output starts now."""
 
     def unplayed(self, physical_channel: str) -> int:
-        """How many queued samples of that output have not been played yet."""
+        """Return the number of queued samples that have not been played."""
 
     def silence(self, physical_channel: str) -> None:
-        """Drop what is queued and hold that output at zero."""
+        """Clear the queue and hold the output at zero."""

@@ -18,38 +18,38 @@ from ..analogue import Sampler
 from .errors import DaqmxRefusal, unsupported_value
 
 MOST_SAMPLES = 1 << 27
-"""Values that one buffer or one read may have: 1 GiB."""
+"""Largest number of values in a buffer or a read: 1 GiB."""
 
 _LEAST_PRETRIGGER = 2
 
 
 @dataclass(frozen=True)
 class ReferenceTrigger:
-    """The edge around which a finite task keeps its samples."""
+    """The edge around which a finite task stores samples."""
 
     terminal: str
     pretrigger: int
-    """Samples per channel that are kept from before it."""
+    """Samples per channel stored before the trigger."""
 
 
 @dataclass
 class Timing:
-    """The sample clock and the triggers, as configured so far."""
+    """Configuration of sample clock and triggers."""
 
     kind: SampleTimingType | None = None
-    """None: what the device does without configuration."""
+    """None: the device's default."""
     requested_hz: float = 1000.0
     mode: AcquisitionType = AcquisitionType.FINITE
     samples: int = 1000
-    """To convert, or for a continuous task the least size of the buffer."""
+    """Samples to acquire; for a continuous task, the smallest buffer size."""
     clock_source: str = ""
     trigger_source: str = ""
-    """Empty: the task begins when it is started."""
+    """Empty: the task begins at its start."""
     reference: ReferenceTrigger | None = None
 
     @property
     def total(self) -> float:
-        """Samples to convert, or infinity."""
+        """Samples to acquire, or infinity."""
         return self.samples if self.mode is AcquisitionType.FINITE else math.inf
 
     def verify_reference(self) -> None:
@@ -65,17 +65,17 @@ class Timing:
 
 
 class Overflow(Enum):
-    """What becomes of samples that find their buffer full."""
+    """What happens to samples when the buffer is full."""
 
     GROW = auto()
-    """The buffer grows: nothing is lost."""
+    """The buffer grows, and nothing is lost."""
     LOSE = auto()
     """The oldest samples are overwritten, as on the real device."""
 
 
 @dataclass(frozen=True)
 class LogSettings:
-    """The TDMS file that a task logs to what is read."""
+    """The TDMS log file of a task."""
 
     path: Path
     group: str
@@ -83,7 +83,7 @@ class LogSettings:
 
 @dataclass
 class InputSettings:
-    """How the program wants to read."""
+    """Read settings of a task."""
 
     buffer_size: int | None = None
     """None: chosen from rate and samples."""
@@ -91,7 +91,7 @@ class InputSettings:
 
 
 class StartsItself(Enum):
-    """Whether a write starts a task that is not running."""
+    """Whether a write starts a stopped task."""
 
     YES = auto()
     NO = auto()
@@ -99,10 +99,10 @@ class StartsItself(Enum):
 
 @dataclass
 class OutputSettings:
-    """How the program wants to write."""
+    """Write settings of a task."""
 
     buffer_size: int = 0
-    """0: as large as the first writes."""
+    """0: the size of the first writes."""
     regeneration: RegenerationMode = RegenerationMode.ALLOW_REGENERATION
 
 
@@ -114,11 +114,11 @@ def check_memory(samples: int, channels: int) -> None:
 
 
 _ROUNDING_SAMPLES = 1e-5
-"""Rig time is a sum of many durations: a sample is due although the sum falls this much of a period short."""
+"""Tolerance in sample periods for due samples, because rig time is a sum with rounding errors."""
 
 
 class Acquisition:
-    """Samples per channel, counted from the start of the task; volts as the converter saw them."""
+    """Acquired samples per channel, counted from the start of the task [V]."""
 
     def __init__(
         self,
@@ -131,14 +131,14 @@ class Acquisition:
         overflow: Overflow,
         reference: ReferenceTrigger | None = None,
     ) -> None:
-        """Begin at rig time ``began_s``; ``total`` samples, or infinity, around a ``reference`` trigger."""
+        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
         self.rate_hz = rate_hz
         self.began_s = began_s
         self.total = total if reference is None else math.inf
         self.acquired = 0
         self.position = 0
         self.asked_at = -1
-        """Read position at which somebody has asked last how many samples wait."""
+        """Read position at the last query of available samples."""
         self.failure: DaqmxRefusal | None = None
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
         self._sampler = sampler
@@ -150,39 +150,39 @@ class Acquisition:
 
     @property
     def available(self) -> int:
-        """Unread samples."""
+        """Number of unread samples."""
         return self.acquired - self.position
 
     @property
     def buffer_size(self) -> int:
-        """Samples per channel that the buffer holds."""
+        """Buffer size in samples per channel."""
         return int(self._ring.shape[1])
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing more will be acquired."""
+        """Whether the acquisition is complete."""
         return self.acquired >= self.total or self.failure is not None
 
     def time_of(self, count: float) -> float:
-        """Rig time at which ``count`` samples exist [s]; infinite if they never will."""
+        """Return the rig time at which ``count`` samples exist [s]; infinite if they never will."""
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     @property
     def passed(self) -> int:
-        """Samples per channel that have gone into the buffer."""
+        """Number of samples per channel stored so far."""
         return self.acquired
 
     @property
     def used(self) -> float:
-        """Samples per channel that the program has read."""
+        """Number of samples per channel read by the program."""
         return self.position
 
     def listened_until_s(self, count: int) -> float:
-        """Rig time at which a listener expects ``count`` samples [s]."""
+        """Return the rig time at which a listener expects ``count`` samples [s]."""
         return self.time_of(count)
 
     def advance_to(self, now_s: float) -> None:
-        """Convert whatever is due at rig time ``now_s``."""
+        """Acquire all samples that are due at rig time ``now_s``."""
         due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
         due = int(min(due, self.total))
         while self.acquired < min(due, self.total) and self._is_open and self.failure is None:
@@ -192,20 +192,20 @@ class Acquisition:
 
     @property
     def awaits_trigger(self) -> bool:
-        """Whether it keeps only the newest samples, until its reference trigger comes."""
+        """Whether only the newest samples are stored until the reference trigger."""
         return self._reference is not None and self._is_open and self.total == math.inf
 
     @property
     def enough_before_s(self) -> float:
-        """Rig time by which the reference trigger counts; infinite when that has passed [s]."""
+        """Rig time from which the reference trigger is accepted; infinite when that has passed [s]."""
         assert self._reference is not None
         kept = self._reference.pretrigger
         return self.began_s + kept / self.rate_hz if self.acquired < kept else math.inf
 
     def trigger(self) -> bool:
-        """Let the reference trigger come now; say whether it counts.
+        """Apply the reference trigger now; return whether it is accepted.
 
-        It does not while there are fewer samples than are to be kept from before it.
+        It is rejected until enough samples before it are stored.
         """
         assert self._reference is not None
         kept = self._reference.pretrigger
@@ -246,9 +246,9 @@ class Acquisition:
         return np.concatenate([self._ring[:, start:], self._ring[:, : count - head]], axis=1)
 
     def read_at(self, first: int, count: int) -> NDArray[np.float64]:
-        """Hand over ``count`` samples from number ``first`` on, shape (channels, count) [V].
+        """Return ``count`` samples from number ``first`` on, shape (channels, count) [V].
 
-        Raises DaqmxRefusal when the buffer has overflown (-200279).
+        Raises DaqmxRefusal after a buffer overflow (-200279).
         """
         if self.failure is not None:
             raise self.failure
@@ -257,12 +257,12 @@ class Acquisition:
         return block
 
     def look_for_overloads(self) -> None:
-        """Latch which inputs have clipped since the last look."""
+        """Latch the inputs that have clipped since the last call."""
         if self._is_open:
             self.overloaded = np.asarray(self._sampler.overloaded(), dtype=np.bool_)
 
     def close(self) -> None:
-        """Stop converting; what is in the buffer can still be read."""
+        """Stop the conversion; stored samples can still be read."""
         if self._is_open:
             self._is_open = False
             self._sampler.close()

@@ -1,6 +1,6 @@
-"""What a program can ask and set: the properties of system, devices, tasks and channels, in one table.
+"""Table of all properties of system, devices, tasks and channels that a program can read or set.
 
-Names are those of NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help has a page on each property.
+Names are those of NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help describes each property.
 """
 
 import re
@@ -32,13 +32,13 @@ from .errors import DaqmxRefusal, member, unsupported_value
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
-"""Major, minor, update. From 24.5 on the client asks the driver how many samples "all" are."""
+"""Major, minor, update. From 24.5 on the client queries the number of samples for "all"."""
 _IDLE = {Idle.ZERO: AOIdleOutputBehavior.ZERO_VOLTS, Idle.HOLD: AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE}
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """One row: how a property is read and, if it can be written, how it is written."""
+    """One property: how it is read and, if writable, how it is set."""
 
     get: Callable[[Any], object]
     set: Callable[[Any, Any], None] | None = None
@@ -49,21 +49,21 @@ Attributes = Mapping[str, Attribute]
 
 @dataclass(frozen=True)
 class Group:
-    """The properties of one kind of thing."""
+    """The properties of one type of object."""
 
     name: str
-    """As the names of its properties begin in the protocol."""
+    """Prefix of the property names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
-    """Finds the things that a request speaks of: the first is asked, all of them are set."""
+    """Returns the objects of a request: the first one is read, all of them are set."""
     attributes: Callable[[Any], Attributes]
-    """The rows that a thing has."""
+    """Returns the properties of an object."""
 
 
-# How the rows read and write
+# Functions that read and write properties
 
 
 def _field(name: str, convert: Callable[[Any], object] = lambda value: value) -> Callable[[Any, Any], None]:
-    """Return what writes a field of a channel."""
+    """Return a function that sets a field of a channel."""
 
     def write(thing: object, value: object) -> None:
         setattr(thing, name, convert(value))
@@ -76,7 +76,7 @@ def _coupling(code: int) -> Coupling:
 
 
 def _require(property_name: str, allowed: Callable[[Any], Enum]) -> Callable[[Any, int], None]:
-    """Return what takes the one value that a thing can have, and refuses any other."""
+    """Return a function that accepts the only supported value and refuses others."""
 
     def write(thing: object, code: int) -> None:
         if code != allowed(thing).value:
@@ -86,7 +86,7 @@ def _require(property_name: str, allowed: Callable[[Any], Enum]) -> Callable[[An
 
 
 def not_supported(name: str, where: str) -> DaqmxRefusal:
-    """Refuse an attribute that this device, channel or task does not have (-200197)."""
+    """Return the error for an attribute that a device, channel or task does not have (-200197)."""
     return DaqmxRefusal(DAQmxErrors.ATTR_NOT_SUPPORTED, f"Property: {name}\n{where}")
 
 
@@ -120,7 +120,7 @@ def _set_rate(task: Task, rate_hz: float) -> None:
 
 
 def _running_acquisition(task: Task) -> Acquisition:
-    """Return the running acquisition of a device that detects overloads."""
+    """Return the running acquisition of a device with overload detection."""
     match task.side:
         case AnalogInputs(overloads=Overloads.DETECTED):
             pass
@@ -216,7 +216,7 @@ READ: Attributes = {
     "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
     "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
-    "0x31E8": Attribute(default_samples),  # not named in the protocol: how many a read of "all" brings
+    "0x31E8": Attribute(default_samples),  # unnamed in the protocol: number of samples for "all"
     "OVERLOADED_CHANS_EXIST": Attribute(_overloads_exist),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }
@@ -282,12 +282,12 @@ GROUPS = {
         "Channel", _channels, lambda channel: OUTPUT if isinstance(channel, OutputChannel) else INPUT
     ),
 }
-"""The groups by the names of their calls."""
+"""The groups by the names of their calls in the protocol."""
 SET_AT_REST = ("Timing", "Trig", "Buffer", "Chan")
 """Groups that cannot be set while the task runs."""
 
 
-# From a call to a row, and from a value to a message
+# From call to property, and from value to message
 
 SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
 _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
@@ -332,7 +332,7 @@ def _setter(system: DaqmxSystem, scope: str, _: Any) -> Callable[[Any], Mapping[
 
 
 def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
-    """Return what finds the row that a request names by number (-200197 for one that is not there)."""
+    """Return a function that finds a property by its number in a request (-200197 if it is missing)."""
     names = {
         value.number: value.name.rpartition("_ATTRIBUTE_")[2]
         for name, descriptor in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items()
@@ -352,6 +352,6 @@ def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
 
 
 def _fields(response: Any, value: object) -> Mapping[str, object]:
-    """Put a value into the field of a response."""
+    """Return a value as the field of a response."""
     name = "value_raw" if "value_raw" in response.fields_by_name else "value"
     return {name: value.value if isinstance(value, Enum) else value}

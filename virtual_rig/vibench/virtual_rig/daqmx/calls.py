@@ -1,7 +1,7 @@
-"""The calls on tasks, channels, clocks, triggers and devices, in one table.
+"""Table of the calls on tasks, channels, clocks, triggers and devices.
 
-Their names are those of NI's protocol file (`nidaqmx.proto`); the function of that name with ``DAQmx`` before
-it stands in the NI-DAQmx C reference.
+Names are those of NI's protocol file (`nidaqmx.proto`); with the prefix ``DAQmx``, the NI-DAQmx C reference
+describes them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -34,7 +34,7 @@ from .tasks import Task
 
 
 class DaqmxSystem:
-    """Everything one driver knows; used with the rig's lock held."""
+    """State of the driver; used with the rig's lock held."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -45,7 +45,7 @@ class DaqmxSystem:
     # --- tasks ---------------------------------------------------------------------------
 
     def create_task(self, name: str) -> Task:
-        """Create a task; an empty name is replaced by a free one (-200089 for a name in use)."""
+        """Create a task; an empty name selects an unused one (-200089 for a name in use)."""
         if not name:
             name = f"_unnamedTask<{self._unnamed}>"
             self._unnamed += 1
@@ -56,26 +56,26 @@ class DaqmxSystem:
         return task
 
     def task(self, name: str) -> Task:
-        """Find a task by name (-200088 if there is none)."""
+        """Return a task by name (-200088 if there is none)."""
         if name not in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
         return self.tasks[name]
 
     def clear_task(self, name: str) -> None:
-        """End a task and forget it."""
+        """End and delete a task."""
         self.task(name).abort()
         del self.tasks[name]
         self.rig.changed.notify_all()
 
     def reset(self) -> None:
-        """Clear every task, also those whose client is gone."""
+        """Delete every task, including those of disconnected clients."""
         for name in tuple(self.tasks):
             self.clear_task(name)
 
     # --- devices -------------------------------------------------------------------------
 
     def device(self, name: str) -> Device:
-        """Find a device by its name, or by that of anything on it (-200220 if there is none)."""
+        """Return a device by its name or that of a channel on it (-200220 if there is none)."""
         device = self.catalogue.find(name.strip("/").partition("/")[0])
         if device is None:
             known = ", ".join(known.name for known in self.catalogue.devices)
@@ -99,7 +99,7 @@ class DaqmxSystem:
         return self._of_side(names, lambda device: device.output_names)
 
     def _of_side(self, names: str, side: Callable[[Device], tuple[str, ...]]) -> tuple[str, ...]:
-        """Spell channels as their devices do (-200220, -200170, -200096 for those that do not exist)."""
+        """Return channel names as their devices spell them (-200220, -200170, -200096 if unknown)."""
         found = []
         for name in _with_devices(expand(names)):
             device = self.device(name)
@@ -116,7 +116,7 @@ class DaqmxSystem:
 
 
 def _with_devices(names: Iterable[str]) -> Iterable[str]:
-    """In ``"Dev1/ai0, ai2"`` the second channel lies on the first one's device."""
+    """Add the device to names without one: in ``"Dev1/ai0, ai2"`` both channels are on Dev1."""
     device = ""
     for name in names:
         if "/" in name.strip("/"):
@@ -127,15 +127,15 @@ def _with_devices(names: Iterable[str]) -> Iterable[str]:
 
 
 Fields = Mapping[str, object]
-"""The fields of a response; status 0 is left out."""
+"""The fields of a response; status 0 is omitted."""
 Call = Callable[[DaqmxSystem, Any], Fields | bytes]
-"""Takes the system and the request, returns the response as fields or ready for the wire."""
+"""Takes system and request; returns the response as fields or as bytes."""
 
 NOTHING: Fields = {}
 
 
 def pick(request: Any, field: str) -> int:
-    """Return an enum of a request: the bare number if given, else the named value."""
+    """Return an enum of a request: the raw number if given, else the named value."""
     return int(getattr(request, f"{field}_raw") or getattr(request, field))
 
 
@@ -247,7 +247,7 @@ def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
 
 
 def _does(act: Callable[[DaqmxSystem, Any], object]) -> Call:
-    """Return a call without an answer."""
+    """Return a call with an empty response."""
 
     def call(system: DaqmxSystem, request: Any) -> Fields:
         act(system, request)
@@ -276,12 +276,12 @@ CALLS: Mapping[str, Call] = {
     "CfgDigEdgeStartTrig": _set_start_trigger,
     "CfgDigEdgeRefTrig": _set_reference_trigger,
     "ConfigureLogging": _set_logging,
-    # The client has already ended the stream it listened to; there is nothing else to undo.
+    # The client has already closed the event stream; nothing else needs to be undone.
     "UnregisterEveryNSamplesEvent": _does(task_of),
     "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
     "ResetDevice": _does(lambda system, request: system.reset_device(request.device_name)),
 }
-"""The calls by their names in the protocol; those that move samples stand in `_data_calls`."""
+"""The calls by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
 # fmt: on
 
 
@@ -289,14 +289,14 @@ Listener = Iterator[Any]
 Stream = Acquisition | Generation
 _FOR_EVER = -1.0
 _BY_OTHERS = float("inf")
-"""Rig time of something that other calls must bring about."""
+"""Rig time of an event that depends on other calls."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
-    """Answer again and again, every ``n_samples`` of a task, until the client or the task ends it.
+    """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    A listener waits for rig time like a reader does: on demand, it is the listener who lets time pass,
-    and it goes on when the samples announced have been read.
+    A listener waits for rig time like a reader. On demand, the listener advances time, and continues when the
+    announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
@@ -316,7 +316,7 @@ def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerCon
 
 
 def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.ServicerContext) -> Listener:
-    """Run on a thread of its own, and take the rig's lock only while looking."""
+    """Run in a separate thread, holding the rig's lock only while checking."""
     subscription = _Subscription(system, task, context)
     while stream := subscription.await_run():
         count = response.n_samples
@@ -326,7 +326,7 @@ def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.Servic
 
 
 class _Subscription:
-    """One listener's view of one task: which run it has followed, and whether its client is still there."""
+    """A listener on one task: the run that it follows, and whether its client is connected."""
 
     def __init__(self, system: DaqmxSystem, task: Task, context: grpc.ServicerContext) -> None:
         self._system = system
@@ -348,16 +348,16 @@ class _Subscription:
         self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, _FOR_EVER)
 
     def await_run(self) -> Stream | None:
-        """Wait for a run not followed yet; None when there is nobody to tell any more."""
+        """Wait for the next run; None when the client or the task is gone."""
         with self._rig.changed:
             self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._followed))
             self._followed = None if self._has_gone else self._task.stream
             return self._followed
 
     def await_count(self, stream: Stream, count: int, announced: int) -> bool:
-        """Wait until ``count`` samples have passed; False when this run will not get there.
+        """Wait until ``count`` samples have passed; False when this run ends before.
 
-        Where nothing is lost nobody is hurried either: the next samples come when those announced are read.
+        A buffer without loss also waits until the announced samples have been read.
         """
         with self._rig.changed:
             if self._rig.pace.overflow is Overflow.GROW:
@@ -372,4 +372,4 @@ class _Subscription:
 
 
 EVENTS = {"RegisterEveryNSamplesEvent": every_n_samples}
-"""The calls that answer with a stream, by their names in the protocol."""
+"""The calls with a stream of responses, by their names in the protocol."""

@@ -1,4 +1,4 @@
-"""The channels of a simulated DAQmx task: what is converted, how, and within which limits."""
+"""Channels of a simulated DAQmx task: conversion, coupling and limits."""
 
 import re
 from collections.abc import Iterable
@@ -15,12 +15,12 @@ from .errors import DaqmxRefusal, unsupported_value
 
 _SHORT_BITS, _LONG_BITS = 16, 32
 _SLACK = 1 + 1e-9
-"""Limits that were computed may miss the range by a rounding error."""
+"""Relative tolerance of limits, which may have rounding errors."""
 
 
 @dataclass
 class InputChannel:
-    """One voltage input of a task, as configured so far."""
+    """Configuration of one voltage input of a task."""
 
     name: str
     physical: str
@@ -28,21 +28,21 @@ class InputChannel:
     inputs: AnalogInputs
     minimum: float
     maximum: float
-    """Expected extremes [V]."""
+    """Largest expected value [V]."""
     terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
     coupling: Coupling | None = None
-    """None: the device's default (AC under excitation, DC otherwise)."""
+    """None: the device's default (AC with excitation, DC without)."""
     excitation: ExcitationSource = ExcitationSource.NONE
     excitation_a: float = 0.0
 
     @property
     def iepe_current_a(self) -> float:
-        """Current the device feeds into the sensor [A]."""
+        """Excitation current of the sensor [A]."""
         return self.excitation_a if self.excitation is ExcitationSource.INTERNAL else 0.0
 
     @property
     def actual_coupling(self) -> Coupling:
-        """The coupling in force."""
+        """Effective coupling."""
         if self.coupling is not None:
             return self.coupling
         wants = Coupling.AC if self.iepe_current_a else Coupling.DC
@@ -50,22 +50,22 @@ class InputChannel:
 
     @property
     def range_v(self) -> float:
-        """Smallest full scale of the device that holds the expected extremes [V]; NaN if none does."""
+        """Smallest full scale that contains the expected values [V]; NaN if none does."""
         wanted_v = max(abs(self.minimum), abs(self.maximum))
         return next((each for each in self.inputs.ranges_v if wanted_v <= each * _SLACK), float("nan"))
 
     @property
     def volts_per_count(self) -> float:
-        """One step of the converter [V]."""
+        """Quantisation step [V]."""
         return float(self.range_v / 2 ** (self.inputs.bits - 1))
 
     @property
     def raw_bits(self) -> int:
-        """Bits of an unscaled sample on its way."""
+        """Bits of an unscaled sample in transfers."""
         return _SHORT_BITS if self.inputs.bits <= _SHORT_BITS else _LONG_BITS
 
     def verify(self) -> None:
-        """Refuse what the device cannot do: range, terminal, coupling, excitation."""
+        """Refuse settings that the device does not support: range, terminal, coupling, excitation."""
         inputs, where = self.inputs, f"on {self.physical}"
         if self.minimum >= self.maximum:
             raise unsupported_value("AI_Min", self.minimum, f"below AI_Max = {self.maximum:g}")
@@ -83,7 +83,7 @@ class InputChannel:
             raise unsupported_value("AI_Coupling", self.actual_coupling, "AC while IEPE excitation is on")
 
     def wiring(self) -> Input:
-        """Describe the channel to the analogue world."""
+        """Return the configuration for the analogue world."""
         return Input(self.physical, self.range_v, self.actual_coupling, self.iepe_current_a)
 
 
@@ -97,10 +97,10 @@ class OutputChannel:
     outputs: AnalogOutputs
     minimum: float
     maximum: float
-    """Expected extremes [V]."""
+    """Largest expected value [V]."""
 
     def verify(self) -> None:
-        """Refuse extremes that the device cannot deliver."""
+        """Refuse limits that the device cannot output."""
         if self.minimum >= self.maximum:
             raise unsupported_value("AO_Min", self.minimum, f"below AO_Max = {self.maximum:g}")
         range_v = self.outputs.range_v
@@ -109,7 +109,7 @@ class OutputChannel:
                 raise unsupported_value(name, value, f"-{range_v:g} to {range_v:g} V on {self.physical}")
 
     def check(self, volts: NDArray[np.float64]) -> None:
-        """Refuse samples beyond the channel's extremes: DAQmx does not clip."""
+        """Refuse samples beyond the channel's limits, because DAQmx does not clip."""
         slack_v = (_SLACK - 1) * self.maximum
         too_low, too_high = volts < self.minimum - slack_v, volts > self.maximum + slack_v
         if np.any(too_low | too_high):
@@ -126,7 +126,7 @@ _RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?P<stem_again>.*?)(?P<last>\
 
 
 def expand(text: str) -> tuple[str, ...]:
-    """Return every single name in a list of names and ranges, in the order given.
+    """Return all names in a list of names and ranges, in order.
 
     ``"Dev1/ai0:2"`` and ``"Dev1/ai0:Dev1/ai2"`` both give three names; ``"ai2:0"`` counts down.
     """
@@ -145,9 +145,9 @@ def _expand_one(part: str) -> Iterable[str]:
 
 
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of virtual channels: the physical ones, or what was given, numbered if they are many.
+    """Return the names of virtual channels: the physical names or the given one, numbered for several.
 
-    A list or range with as many names as there are channels is used as it is.
+    A list or range with one name per channel is used unchanged.
     """
     if not given:
         return physical

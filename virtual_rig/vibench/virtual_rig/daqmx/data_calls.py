@@ -1,4 +1,4 @@
-"""Calls that move samples between a program and a task: read, written, and packed as protobuf packs them."""
+"""Calls that transfer samples between a program and a task, with their protobuf encoding."""
 
 import math
 import time
@@ -23,14 +23,14 @@ READ_ALL = -1
 
 @dataclass(frozen=True)
 class Reading:
-    """What a read brought."""
+    """Result of a read."""
 
     volts: NDArray[np.float64]
-    """Shape (channels, samples), of all channels of the task [V]."""
+    """Samples of all channels of the task, shape (channels, samples) [V]."""
     status: int = 0
-    """0, or why there are fewer samples than requested."""
+    """0, or the reason for fewer samples than requested."""
     began_s: float = 0.0
-    """Rig time of the first of them [s]."""
+    """Rig time of the first sample [s]."""
 
     @property
     def samples(self) -> int:
@@ -39,12 +39,12 @@ class Reading:
 
 
 def read(task: Task, samples: int, timeout_s: float) -> Reading:
-    """Read ``samples`` per channel, starting the task if need be; negative ``samples``: all there are.
+    """Read ``samples`` per channel, starting the task if necessary; a negative number reads all.
 
     Raises
     ------
     DaqmxRefusal
-        -200279 for lost samples, -200278 past the end, -200284 if nothing at all came in time.
+        -200279 for lost samples, -200278 past the end, -200284 if no sample came in time.
     """
     require_inputs(task)
     check_memory(samples, len(task.inputs))
@@ -76,7 +76,7 @@ def _is_used_up(task: Task) -> bool:
 
 
 def default_samples(task: Task) -> int:
-    """How many samples "all" are: a finite task's whole number, a continuous one's unread samples."""
+    """Return the number of samples for "all": all of a finite task, the unread ones of a continuous task."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -85,7 +85,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Unread samples per channel, as of now; a rig at its own pace lets some come where there are none."""
+    """Return the number of unread samples per channel; on demand, time advances if there are none."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -100,7 +100,7 @@ def newest(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Answer how many wait: who asks again without reading polls, and only then a rig lets some come."""
+    """Return the number of unread samples; on demand, only repeated queries without a read advance time."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.asked_at == acquisition.position:
         return available(task)
@@ -185,7 +185,7 @@ _INT64_WRAP = 1 << 64
 
 
 def varint(number: int) -> bytes:
-    """Write a number in base-128 digits, least first; a negative one wraps as 64 bits do."""
+    """Return a number in base-128 digits, least significant first; a negative one as 64-bit complement."""
     if number < 0:
         number += _INT64_WRAP
     digits = bytearray()
@@ -365,7 +365,7 @@ def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
 
 
 def _read_what_fits(task: Task, request: Any) -> Reading:
-    """Read what was asked for; "all" means as much as the caller has room for."""
+    """Read the requested samples; "all" is limited by the caller's array."""
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan
@@ -378,7 +378,7 @@ def _read_what_fits(task: Task, request: Any) -> Reading:
 
 
 def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
-    """One row after the other, or one scan after the other; rows keep the distance the caller's array has."""
+    """Return the values by channel or by scan; channel rows have the spacing of the caller's array."""
     if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
         return values.T
     channels, samples = values.shape
@@ -391,7 +391,7 @@ def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
 
 
 def _whole(reading: Reading) -> Reading:
-    """Check a reading for a caller that cannot take a part of it."""
+    """Return a complete reading, or raise its status for a caller that cannot use a part."""
     if reading.status:
         raise DaqmxRefusal(reading.status, samples_read=reading.samples)
     return reading

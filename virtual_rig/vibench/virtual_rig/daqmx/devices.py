@@ -1,9 +1,8 @@
-"""The devices the simulated DAQmx system has: what each can do, in one table.
+"""Table of the devices of the simulated DAQmx system and their capabilities.
 
-Sources: NI 9234 and NI USB-9234 guides (ranges, IEPE, data rates fM/256/n), NI USB-443x
-specifications (ranges, rates, IEPE), NI USB-6211 specifications. Not confirmed on a device: the
-minimum rate, the rate steps and the output memory of the USB-4431, the default couplings, and the
-USB-6211's figures.
+Sources: NI 9234 and NI USB-9234 guides (ranges, IEPE, data rates fM/256/n), NI USB-443x specifications
+(ranges, rates, IEPE), NI USB-6211 specifications. Not confirmed on a device: the minimum rate, the rate steps
+and the output memory of the USB-4431, the default couplings, and the USB-6211's figures.
 """
 
 import math
@@ -21,12 +20,12 @@ _NI_9234_MAX_DIVISOR = 31
 _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
-"""A rate read back and asked for again must not jump to the next one."""
+"""A rate that is read back and set again must not change to the next one."""
 
 
 @dataclass(frozen=True)
 class AnyRate:
-    """Every rate in an interval is possible."""
+    """Any rate within an interval."""
 
     minimum_hz: float
     maximum_hz: float
@@ -38,14 +37,14 @@ class AnyRate:
 
 @dataclass(frozen=True)
 class DividedRate:
-    """A clock divided by a whole number: a request becomes the next higher rate there is."""
+    """A clock divided by an integer; a requested rate is rounded up to the next possible one."""
 
     clock_hz: float
     minimum_hz: float
     maximum_hz: float
 
     def next_up(self, rate_hz: float) -> float:
-        """Smallest ``clock_hz / n`` that is not below ``rate_hz``, a rounding error apart."""
+        """Return the smallest ``clock_hz / n`` not below ``rate_hz``, except for rounding errors."""
         return self.clock_hz / math.floor(self.clock_hz / rate_hz * (1 + _ROUNDING))
 
 
@@ -53,30 +52,30 @@ Rates = AnyRate | DividedRate
 
 
 class Idle(Enum):
-    """What an output does when its generation ends."""
+    """State of an output after its generation."""
 
     ZERO = auto()
     HOLD = auto()
 
 
 class Untimed(Enum):
-    """What a task without a sample clock does."""
+    """Behaviour of a task without a sample clock."""
 
     ON_DEMAND = auto()
-    """Converts when the program asks (successive approximation)."""
+    """Converts when the program reads (successive approximation)."""
     SAMPLE_CLOCK = auto()
-    """Runs the sample clock at its default rate (delta-sigma converters cannot do otherwise)."""
+    """Runs the sample clock at its default rate (delta-sigma converters have no other mode)."""
 
 
 class Overloads(Enum):
-    """Whether the device tells clipped inputs."""
+    """Whether the device reports clipped inputs."""
 
     DETECTED = auto()
     NOT_DETECTED = auto()
 
 
 class Conversion(Enum):
-    """Whether the inputs of a task are converted together."""
+    """Whether the inputs of a task are sampled simultaneously."""
 
     SIMULTANEOUS = auto()
     MULTIPLEXED = auto()
@@ -84,16 +83,16 @@ class Conversion(Enum):
 
 @dataclass(frozen=True)
 class AnalogInputs:
-    """The input side of a device."""
+    """Inputs of a device."""
 
     count: int
     ranges_v: tuple[float, ...]
-    """Full scales, ascending; each is plus and minus [V]."""
+    """Full scales in ascending order, positive and negative [V]."""
     rates: Rates
     bits: int
     couplings: tuple[Coupling, ...]
     iepe_currents_a: tuple[float, ...]
-    """Excitation currents to choose from, without 0; empty: no excitation."""
+    """Possible excitation currents without 0; empty: no excitation."""
     terminals: tuple[TerminalConfiguration, ...]
     """The first is the default."""
     untimed: Untimed
@@ -103,7 +102,7 @@ class AnalogInputs:
 
 @dataclass(frozen=True)
 class AnalogOutputs:
-    """The output side of a device."""
+    """Outputs of a device."""
 
     count: int
     range_v: float
@@ -111,7 +110,7 @@ class AnalogOutputs:
     idle: Idle
     untimed: Untimed
     memory: int
-    """Samples per channel that wait on the device itself, between the program's buffer and the converter."""
+    """Samples per channel in the device's memory, between the program's buffer and the converter."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ class Device:
 
     @property
     def clock_name(self) -> str:
-        """The device whose timing engine clocks this one: its chassis, if it sits in one."""
+        """The device whose timing engine is used: the chassis of a module, else the device itself."""
         return self.chassis or self.name
 
     @property
@@ -145,7 +144,7 @@ class Device:
 
     @property
     def terminals(self) -> tuple[str, ...]:
-        """Names of the terminals that signals can be routed to and from."""
+        """Names of the terminals for routing signals."""
         pfi = [f"/{self.name}/PFI{n}" for n in range(self.pfi_lines)]
         sides = [side for side, names in (("ai", self.input_names), ("ao", self.output_names)) if names]
         inner = [
@@ -207,7 +206,7 @@ USB_6211 = Device(
 
 @dataclass(frozen=True)
 class Catalogue:
-    """The devices of one system, by name (DAQmx ignores the case of names)."""
+    """The devices of a system by name (DAQmx ignores case)."""
 
     devices: tuple[Device, ...] = (CDAQ1, NI_9234, USB_4431, USB_6211)
     _by_name: dict[str, Device] = field(init=False, repr=False, compare=False)
@@ -216,14 +215,14 @@ class Catalogue:
         object.__setattr__(self, "_by_name", {device.name.lower(): device for device in self.devices})
 
     def find(self, name: str) -> Device | None:
-        """Look up a device by name; a terminal's leading slash does not matter."""
+        """Return a device by name; a leading slash is ignored."""
         return self._by_name.get(name.strip("/").lower())
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:
-    """Return the default system, in which the device of that product has that name.
+    """Return the default system, with the device of type ``product_type`` renamed to ``name``.
 
-    Raises ConfigurationError when there is no such product, or the name is taken by another one.
+    Raises ConfigurationError for an unknown type, or a name of another device.
     """
     devices = Catalogue().devices
     old = next((device for device in devices if device.product_type == product_type), None)

@@ -1,4 +1,4 @@
-"""What the simulated DAQmx driver answers when it refuses: a code, a sentence, how many samples moved."""
+"""Errors of the simulated DAQmx driver: code, sentence, and number of transferred samples."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -52,12 +52,12 @@ _SENTENCES: dict[int, str] = {
 
 
 class DaqmxRefusal(InstrumentError):
-    """A call that the driver answers with a negative status, as the client will see it."""
+    """A call that the driver answers with a negative status."""
 
     def __init__(
         self, code: int, detail: str = "", samples_read: int | None = None, samples_written: int | None = None
     ) -> None:
-        """Name the DAQmx ``code``; ``detail`` says what was given and what is allowed."""
+        """Store the DAQmx ``code``; ``detail`` gives the rejected and the allowed values."""
         super().__init__("\n\n".join(filter(None, (sentence(code), detail, f"Status Code: {int(code)}"))))
         self.code = int(code)
         self.samples_read = samples_read
@@ -65,7 +65,7 @@ class DaqmxRefusal(InstrumentError):
 
 
 def sentence(code: int) -> str:
-    """Return what a status code means: a sentence for the frequent ones, NI's name for the others."""
+    """Return the meaning of a status code: a sentence for frequent codes, NI's name for others."""
     if code in _SENTENCES:
         return _SENTENCES[code]
     try:
@@ -79,7 +79,7 @@ Member = TypeVar("Member", bound=Enum)
 
 
 def member(kind: type[Member], code: int, property_name: str) -> Member:
-    """Return the member of one of NI's enums that a request's number stands for, or refuse it (-200077)."""
+    """Return the member of an NI enum for a number in a request; unknown ones are refused (-200077)."""
     try:
         return kind(code)
     except ValueError:
@@ -88,7 +88,7 @@ def member(kind: type[Member], code: int, property_name: str) -> Member:
 
 
 def unsupported_value(property_name: str, requested: object, allowed: str) -> DaqmxRefusal:
-    """Refuse a property value, the way DAQmx reports it (-200077)."""
+    """Return the error for a property value that is not supported (-200077)."""
     return DaqmxRefusal(
         DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
         f"Property: {property_name}\nRequested Value: {requested}\nPossible Values: {allowed}",
@@ -100,26 +100,26 @@ SERVER_GONE = "server gone"
 
 @dataclass(frozen=True)
 class Fault:
-    """A rule: calls of that name fail with that code.
+    """A rule that makes calls with a name fail with a code.
 
-    Both conditions must hold; by default a fault applies at once and for ever.
+    Both conditions must be met; by default a fault starts at once and lasts for ever.
     """
 
     rpc: str
-    """Name of the call, ``"ReadAnalogF64"`` for example; ``"*"``: every call."""
+    """Name of the call, such as ``"ReadAnalogF64"``; ``"*"`` for every call."""
     code: int
-    """A DAQmx status, -200361 for example (nidaqmx.error_codes.DAQmxErrors)."""
+    """A DAQmx status, such as -200361 (nidaqmx.error_codes.DAQmxErrors)."""
     from_call: int = 1
-    """First call that fails, counted from 1 since the rule was given."""
+    """First failing call, counted from 1 after the rule was added."""
     from_s: float = 0.0
-    """Rig time from which on calls fail [s]."""
+    """Rig time from which calls fail [s]."""
     calls: float = float("inf")
-    """How many calls fail before the fault heals."""
+    """Number of failing calls."""
 
 
 @dataclass(frozen=True)
 class ServerGone:
-    """A rule: from then on no call is answered (the client sees UNAVAILABLE), as if the computer were off."""
+    """A rule that leaves all calls unanswered (the client sees UNAVAILABLE), as if the computer were off."""
 
     rpc: str = "*"
     from_call: int = 1
@@ -127,24 +127,24 @@ class ServerGone:
 
 
 class Unavailable(Exception):
-    """The server plays dead."""
+    """The server does not answer."""
 
 
 @dataclass
 class Faults:
-    """The rules in force; change them at any time."""
+    """The active rules; they can be changed at any time."""
 
     rules: list[Fault | ServerGone] = field(default_factory=list)
     _seen: dict[int, int] = field(default_factory=dict)
     _restart_is_due: bool = False
 
     def add(self, rule: Fault | ServerGone) -> None:
-        """Put a rule in force; its calls are counted from now on."""
+        """Add a rule and start counting its calls."""
         self._seen[id(rule)] = 0
         self.rules.append(rule)
 
     def remove(self, rule: Fault | ServerGone) -> None:
-        """Heal one rule; nothing happens when it is out of force already."""
+        """Remove a rule; a rule that is not active is ignored."""
         self.rules = [other for other in self.rules if other is not rule]
         self._seen.pop(id(rule), None)
         match rule:
@@ -152,17 +152,17 @@ class Faults:
                 self._restart_is_due = True
 
     def take_restart(self) -> bool:
-        """Say, once, whether the server has come back from being gone: with none of its tasks."""
+        """Return once whether the server has restarted, without its tasks."""
         is_due, self._restart_is_due = self._restart_is_due, False
         return is_due
 
     def clear(self) -> None:
-        """Heal everything."""
+        """Remove all rules."""
         self.rules.clear()
         self._seen.clear()
 
     def check(self, rpc: str, now_s: float) -> None:
-        """Fail the call if a rule says so; raises DaqmxRefusal or Unavailable as the rule demands."""
+        """Raise DaqmxRefusal or Unavailable if a rule applies to the call."""
         for rule in tuple(self.rules):
             if rule.rpc not in ("*", rpc) or now_s < rule.from_s:
                 continue

@@ -1,4 +1,4 @@
-"""A running generation: the output buffer, and handing its samples to the world in time."""
+"""A running generation: the output buffer, and the transfer of its samples to the world."""
 
 import math
 
@@ -12,16 +12,16 @@ from .devices import AnalogOutputs, Idle
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""How far samples are handed to the world ahead of their time [s]: no gap, yet new data soon plays."""
+"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
 
 _ROUNDING_SAMPLES = 1e-5
 
 
 class OutputBuffer:
-    """What a program has written and the device has not yet used up, shape (channels, size) [V]."""
+    """Samples written by a program and not yet used by the device, shape (channels, size) [V]."""
 
     def __init__(self, channels: int, size: int = 0) -> None:
-        """``size`` 0: as large as what is written before the start."""
+        """``size`` 0 adapts to the samples written before the start."""
         self.is_sized = size > 0
         self.written = 0
         self._ring = np.zeros((channels, size))
@@ -33,21 +33,21 @@ class OutputBuffer:
 
     @property
     def filled(self) -> int:
-        """Samples that a regeneration repeats."""
+        """Number of samples repeated by a regeneration."""
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
-        """Make room for ``count`` more, before the start of a task that was given no buffer size."""
+        """Enlarge the buffer by ``count`` samples, before the start of a task without a buffer size."""
         self._ring = np.concatenate([self._ring, np.zeros((self._ring.shape[0], count))], axis=1)
 
     def write(self, volts: NDArray[np.float64]) -> None:
-        """Append samples, over the oldest ones if need be; the caller has made sure there is room."""
+        """Append samples, which may overwrite the oldest; the caller has checked the space."""
         at = (self.written + np.arange(volts.shape[1])) % self.size
         self._ring[:, at] = volts
         self.written += volts.shape[1]
 
     def cyclic(self, first: int, count: int) -> NDArray[np.float64]:
-        """``count`` samples from number ``first`` on, the filled part repeated for ever."""
+        """Return ``count`` samples from number ``first`` on; the filled part repeats for ever."""
         return self._ring[:, (first + np.arange(count)) % self.filled]
 
 
@@ -65,7 +65,7 @@ class Generation:
         regeneration: RegenerationMode,
         device: AnalogOutputs,
     ) -> None:
-        """Begin at rig time ``began_s``; ``total`` samples, or infinity."""
+        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
         self.rate_hz = rate_hz
         self.began_s = began_s
         self.total = total
@@ -78,7 +78,7 @@ class Generation:
         self._repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
         self._idle = device.idle
         self._memory = np.empty((len(outputs), 0))
-        """What has left the buffer and waits on the device; a repeated buffer is not fetched ahead."""
+        """Samples in the device's memory; a repeated buffer is not transferred ahead."""
         self._most_in_memory = 0 if self._repeats else device.memory
         self._fetched = 0
         self._recent = np.empty((len(outputs), 0))
@@ -86,7 +86,7 @@ class Generation:
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing more will be generated."""
+        """Whether the generation is complete."""
         return self.generated >= self.total or self.failure is not None
 
     @property
@@ -98,35 +98,35 @@ class Generation:
         return self.buffer.size - (self.buffer.written - self._fetched)
 
     def time_of_room(self, samples: int) -> float:
-        """Rig time at which there is room for this many samples [s]."""
+        """Return the rig time at which ``samples`` can be written [s]."""
         left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
         return self.time_of(max(0, left)) - LEAD_S
 
     @property
     def uses_up_its_buffer(self) -> bool:
-        """Whether every sample is played once only."""
+        """Whether every sample is played only once."""
         return not self._repeats
 
     def time_of(self, count: float) -> float:
-        """Rig time at which ``count`` samples have been generated [s]; infinite if they never will."""
+        """Return the rig time at which ``count`` samples are played [s]; infinite if they never will be."""
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     @property
     def passed(self) -> int:
-        """Samples per channel that have left the buffer."""
+        """Number of samples per channel that have left the buffer."""
         return self.generated
 
     @property
     def used(self) -> float:
-        """A listener need not wait for anybody."""
+        """Infinite, because a listener waits for no reader."""
         return math.inf
 
     def listened_until_s(self, count: int) -> float:  # noqa: ARG002 - see below
-        """Let others make time pass: listening to a buffer repeated for ever would never pause."""
+        """Return infinity, because a listener to a repeated buffer must not advance time."""
         return math.inf
 
     def prepare(self, until_s: float) -> None:
-        """Hand over what is played up to rig time ``until_s``, and a little more."""
+        """Pass on the samples up to rig time ``until_s``, plus a lead."""
         if not self._is_open:
             return
         wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)
@@ -142,7 +142,7 @@ class Generation:
         self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
 
     def _fetch(self, until: int) -> None:
-        """Move samples from the buffer to the device, as far as there are any."""
+        """Move available samples from the buffer to the device."""
         count = int(min(until, self.total, self._end)) - self._fetched
         if count > 0:
             self._memory = np.concatenate([self._memory, self.buffer.cyclic(self._fetched, count)], axis=1)
@@ -153,7 +153,7 @@ class Generation:
         return math.inf if self._repeats and self.buffer.filled else self.buffer.written
 
     def advance_to(self, now_s: float) -> None:
-        """Count what has been played at rig time ``now_s``; notice an underflow."""
+        """Update the number of played samples at rig time ``now_s``, and detect an underflow."""
         if not self._is_open:
             return
         due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
@@ -166,7 +166,7 @@ class Generation:
             self._rest()
 
     def close(self) -> None:
-        """End the generation now: what is queued is dropped."""
+        """End the generation now and clear the queue."""
         if self._is_open:
             self._rest()
 

@@ -1,4 +1,4 @@
-"""The rig behind the simulated driver, and how its time passes: on demand, or with the wall clock."""
+"""The rig behind the simulated driver, and the passing of its time: on demand or in real time."""
 
 import threading
 import time
@@ -16,34 +16,32 @@ from .errors import DaqmxRefusal
 from .generation import Generation
 
 QUESTION_S = 0.1
-"""Rig time that a question about progress takes when nothing else lets time pass [s].
+"""Rig time added by a query of progress when nothing else advances time [s].
 
-A program that polls ("how many samples are there?") would otherwise poll for ever.
-"""
+Without it, a program that polls the number of samples would never end."""
 
 FAILED_CALL_S = 0.5
-"""Rig time before a call that has failed on demand is tried again, when nothing else lets time pass [s].
+"""Rig time before a failed call on demand is repeated, when nothing else advances time [s].
 
-A fault that heals after a while would otherwise last for ever for a program that tries again.
-"""
+Without it, a temporary fault would never end for a program that retries."""
 
 TICK_S = 0.01
-"""How often a rig on the wall clock is brought up to date [s]: well below the shortest usual read."""
+"""Interval of updates in real time [s], well below the usual read times."""
 SLICE_S = 0.1
-"""Longest stretch of rig time computed without letting another caller in [s]."""
+"""Longest rig time computed without releasing the lock [s]."""
 
 YIELD_S = 1e-4
-"""Pause between two slices while behind the clock [s]."""
+"""Pause between two slices while the rig lags behind the clock [s]."""
 
 
 class Rig:
-    """Moves the world and every running task through rig time together.
+    """Advances the world and all running tasks together.
 
-    ``changed`` guards the tasks and the trigger lines. The world guards itself: others use it too.
+    ``changed`` guards tasks and trigger lines. The world has its own lock, because others use it too.
     """
 
     def __init__(self, world: AnalogueWorld, pace: "Pace", catalogue: Catalogue) -> None:
-        """Begin at the world's time, with nothing running."""
+        """Start at the world's time, without running tasks."""
         self.world = world
         self.catalogue = catalogue
         self.pace = pace
@@ -53,19 +51,19 @@ class Rig:
         self._generations: list[Generation] = []
         self._armed: dict[str, list[Callable[[], None]]] = {}
         self._holders: dict[str, Any] = {}
-        """Which task holds which side of which device."""
+        """Tasks that have reserved an input or output side of a device."""
 
     @property
     def now_s(self) -> float:
-        """Rig time reached so far [s]."""
+        """Current rig time [s]."""
         return self.world.time_s
 
     def wall_s(self, rig_s: float) -> float:
-        """Wall-clock time of a moment of rig time [s since 1970]; they met when the rig was switched on."""
+        """Return the wall-clock time of a rig time [s since 1970]; both coincide at switch-on."""
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
-        """Let rig time pass; a world that cannot go on ends all that runs, and what waits for it."""
+        """Advance rig time; if the world fails, end all running tasks and waiting calls."""
         try:
             self._advance_to(until_s)
         except AcquisitionError as error:
@@ -77,7 +75,7 @@ class Rig:
             raise lost from error
 
     def _advance_to(self, until_s: float) -> None:
-        """Go in slices: outputs are fed first, then inputs convert, then the rest passes."""
+        """Advance in slices: feed the outputs, acquire the inputs, then advance the rest."""
         reached_s = self.now_s
         for acquisition in self._acquisitions:
             acquisition.advance_to(reached_s)
@@ -94,83 +92,84 @@ class Rig:
         self.changed.notify_all()
 
     def run_acquisition(self, acquisition: Acquisition) -> None:
-        """Take it along through time."""
+        """Include an acquisition in the advance of time."""
         self._acquisitions.append(acquisition)
         self.changed.notify_all()
 
     def run_generation(self, generation: Generation) -> None:
-        """Take it along through time; its first samples start now."""
+        """Include a generation in the advance of time; it starts now."""
         generation.prepare(self.now_s)
         self._generations.append(generation)
         self.changed.notify_all()
 
     def end(self, stream: Acquisition | Generation) -> None:
-        """Stop taking it along."""
+        """Exclude an ended stream."""
         stream.close()
         self._acquisitions = [other for other in self._acquisitions if other is not stream]
         self._generations = [other for other in self._generations if other is not stream]
         self.changed.notify_all()
 
     def reserve(self, resource: str, task: Any) -> None:
-        """Give one side of a device to a task (-50103 if another one holds it)."""
+        """Reserve one side of a device for a task (-50103 if another one has it)."""
         other = self._holders.setdefault(resource, task)
         if other is not task:
             detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {task.name}"
             raise DaqmxRefusal(DAQmxErrors.PAL_RESOURCE_RESERVED, detail)
 
     def release(self, task: Any) -> None:
-        """Take back everything a task holds."""
+        """Release all reservations of a task."""
         self._holders = {resource: other for resource, other in self._holders.items() if other is not task}
 
     def require_terminal(self, name: str) -> None:
-        """Refuse a terminal that no device has (-89120)."""
+        """Refuse an unknown terminal (-89120)."""
         known = {known.lower() for device in self.catalogue.devices for known in device.terminals}
         if name.lower() not in known:
             detail = f"Source Terminal: {name}"
             raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
 
     def arm(self, terminal: str, begin: Callable[[], None]) -> None:
-        """Call ``begin`` at the next edge on that terminal."""
+        """Call ``begin`` at the next edge on a terminal."""
         self._armed.setdefault(terminal.lower(), []).append(begin)
 
     def disarm(self, begin: Callable[[], None]) -> None:
-        """Forget what waits for an edge."""
+        """Remove a waiting function."""
         self._armed = {
             terminal: [other for other in waiting if other != begin]
             for terminal, waiting in self._armed.items()
         }
 
     def edge(self, terminal: str) -> None:
-        """Raise a terminal: everything that waits for it begins at this very instant."""
+        """Raise a terminal, and start everything that waits for it."""
         for begin in self._armed.pop(terminal.lower(), []):
             begin()
         self.changed.notify_all()
 
 
 class Pace(Protocol):
-    """A rule for the passing of rig time. Every method is called with ``rig.changed`` held."""
+    """A rule for the passing of rig time; its methods are called with ``rig.changed`` held."""
 
     @property
     def overflow(self) -> Overflow:
-        """What a full buffer does."""
+        """Behaviour of a full buffer."""
 
     def open(self, rig: "Rig") -> None:
-        """Begin: rig time passes from here on."""
+        """Start the passing of time."""
 
     def close(self) -> None:
-        """End: rig time stands still. Called without the lock."""
+        """Stop the passing of time; called without the lock."""
 
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until ``is_there()``, which is expected at rig time ``until_s``; say whether it came to be.
+        """Wait until ``is_there()``, expected at rig time ``until_s``; return whether it became true.
 
-        ``timeout_s`` is wall time; negative waits for ever. An infinite ``until_s`` depends on somebody else.
+        ``timeout_s`` is wall time; a negative one waits for ever. An infinite ``until_s`` depends on other
+        calls.
         """
 
     def answer_progress(self, rig: "Rig") -> None:
-        """Let a question about progress be answered with something newer than the last time."""
+        """Ensure that a query of progress returns something newer than the one before."""
 
     def stumble(self, rig: "Rig") -> None:
-        """Let time pass before a call that has failed on demand is tried again."""
+        """Advance time before a failed call on demand is repeated."""
 
 
 def _wait(rig: "Rig", is_there: Callable[[], bool], timeout_s: float) -> bool:
@@ -178,18 +177,18 @@ def _wait(rig: "Rig", is_there: Callable[[], bool], timeout_s: float) -> bool:
 
 
 class OnDemandPace:
-    """FREE: samples exist when asked for. Nothing waits, nothing is lost, two runs are equal bit for bit."""
+    """FREE: samples exist when requested. Nothing waits or is lost, and runs are reproducible bit for bit."""
 
     overflow = Overflow.GROW
 
     def open(self, rig: "Rig") -> None:
-        """Nothing to begin: time passes on request."""
+        """Do nothing, because time advances on request."""
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Do nothing."""
 
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
-        """Let time pass at once; wait only for what other calls must bring about, such as a trigger."""
+        """Advance time at once; wait only for events from other calls, such as a trigger."""
         if is_there():
             return True
         if until_s < float("inf"):
@@ -198,24 +197,24 @@ class OnDemandPace:
         return _wait(rig, is_there, timeout_s)
 
     def answer_progress(self, rig: "Rig") -> None:
-        """Let ``QUESTION_S`` of rig time pass."""
+        """Advance by ``QUESTION_S``."""
         rig.advance_to(rig.now_s + QUESTION_S)
 
     def stumble(self, rig: "Rig") -> None:
-        """Let ``FAILED_CALL_S`` of rig time pass."""
+        """Advance by ``FAILED_CALL_S``."""
         rig.advance_to(rig.now_s + FAILED_CALL_S)
 
 
 class WallPace:
-    """WALL: rig time follows a clock, ``speed`` times as fast; late readers lose samples, early ones wait.
+    """WALL: rig time follows a clock at ``speed``; late readers lose samples, early readers wait.
 
-    A world that cannot be computed that fast makes its samples come late, never wrong.
+    If the world is computed too slowly, samples come late but stay correct.
     """
 
     overflow = Overflow.LOSE
 
     def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
-        """Follow ``clock`` [s], any clock that never runs backwards."""
+        """Follow ``clock`` [s], any monotonic clock."""
         if not 0 < speed < float("inf"):
             message = f"the speed of a rig on the wall clock is {speed}; it must be above 0 and finite"
             raise ValueError(message)
@@ -226,7 +225,7 @@ class WallPace:
         self._began_s = (0.0, 0.0)
 
     def open(self, rig: "Rig") -> None:
-        """Start the clock, and the thread that keeps the rig up to it."""
+        """Start the clock, and the thread that advances the rig."""
         self._began_s = (self._clock(), rig.now_s)
         self._closing.clear()
         self._thread = threading.Thread(target=self._keep_up, args=(rig,), name="rig clock", daemon=True)
@@ -244,11 +243,11 @@ class WallPace:
         return is_there() or _wait(rig, is_there, timeout_s)
 
     def answer_progress(self, rig: "Rig") -> None:
-        """Bring the rig up to the clock."""
+        """Advance the rig to the clock."""
         self._step(rig)
 
     def stumble(self, rig: "Rig") -> None:
-        """Bring the rig up to the clock."""
+        """Advance the rig to the clock."""
         self._step(rig)
 
     def _keep_up(self, rig: "Rig") -> None:
@@ -258,11 +257,11 @@ class WallPace:
                 try:
                     behind_s = self._step(rig)
                 except AcquisitionError:
-                    return  # the world stands still; the next call reports it
+                    return  # the world has failed; the next call reports it
             pause_s = YIELD_S if behind_s > 0 else TICK_S
 
     def _step(self, rig: "Rig") -> float:
-        """Compute one slice at most, so that nobody waits long for the rig; say how much is left."""
+        """Compute at most one slice, so that the lock is released soon; return the remaining lag."""
         began_s, rig_began_s = self._began_s
         target_s = rig_began_s + self.speed * (self._clock() - began_s)
         rig.advance_to(min(target_s, rig.now_s + SLICE_S))

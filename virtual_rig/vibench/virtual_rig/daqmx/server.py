@@ -1,4 +1,4 @@
-"""The simulated DAQmx system on a port: any nidaqmx program can connect to it."""
+"""gRPC server of the simulated DAQmx system, for any nidaqmx program."""
 
 import hmac
 import secrets
@@ -28,19 +28,19 @@ LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
 
 
 def token_for(address: str) -> str | None:
-    """Make a token for a server at ``"host:port"``; None on loopback, which is this computer only."""
+    """Return a token for a server at ``"host:port"``; None on loopback, which only this computer reaches."""
     host = address.rpartition(":")[0]
     return None if host in LOOPBACK_HOSTS else secrets.token_urlsafe(24)
 
 
 class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Turns away every call without the token."""
+    """Rejects calls without the token."""
 
     def __init__(self, token: str) -> None:
         self._token = token
 
     def intercept_service(self, continuation: Callable[[Any], Any], details: Any) -> Any:
-        """Let a call pass, or answer it with a refusal."""
+        """Pass a call on, or reject it."""
         given = dict(details.invocation_metadata).get(TOKEN_KEY, "")
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)
@@ -55,19 +55,19 @@ def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG00
 
 
 LOOPBACK = "127.0.0.1:0"
-"""This computer only, on a free port: the server knows no passwords."""
+"""This computer only, on a free port, because the server has no passwords."""
 
 LAST_PORT = 65_535
 _WORKERS = 64
-"""Every blocking read and every event listener holds one thread."""
+"""Threads: each blocking read and each event listener needs one."""
 
 LONGEST_REQUEST_BYTES = 64_000_000
-"""Eight million samples of an output in one call, which is 40 s of the fastest."""
+"""Largest request: eight million output samples, which is 40 s at the highest rate."""
 _NO_LIMIT = -1
 _OPTIONS = (
     ("grpc.max_receive_message_length", LONGEST_REQUEST_BYTES),
     ("grpc.max_send_message_length", _NO_LIMIT),
-    ("grpc.so_reuseport", 0),  # a second server on the same port is an error, not a matter of chance
+    ("grpc.so_reuseport", 0),  # a second server on the same port must fail
 )
 
 Handler = Callable[[Any, grpc.ServicerContext], Any]
@@ -75,22 +75,22 @@ Metadata = tuple[tuple[str, str], ...]
 
 
 class DaqServer:
-    """The simulated DAQmx system, served; leaving it clears every task and ends every thread.
+    """Serves the simulated DAQmx system; leaving it deletes every task and ends every thread.
 
     Parameters
     ----------
     world
-        What the converters are wired to.
+        The signals at the converters.
     pace
-        How rig time passes; default: on demand.
+        Passing of rig time; by default on demand.
     address
-        ``"host:port"``; port 0 takes a free one, see `DaqServer.address`.
+        ``"host:port"``; port 0 selects a free one, see `DaqServer.address`.
     catalogue
-        The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
+        The devices; by default a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
     handlers
-        Further gRPC services for the same port.
+        Further gRPC services on the same port.
     token
-        What every call must carry; None lets everybody in who can reach the port.
+        Token required for every call; None accepts everyone who can reach the port.
 
     Raises
     ------
@@ -111,7 +111,7 @@ class DaqServer:
         _require_address(address)
         self.faults = Faults()
         self._refused: set[str] = set()
-        """Calls that were refused the last time they were made."""
+        """Calls that failed at their last attempt."""
         self._pace = pace or OnDemandPace()
         self._rig = Rig(world, self._pace, catalogue or Catalogue())
         self._system = DaqmxSystem(self._rig)
@@ -134,7 +134,7 @@ class DaqServer:
         self._server.start()
 
     def __enter__(self) -> Self:
-        """Enter; the server has been running since it was made."""
+        """Return the server, which has been running since its creation."""
         return self
 
     def __exit__(
@@ -144,37 +144,37 @@ class DaqServer:
 
     @property
     def task_names(self) -> tuple[str, ...]:
-        """The tasks that exist, those of vanished clients included."""
+        """Names of all tasks, including those of disconnected clients."""
         with self._rig.changed:
             return tuple(self._system.tasks)
 
     def reset(self) -> None:
-        """Clear every task and every fault, as after switching the computer off and on."""
+        """Delete every task and every fault, as after a restart of the computer."""
         with self._rig.changed:
             self._system.reset()
             self.faults.clear()
 
     def let_pass(self, duration_s: float) -> None:
-        """Let rig time pass while nobody asks for samples."""
+        """Advance rig time without a request."""
         with self._rig.changed:
             self._rig.advance_to(self._rig.now_s + duration_s)
 
     def edge(self, terminal: str) -> None:
-        """Raise a terminal, ``"/Dev1/PFI0"`` for example: what waits for it begins."""
+        """Raise a terminal, such as ``"/Dev1/PFI0"``, and start what waits for it."""
         with self._rig.changed:
             self._rig.edge(terminal)
 
     def close(self) -> None:
-        """Stop serving; legal at any time, more than once."""
+        """Stop the server; may be called repeatedly."""
         with self._rig.changed:
             self._system.reset()
         self._server.stop(grace=None).wait()
-        with self._rig.changed:  # a call that was still under way may have made and started another task
+        with self._rig.changed:  # an unfinished call may have started another task
             self._system.reset()
         self._pace.close()
         self._workers.shutdown(wait=True)
 
-    # --- from a request to its answer ----------------------------------------------------
+    # --- requests and responses -----------------------------------------------------------
 
     def _unary_calls(self) -> dict[str, Handler]:
         calls: dict[str, Callable[[Any], Fields | bytes]] = {**attribute_calls(self._system)}
@@ -196,13 +196,13 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Fail the call if a rule says so. The first refusal comes at once; to be refused again takes time.
+        """Raise an error if a rule applies. The first failure takes no rig time; repeated ones do.
 
-        A call that is let through takes none: a reader would be behind by what had passed.
+        Successful calls take no time, because readers would otherwise fall behind.
         """
         try:
             self.faults.check(name, self._rig.now_s)
-        except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
+        except DaqmxRefusal:  # a missing server does not advance time
             if name in self._refused:
                 self._pace.stumble(self._rig)
             self._refused.add(name)
@@ -214,7 +214,7 @@ class DaqServer:
             with _report_refusals(context), self._rig.changed:
                 self.faults.check(name, self._rig.now_s)
                 listener = call(request, context)
-            context.send_initial_metadata(())  # the client waits for it before it goes on
+            context.send_initial_metadata(())  # the client waits for the metadata
             yield from listener
 
         return handle
@@ -222,11 +222,11 @@ class DaqServer:
 
 @contextmanager
 def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
-    """Turn a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
+    """Convert a refusal to gRPC status UNKNOWN with the code in the trailing metadata, as clients expect."""
     try:
         try:
             yield
-        except ConfigurationError as error:  # the world cannot do what the device could
+        except ConfigurationError as error:  # the simulated world lacks a capability of the device
             raise DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error)) from error
     except DaqmxRefusal as refusal:
         context.set_trailing_metadata(_metadata(refusal))
@@ -236,7 +236,7 @@ def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
 
 
 def _require_address(address: str) -> None:
-    """Refuse what is no ``host:port``: gRPC would take a port beyond the last for another one."""
+    """Refuse text other than ``host:port``, because gRPC maps ports above the limit to others."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(
@@ -255,14 +255,14 @@ def _metadata(refusal: DaqmxRefusal) -> Metadata:
 
 
 class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
-    """The methods of the service: a program calls some thirty of 451, so each is made ready when called."""
+    """The methods of the service; prepared at the first call, because programs use about thirty of 451."""
 
     def __init__(self, unary: dict[str, Handler], listening: dict[str, Handler]) -> None:
         self._unary = unary
         self._listening = listening
 
     def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
-        """Return what answers a call; None where it is another service's."""
+        """Return the handler of a call; None for another service."""
         service, _, name = handler_call_details.method.removeprefix("/").partition("/")
         method = SERVICE.methods_by_name.get(name) if service == SERVICE.full_name else None
         return None if method is None else _rpc(method, self._unary, self._listening)

@@ -1,4 +1,4 @@
-"""A simulated DAQmx task: its channels, its states, and the terminals of its clock and trigger."""
+"""A simulated DAQmx task: channels, states, and the terminals of clock and trigger."""
 
 import math
 import time
@@ -22,7 +22,7 @@ from .rig import Rig
 
 
 class TdmsLog:
-    """The file of one run of a task; needs npTDMS."""
+    """TDMS file of one run of a task; needs npTDMS."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class TdmsLog:
         rate_hz: float,
         wall_s: Callable[[float], float],
     ) -> None:
-        """Make the file, in the place of one that is there."""
+        """Create the file; an existing one is replaced."""
         if find_spec("nptdms") is None:
             raise ConfigurationError(
                 "Logging needs npTDMS where the virtual rig runs: pip install 'vibench[exchange]'"
@@ -47,7 +47,7 @@ class TdmsLog:
             raise DaqmxRefusal(DAQmxErrors.GENERIC_FILE_IO, f"File: {settings.path}\n{error}") from error
 
     def write(self, volts: NDArray[np.float64], began_s: float) -> None:
-        """Append samples, shape (channels, samples) [V]; the first of them at rig time ``began_s``."""
+        """Append samples, shape (channels, samples) [V]; ``began_s`` is the rig time of the first."""
         from nptdms import ChannelObject, TdmsWriter  # noqa: PLC0415 - an extra; few programs log
 
         self._began = self._began or np.datetime64(round(self._wall_s(began_s) * 1e6), "us")
@@ -72,11 +72,11 @@ class TdmsLog:
 _BREATH_S = 1e-4
 _OWN_CLOCKS = ("", "onboardclock")
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
-"""Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
+"""Highest rate and samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
 
 
 class TaskState(IntEnum):
-    """The DAQmx task state model (NI-DAQmx Help, "Task State Model"); each state includes the ones before."""
+    """States of a task (NI-DAQmx Help, "Task State Model"); each includes the previous ones."""
 
     UNVERIFIED = 0
     VERIFIED = 1
@@ -103,32 +103,32 @@ class Task:
         self.log: TdmsLog | None = None
         self._rests_in = TaskState.UNVERIFIED
 
-    # --- what it consists of -------------------------------------------------------------
+    # --- configuration -------------------------------------------------------------------
 
     @property
     def channels(self) -> list[Channel]:
-        """All channels in the order they were added."""
+        """All channels in the order of their creation."""
         return [*self.inputs, *self.outputs]
 
     @property
     def devices(self) -> tuple[Device, ...]:
-        """The devices the channels lie on, each once."""
+        """The devices of the channels, without repetition."""
         return tuple({channel.device.name: channel.device for channel in self.channels}.values())
 
     @property
     def side(self) -> AnalogInputs | AnalogOutputs:
-        """What the device can do on the side this task uses."""
+        """Capabilities of the device on the side of this task."""
         self.require_channels()
         return self.inputs[0].inputs if self.inputs else self.outputs[0].outputs
 
     @property
     def stream(self) -> Acquisition | Generation | None:
-        """What runs, once it has been triggered."""
+        """The running stream after its trigger."""
         return self.acquisition or self.generation
 
     @property
     def kind(self) -> SampleTimingType:
-        """The timing in force: what was configured, or what the device does without."""
+        """Effective timing: the configured one, or the device's default."""
         if self.timing.kind is not None:
             return self.timing.kind
         is_on_demand = self.side.untimed is Untimed.ON_DEMAND
@@ -136,7 +136,7 @@ class Task:
 
     @property
     def rate_hz(self) -> float:
-        """The rate the device really runs at, the next one up that it has [Hz]; -200077 out of its range."""
+        """Effective rate, the next possible one above the requested [Hz]; -200077 out of range."""
         side, asked_hz = self.side, self.timing.requested_hz
         is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
         highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
@@ -149,7 +149,7 @@ class Task:
 
     @property
     def buffer_size(self) -> int:
-        """Samples per channel of the input buffer."""
+        """Size of the input buffer in samples per channel."""
         if self.kind is SampleTimingType.ON_DEMAND:
             return 0
         if self.reading.buffer_size is not None:
@@ -161,12 +161,12 @@ class Task:
 
     @property
     def is_running(self) -> bool:
-        """Whether it has been started and not stopped."""
+        """Whether the task is started."""
         return self.state is TaskState.RUNNING
 
     @property
     def is_on_chassis(self) -> bool:
-        """Whether its timing engine is only known once it is reserved."""
+        """Whether the timing engine is chosen at reservation."""
         return any(device.chassis for device in self.devices)
 
     @property
@@ -174,20 +174,20 @@ class Task:
         return "ai" if self.inputs else "ao"
 
     def full_terminal(self, name: str) -> str:
-        """Return a terminal with its device: ``"PFI0"`` is one of the task's own, ``"/Dev1/PFI0"``."""
+        """Return the name of a terminal with its device: ``"PFI0"`` becomes ``"/Dev1/PFI0"``."""
         self.require_channels()
         return name if name.startswith("/") else f"/{self.devices[0].clock_name}/{name}"
 
     @property
     def start_terminal(self) -> str:
-        """Terminal of its own start trigger."""
+        """Terminal of the task's start trigger."""
         return self.full_terminal(f"{self._side_name}/StartTrigger")
 
     @property
     def _awaited_terminal(self) -> str:
-        """Terminal whose edge makes the task begin; empty: its own start.
+        """Terminal whose edge starts the task; empty: its own start.
 
-        Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
+        The sample clock of another task starts with that task, so it is treated like its start trigger.
         """
         if self.timing.trigger_source:
             return self.timing.trigger_source
@@ -208,20 +208,20 @@ class Task:
         return [by_name[name] for name in wanted]
 
     def require_channels(self) -> None:
-        """Refuse to go on without channels (-200478)."""
+        """Refuse a task without channels (-200478)."""
         if not self.channels:
             code = DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
             raise DaqmxRefusal(code, f"Task Name: {self.name}")
 
     def require_stopped(self) -> None:
-        """Refuse to change what is running (-200479), and forget what was verified."""
+        """Refuse changes of a running task (-200479), and require a new verification."""
         if self.is_running:
             raise DaqmxRefusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, f"Task Name: {self.name}")
         if self.state is TaskState.VERIFIED:
             self.state = TaskState.UNVERIFIED
 
     def add(self, channel: Channel) -> None:
-        """Add a channel; a task has one direction and, except for a chassis, one device."""
+        """Add a channel; a task has one direction and, except on a chassis, one device."""
         self.require_stopped()
         if any(other.name.lower() == channel.name.lower() for other in self.channels):
             raise DaqmxRefusal(DAQmxErrors.VIRTUAL_CHAN_NAME_USED, f"Channel: {channel.name}")
@@ -235,10 +235,10 @@ class Task:
             case _:
                 raise DaqmxRefusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, f"Channel: {channel.name}")
 
-    # --- its states ----------------------------------------------------------------------
+    # --- states --------------------------------------------------------------------------
 
     def control(self, action: TaskMode) -> None:
-        """Go to the state an action names."""
+        """Change to the state of an action."""
         match action:
             case TaskMode.TASK_START:
                 self.start()
@@ -286,7 +286,7 @@ class Task:
                 raise
 
     def start(self) -> None:
-        """Begin, or wait for the trigger."""
+        """Start, or wait for the trigger."""
         self.require_channels()
         self.require_stopped()
         self._verify()
@@ -301,13 +301,13 @@ class Task:
             return
         try:
             self._begin()
-        except AcquisitionError:  # what is wired to it cannot do what the device could
+        except AcquisitionError:  # the simulated world lacks a capability of the device
             self.stop()
             raise
 
     @property
     def output_buffer(self) -> OutputBuffer:
-        """What has been written, made at the first need."""
+        """Return the output buffer, created at first use."""
         if self.buffer is None:
             self.buffer = OutputBuffer(len(self.outputs), self.writing.buffer_size)
         return self.buffer
@@ -336,12 +336,12 @@ class Task:
             self.rig.arm(self.timing.reference.terminal, self._reference_edge)
 
     def _reference_edge(self) -> None:
-        """Take an edge for the reference trigger; one that comes too early is ignored."""
+        """Apply an edge to the reference trigger; an early one is ignored."""
         if self.acquisition is not None and not self.acquisition.trigger():
             self._await_reference_edge()
 
     def await_reference(self, deadline_s: float) -> bool:
-        """Wait for a reference trigger until a moment of the wall's clock; say whether none is awaited."""
+        """Wait for a reference trigger until a wall-clock time; return whether it is settled."""
         acquisition = self.acquisition
         if acquisition is None:
             return True
@@ -352,7 +352,7 @@ class Task:
         while not is_there() and (left_s := deadline_s - time.monotonic()) > 0:
             wait_s = -1.0 if math.isinf(left_s) else left_s
             self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, wait_s)
-            self.rig.changed.wait(_BREATH_S)  # who wants to stop this task is let in
+            self.rig.changed.wait(_BREATH_S)  # let other callers stop the task
         return is_there()
 
     def _generate(self) -> Generation:
@@ -363,7 +363,7 @@ class Task:
         )  # fmt: skip
 
     def is_done(self) -> bool:
-        """Whether it has nothing left to do; raises what ended it, if it failed."""
+        """Return whether the task is finished; raise the error that ended it."""
         stream = self.stream
         if stream is None:
             return not self.is_running or self.kind is SampleTimingType.ON_DEMAND
@@ -372,7 +372,7 @@ class Task:
         return stream.is_done
 
     def wait_until_done(self, timeout_s: float) -> None:
-        """Wait for the end of a finite task (-200560 if it does not come)."""
+        """Wait for the end of a finite task (-200560 after the timeout)."""
         began_s = time.monotonic()
         self.await_reference(math.inf if timeout_s < 0 else began_s + timeout_s)
         until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
@@ -382,7 +382,7 @@ class Task:
             raise DaqmxRefusal(code, f"Task Name: {self.name}")
 
     def stop(self) -> None:
-        """End what runs and go back to the state before the start; legal in every state."""
+        """End the run and return to the state before the start; allowed in every state."""
         if not self.is_running:
             return
         self.rig.disarm(self._begin)
@@ -398,7 +398,7 @@ class Task:
         self.rig.changed.notify_all()
 
     def abort(self) -> None:
-        """End what runs and give everything back."""
+        """End the run and release all reservations."""
         self.stop()
         self.rig.release(self)
         self.state = self._rests_in = TaskState.UNVERIFIED

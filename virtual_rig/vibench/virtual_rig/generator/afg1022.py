@@ -67,11 +67,11 @@ from .terminal_voltage import Relay, Terminal
 
 DEFAULT_SERIAL = "C010101"
 SOUNDING_CHANNEL = 1
-"""The channel whose terminal is wired; channel 2 keeps its settings and plays nothing."""
+"""The only connected channel; channel 2 stores settings without an output."""
 
 
 class AFG1022(ScpiInstrument):
-    """The generator: one object behind USB, socket and the analogue world.
+    """The generator, for USB, socket and the analogue world.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class AFG1022(ScpiInstrument):
     serial
         Serial number, part of the VISA address.
     quirks, panel, terminal
-        Habits of the firmware; settings of the front panel; load, clock error and noise of the output.
+        Peculiarities of the firmware; settings of the front panel; load, clock error and noise of the output.
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
@@ -104,7 +104,7 @@ class AFG1022(ScpiInstrument):
         self.frequencies_are_locked = False
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
-        """Return every command this firmware knows, besides the common ones."""
+        """Return the instrument's commands, except the common ones."""
         return COMMANDS if quirks.load_is_panel_only else (*COMMANDS, LOAD)
 
     def _new_memory(self) -> ArbitraryMemory:
@@ -121,27 +121,28 @@ class AFG1022(ScpiInstrument):
         Parameters
         ----------
         start_s
-            Rig time of the first interval [s]; calls move forward in time.
+            Rig time of the first interval [s]; must not decrease from call to call.
         interval_s, count
-            Length of the intervals [s] and how many.
+            Length of the intervals [s] and their number.
 
         Returns
         -------
         NDArray
-            Shape (count,) [V], into the load of ``Terminal``. Commands act at the rig time at which
-            they arrived, or at the end of what was already rendered if that is later.
+            Shape (count,) [V], with the load of ``Terminal``. Commands act at the rig time of their arrival,
+            or at the
+            end of the part already rendered if that is later.
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)
 
-    # What a command may do
+    # Operations for commands
 
     def settings(self, channel: int) -> ChannelSettings:
         """Return the settings of channel 1 or 2."""
         return self._channels[channel]
 
     def configure(self, channel: int, settings: ChannelSettings) -> None:
-        """Check and take over new settings; raises ScpiError and changes nothing if they are refused."""
+        """Check and apply new settings; raises ScpiError and changes nothing if they are refused."""
         settings.checked()
         shape_of(settings, self.memory)
         previous = self._channels[channel]
@@ -150,30 +151,30 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Let the other channel follow the frequency of this one, or not."""
+        """Lock or unlock the other channel's frequency to this one's."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)
 
     def memory_changed(self) -> None:
-        """Let a changed waveform act at once if it is playing."""
+        """Apply a changed waveform at once if it is playing."""
         sounding = self._channels[SOUNDING_CHANNEL]
         if memory_name(sounding.shape) is not None:
             self._replace(SOUNDING_CHANNEL, sounding)
 
     def reset(self) -> None:
-        """Return to the defaults; a load that only the panel can set stays."""
+        """Restore the defaults, except a load that only the panel can set."""
         self.frequencies_are_locked = False
         for channel, settings in self._channels.items():
             load_ohm = settings.declared_load_ohm if self.quirks.load_is_panel_only else 50.0
             self._replace(channel, self._power_on(load_ohm))
 
     def trigger(self) -> None:
-        """Start a waiting burst, or sweep."""
+        """Start a waiting burst or sweep."""
         self._output.trigger(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def align_phases(self) -> None:
-        """Start both channels at their start phase now."""
+        """Set both channels to their start phase now."""
         self._output.align(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def _replace(self, channel: int, settings: ChannelSettings) -> None:
@@ -182,21 +183,21 @@ class AFG1022(ScpiInstrument):
             self._output.follow(previous, settings, self.now_s)
 
     def _follow_frequency(self, leader: int) -> None:
-        """Give the other channels the same frequency, within what their shapes allow."""
+        """Set the frequency of the other channels, within the limits of their shapes."""
         for channel, follower in self._channels.items():
             if channel != leader:
                 low, high = follower.frequency_range_hz
                 hz = min(max(self._channels[leader].frequency_hz, low), high)
                 self._replace(channel, replace(follower, frequency_hz=hz))
 
-    # Faults on demand
+    # Faults
 
     def weld_output_relay(self) -> None:
-        """Make ``OUTP OFF`` have no effect, although it is accepted and reported as off."""
+        """Make ``OUTP OFF`` ineffective, although it is accepted and reported as off."""
         self._set_relay_stuck(stuck=True)
 
     def repair_output_relay(self) -> None:
-        """Let the output be what it is set to."""
+        """Restore the function of the output relay."""
         self._set_relay_stuck(stuck=False)
 
     def _set_relay_stuck(self, *, stuck: bool) -> None:
@@ -207,23 +208,23 @@ class AFG1022(ScpiInstrument):
             self._output.follow(settings, settings, now_s)
 
     def jump_clock(self, by_s: float) -> None:
-        """Let the generator's clock jump, and with it the phase of what plays [s]."""
+        """Shift the generator's clock, and thus the phase of its output [s]."""
         with self.lock:
             self._output.jump_clock(by_s)
 
 
-# What the rows of the table do that no kind of row does
+# Special commands
 
 
 def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings with a mode switched on, or off if it was on (SCPI has one switch for each mode)."""
+    """Return settings with a mode switched on or off (SCPI has one switch per mode)."""
     if wanted:
         return replace(settings, mode=mode)
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
 
 
 def modulation_switch(mode: RunMode) -> Command:
-    """Return the row of a modulation: one that the panel has left on is switched off, and none on (-241)."""
+    """Return the command of a modulation: it can be switched off, but not on (-241)."""
 
     def put(settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
         if wanted:
@@ -247,7 +248,7 @@ def _shape_name(parameter: bytes) -> str:
 
 
 def _write_shape(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Select a shape; a frequency that it cannot have is lowered."""
+    """Select a shape, and lower the frequency to its limit."""
     settings, name = generator.settings(channel), _shape_name(only(parameters))
     frequency_hz = min(settings.frequency_hz, highest_frequency_hz(name))
     generator.configure(channel, replace(settings, shape=name, frequency_hz=frequency_hz))
@@ -260,7 +261,7 @@ def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> byte
 
 
 def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Take ``31DEG``, or radians without a unit; whole degrees are kept, negative ones refused."""
+    """Parse ``31DEG`` or radians; the phase is truncated to degrees, a negative one is refused."""
     full_turn_deg = 360.0
     angle, unit = number_and_unit(only(parameters))
     if unit not in ("", "RAD", "DEG"):
@@ -268,7 +269,7 @@ def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> No
     angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-    # A hair is added so that 31 degrees, sent in radians, are not truncated to 30.
+    # A small margin prevents truncation of 31 degrees, sent in radians, to 30.
     whole = math.floor(angle_deg + 1e-9)
     generator.configure(channel, replace(generator.settings(channel), phase_deg=whole))
 
@@ -322,7 +323,7 @@ def _catalogue(generator: AFG1022) -> bytes:
 
 
 def load_command(header: str) -> Command:
-    """Return the row of the declared load; high impedance is infinite."""
+    """Return the command of the declared load; high impedance is infinite."""
     row = number(
         header, "IVI; drivers contradict each other", "declared_load_ohm", RESISTANCE_UNITS,
         lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,
@@ -349,14 +350,14 @@ _DUTY = number(
 
 
 def _write_duty(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Set the duty, and complain all the same."""
+    """Set the duty cycle and queue an error, as the instrument does."""
     assert _DUTY.write is not None
     _DUTY.write(generator, channel, parameters)
     raise ScpiError(ErrorCode.SYNTAX_ERROR)
 
 
 def burst_cycles(most: int, channels: int) -> Command:
-    """Return the row of the number of periods of a burst."""
+    """Return the command of the number of burst periods."""
     return number(
         "[SOURce#:]BURSt:NCYCles", "IVI, drivers", "burst_cycles", NO_UNITS, lambda _: (1, most),
         default=5, decimals=0, channels=channels, largest=math.inf,
@@ -381,7 +382,7 @@ SHARED_COMMANDS = (
     number("[SOURce#:]FREQuency:STOP", "IVI", "sweep_stop_hz", FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
 )
-"""What the simulated generators have in common."""
+"""Commands common to the simulated generators."""
 COMMANDS = (
     *SHARED_COMMANDS,
     Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape, _ask_shape),
@@ -405,5 +406,5 @@ COMMANDS = (
     Command("DATA:COPY", "IVI, drivers", _copy_memory, None),
     report("DATA:CATalog", "IVI, drivers", _catalogue),
 )
-"""What an AFG1022 obeys besides the common commands and `LOAD`."""
+"""Commands of an AFG1022 besides the common ones and `LOAD`."""
 # fmt: on

@@ -1,4 +1,4 @@
-"""The output of one channel: turns changes of settings into the signals of its timeline."""
+"""Output of one channel: converts changes of settings to signals of its timeline."""
 
 import math
 from dataclasses import dataclass, replace
@@ -24,24 +24,22 @@ from .terminal_voltage import (
     Triangle,
 )
 
-# What the generator is set to, channel by channel, and what it allows.
-#
-# Amplitude and offset are kept as the voltage without load. What the panel shows, and what commands and
-# queries speak of, is that voltage divided by the load the user has declared (``OUTP:IMP``): declaring
-# another load changes the reading, not the output.
+# Settings by channel, and their limits. Amplitude and offset are stored as open-circuit voltages. The panel,
+# commands and queries use that voltage divided down by the declared load (``OUTP:IMP``), so declaring another
+# load changes the reading, not the output.
 
 LOWEST_FREQUENCY_HZ = 1e-6
 LOWEST_BURST_FREQUENCY_HZ = 2e-3
 OPEN_AMPLITUDE_RANGE_VPP = (2e-3, 20.0)
-"""Without load; 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
+"""Open circuit; 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
 OPEN_PEAK_V = 10.0
-"""Largest |offset| + amplitude/2 without load, the stricter of the two published readings."""
+"""Largest |offset| + amplitude/2 in open circuit, the stricter of the two published values."""
 _PEAK_ROUNDING_V = 1e-9
 _HIGHEST_MEMORY_FREQUENCY_HZ = 10e6
 
 
 class RunMode(StrEnum):
-    """What the generator does with its carrier; values are the SCPI nodes."""
+    """Run modes of the generator; values are the SCPI nodes."""
 
     CONTINUOUS = "CW"
     SWEEP = "SWE"
@@ -56,11 +54,11 @@ class RunMode(StrEnum):
 
 
 MODULATIONS = tuple(RunMode)[3:]
-"""Can be left on at the panel, and switched off remotely; what they do to the output is not simulated."""
+"""May be left on at the panel, and can be switched off remotely; their effect is not simulated."""
 
 
 class StandardShape(Enum):
-    """The shapes that need no memory."""
+    """The shapes without a memory."""
 
     SINE = "SINusoid"
     SQUARE = "SQUare"
@@ -71,7 +69,7 @@ class StandardShape(Enum):
 
     @property
     def short(self) -> str:
-        """What a query answers."""
+        """Reply to a query."""
         return short_form(self.value)
 
 
@@ -86,21 +84,21 @@ _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, N
 
 
 def standard_shape(word: str) -> str | None:
-    """Return the canonical name of a shape that needs no memory, or None if the word means none."""
-    if word.upper() in ("PRN", "PRNO"):  # public drivers and users write it so
+    """Return the canonical name of a shape without a memory; None for other words."""
+    if word.upper() in ("PRN", "PRNO"):  # spellings of public drivers and users
         return NOISE
     return next((shape.short for shape in StandardShape if mnemonic_matches(word, shape.value)), None)
 
 
 class BurstMode(Enum):
-    """What starts a burst; nothing is connected to the gate input."""
+    """Start of a burst; the gate input is open."""
 
     TRIGGERED = "TRIGgered"
     GATED = "GATed"
 
 
 class SweepTrigger(Enum):
-    """What starts a sweep, and a burst, of a generator that lets one choose."""
+    """Start of a sweep or burst, for generators with a choice."""
 
     IMMEDIATE = "IMMediate"
     BUS = "BUS"
@@ -108,7 +106,7 @@ class SweepTrigger(Enum):
 
 @dataclass(frozen=True)
 class OwnSweep:
-    """A sweep whose time is set remotely, as some generators have it."""
+    """A sweep with remotely set times, for generators that support it."""
 
     sweep_s: float = 1.0
     hold_s: float = 0.0
@@ -118,7 +116,7 @@ class OwnSweep:
 
 @dataclass(frozen=True)
 class ChannelSettings:
-    """All settings of one channel; the defaults are those of ``*RST``."""
+    """All settings of one channel; defaults are those of ``*RST``."""
 
     relay: Relay = Relay.OPEN
     declared_load_ohm: float = OUTPUT_RESISTANCE_OHM
@@ -126,33 +124,33 @@ class ChannelSettings:
     shape: str = SINE
     frequency_hz: float = 1e6
     amplitude_vpp: float = 2.0
-    """Without load: 1 Vpp into 50 ohm."""
+    """Open circuit: 1 Vpp into 50 ohm."""
     offset_v: float = 0.0
-    """Without load."""
+    """Open circuit."""
     phase_deg: int = 0
     duty_percent: float = 50.0
     mode: RunMode = RunMode.CONTINUOUS
     sweep_start_hz: float = 100e3
     sweep_stop_hz: float = 1e6
     sweep: OwnSweep | None = None
-    """None where time and spacing are the panel's."""
+    """None if time and spacing are set at the panel."""
     burst_cycles: float = 5
-    """``math.inf`` for a burst that never ends."""
+    """``math.inf`` for an endless burst."""
     burst_mode: BurstMode = BurstMode.TRIGGERED
 
     @property
     def declared_share(self) -> float:
-        """Displayed voltage over voltage without load."""
+        """Displayed voltage over open-circuit voltage."""
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.declared_load_ohm)
 
     @property
     def frequency_range_hz(self) -> tuple[float, float]:
-        """What the present shape and mode allow."""
+        """Frequency limits of the current shape and mode."""
         lowest = LOWEST_BURST_FREQUENCY_HZ if self.mode is RunMode.BURST else LOWEST_FREQUENCY_HZ
         return lowest, highest_frequency_hz(self.shape)
 
     def checked(self) -> "ChannelSettings":
-        """Return these settings if they may stand together.
+        """Return the settings if they are consistent.
 
         Raises ScpiError -221 for a peak beyond the output stage, a sweep of pulse or noise, and a burst or
         modulation of noise.
@@ -166,7 +164,7 @@ class ChannelSettings:
 
 
 def highest_frequency_hz(shape: str) -> float:
-    """Return the highest frequency at which a shape can be played."""
+    """Return the highest frequency of a shape."""
     return _HIGHEST_FREQUENCY_HZ.get(shape, _HIGHEST_MEMORY_FREQUENCY_HZ)
 
 
@@ -176,16 +174,16 @@ _PERCENT = 100.0
 
 @dataclass(frozen=True)
 class Panel:
-    """What only the front panel can set."""
+    """Settings available at the front panel only."""
 
     declared_load_ohm: float = 50.0
-    """The load the panel shows at power-on; ``math.inf`` for high impedance."""
+    """Declared load at power-on; ``math.inf`` for high impedance."""
     sweep_s: float = 1.0
     sweep_spacing: Spacing = Spacing.LINEAR
 
 
 def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShape | None:
-    """Return the shape that is set; None for noise. An empty user memory is refused."""
+    """Return the selected shape; None for noise. An empty user memory is refused."""
     duty = settings.duty_percent / _PERCENT
     computed: dict[str, PeriodicShape | None] = {
         SINE: Sine(),
@@ -201,13 +199,13 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 
 
 class ChannelOutput:
-    """Plays what the settings say, from the rig time at which they changed."""
+    """Plays the settings, each from the rig time of its change."""
 
     def __init__(
         self, terminal: Terminal, panel: Panel, memory: ArbitraryMemory, power_on: ChannelSettings
     ) -> None:
         self.relay_is_stuck = False
-        """Whether the output stays on whatever the settings say."""
+        """Whether the output stays on regardless of the settings."""
         self._panel = panel
         self._memory = memory
         carrier = SteadyPhase(round(power_on.frequency_hz * UHZ_PER_HZ), 0.0)
@@ -218,15 +216,14 @@ class ChannelOutput:
         return self._timeline.render(start_s, interval_s, count)
 
     def jump_clock(self, by_s: float) -> None:
-        """Let whatever plays jump in phase, as if that time had passed."""
+        """Shift the phase of the output as if ``by_s`` had passed."""
         self._timeline.jump(by_s)
 
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
-        """Bring the terminal in line with new settings, as of a rig time.
+        """Apply new settings at a rig time.
 
-        The phase goes on without a jump unless the start phase itself was changed. Noise is accepted, and
-        the shape before it goes on playing; the built-in DC shape stays at zero whatever the offset (AFG1062,
-        drivers).
+        The phase is continuous unless the start phase was changed. Noise is accepted, and the shape before it
+        continues; the built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
         at_s, own_s = self._when(now_s)
         latest = self._timeline.latest
@@ -243,7 +240,7 @@ class ChannelOutput:
         self._timeline.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a waiting burst or sweep; while a burst runs, and without either mode, nothing happens.
+        """Start a waiting burst or sweep; without one, or during a burst, do nothing.
 
         A gated burst needs the gate input, which is open.
         """
@@ -261,20 +258,20 @@ class ChannelOutput:
             self._timeline.change(replace(latest, course=course, burst=burst), at_s)
 
     def align(self, settings: ChannelSettings, now_s: float) -> None:
-        """Let the phase be the start phase now."""
+        """Set the phase to the start phase now."""
         at_s, own_s = self._when(now_s)
         course = self._course(settings, settings.phase_deg / _DEGREES % 1.0, own_s)
         self._timeline.change(replace(self._timeline.latest, course=course), at_s)
 
     def _when(self, now_s: float) -> tuple[float, float]:
-        """Return when a command acts: in rig time and in the generator's own time."""
+        """Return when a command acts, in rig time and in the generator's time."""
         at_s = self._timeline.effective(now_s)
         return at_s, self._timeline.own_time(at_s)
 
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
     ) -> PhaseCourse:
-        """Return the course of the phase: the same object if nothing of it has changed."""
+        """Return the phase course; the same object if it is unchanged."""
         running = self._timeline.latest.course
         if _course_key(previous) == _course_key(settings):
             return running
@@ -282,13 +279,13 @@ class ChannelOutput:
         return self._course(settings, (running.phase(own_s) + turn) % 1.0, own_s)
 
     def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
-        """Return the course that the mode asks for, passing through a phase [cycles] at a time."""
+        """Return the phase course of the mode, with a given phase [cycles] at a time."""
         if settings.mode is RunMode.SWEEP:
             return self._swept(settings, phase, own_s, math.inf)
         return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
 
     def _swept(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
-        """Return a sweep: one at a trigger, or one after the other."""
+        """Return a sweep, triggered or repeated."""
         ends = settings.sweep_start_hz, settings.sweep_stop_hz
         sweep = settings.sweep or OwnSweep(self._panel.sweep_s, spacing=self._panel.sweep_spacing)
         if sweep.trigger is SweepTrigger.IMMEDIATE:
@@ -297,7 +294,7 @@ class ChannelOutput:
 
 
 def _course_key(settings: ChannelSettings) -> tuple[object, ...]:
-    """Everything that the course of the phase depends on."""
+    """Return all settings that affect the phase course."""
     return (
         settings.mode,
         settings.frequency_hz,

@@ -1,7 +1,7 @@
-"""A simulated Keysight 33500B: the same output stage as the AFG1022's, behind another table of commands.
+"""A simulated Keysight 33500B: the output stage of the AFG1022, with another table of commands.
 
-Source: Keysight Trueform Series Operating and Service Guide, as public drivers use it (pymeasure's
-``agilent33500``, MATLAB and Python programs of laboratories); nothing was compared with an instrument.
+Source: Keysight Trueform Series Operating and Service Guide, as used by public drivers (pymeasure's
+``agilent33500``, MATLAB and Python programs of laboratories); not compared with an instrument.
 """
 
 from dataclasses import replace
@@ -29,7 +29,7 @@ from .scpi_message import (
 )
 
 TOP_CODE = 65_534
-"""Codes -32767 to 32767, counted from zero."""
+"""Codes -32767 to 32767, with an offset to start at zero."""
 _MIDDLE = 32_767
 POINTS = (8, 1_048_576)
 HIGHEST_RATE_HZ = 250e6
@@ -71,7 +71,7 @@ class _Filter(Enum):
 
 
 class Keysight33500B(AFG1022):
-    """The generator: see `AFG1022`; its waveforms have names, and its sweeps a time, a hold and a trigger."""
+    """The generator; see `AFG1022`. Its waveforms have names, its sweeps a time, a hold and a trigger."""
 
     maker, model, firmware = "Agilent Technologies", "33522B", "4.00-1.19-2.00-52-00"
 
@@ -104,7 +104,7 @@ def _name(parameter: bytes) -> str:
 
 
 def _write_dac(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    """Take a waveform as a binary block of 16-bit numbers, or as a list of them."""
+    """Store a waveform from a binary block of 16-bit numbers, or from a list."""
     del channel
     if len(parameters) < 2:
         raise ScpiError(ErrorCode.MISSING_PARAMETER)
@@ -197,7 +197,7 @@ def _set_sweep(own: Keysight33500B, channel: int, field: str, value: object) -> 
 
 
 def _sweep_seconds(node: str, field: str, range_s: tuple[float, float]) -> Command:
-    """Return the row of a time of the sweep [s]."""
+    """Return the command of a sweep time [s]."""
 
     def write(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
         seconds = number(only(parameters), _SECONDS)

@@ -1,8 +1,8 @@
-"""How the phase of a generator runs with its own time: steady or swept.
+"""Phase of a generator as a function of its own time: steady or swept.
 
-Phase is in cycles, time in seconds of the generator's own clock. Frequencies are whole microhertz,
-the resolution of the instrument, so that whole seconds contribute an exact fraction of a cycle and
-nothing drifts over hours (a DDS accumulator that never overflows).
+Phase is in cycles, time in seconds of the generator's clock. Frequencies are integer microhertz, the
+instrument's resolution, so that whole seconds give an exact fraction of a cycle and the phase does not drift
+over hours (like a DDS accumulator that never overflows).
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ Samples = NDArray[np.float64]
 MICROHERTZ = 1e-6
 UHZ_PER_HZ = 1_000_000
 CURVATURE_TOLERANCE_CYCLES = 1e-6
-"""How far the phase inside a piece may bend away from a straight line."""
+"""Largest deviation of the phase from a straight line within a piece."""
 FINEST_SPLIT = 256
-"""At most this many pieces of one interval; only sweeps above some 1e9 Hz/s would need more."""
+"""Most pieces per interval; only sweeps above about 1e9 Hz/s would need more."""
 NO_TIMES: Samples = np.empty(0)
 
 
@@ -33,7 +33,7 @@ class PhaseCourse(Protocol):
         """Return start (fraction of a cycle) and span (cycles) of the phase between consecutive edges."""
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return the instants inside (begin, end) at which to cut so that the phase is straight."""
+        """Return the times within (begin, end) between which the phase is straight."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class SteadyPhase:
 
     @classmethod
     def through(cls, frequency_uhz: int, phase: float, time_s: float) -> "SteadyPhase":
-        """Build the course that has a given phase at a given time."""
+        """Return the course with a given phase at a given time."""
         since_zero = cls(frequency_uhz, 0.0).phase(time_s)
         return cls(frequency_uhz, (phase - since_zero) % 1.0)
 
@@ -70,7 +70,7 @@ class SteadyPhase:
 
 
 class Spacing(StrEnum):
-    """How a sweep moves from start to stop."""
+    """Spacing of frequencies in a sweep."""
 
     LINEAR = "linear"
     LOGARITHMIC = "logarithmic"
@@ -78,16 +78,16 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """A frequency that runs from start to stop, again and again, without a jump of phase."""
+    """Repeated sweeps from start to stop with continuous phase."""
 
     start_hz: float
     stop_hz: float
     sweep_s: float
     spacing: Spacing
     begin_s: float
-    """When the first sweep began."""
+    """Start of the first sweep."""
     offset: float
-    """Phase at that instant [cycles]."""
+    """Phase at that time [cycles]."""
 
     def phase(self, time_s: float) -> float:
         """Return the phase at one instant [cycles, 0..1)."""
@@ -113,7 +113,7 @@ class SweptPhase:
         return _fraction(cycles[:-1]), np.diff(cycles)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return the starts of the sweeps, and as many points between as the curvature asks for."""
+        """Return the starts of the sweeps, and points between them as required by the curvature."""
         steepest = abs(self.stop_hz - self.start_hz) / self.sweep_s
         if self.spacing is Spacing.LOGARITHMIC:
             steepest = (
@@ -131,7 +131,7 @@ class SweptPhase:
 
 @dataclass(frozen=True)
 class TriggeredSweepPhase:
-    """One sweep at a trigger: the start frequency before it, the stop frequency for a time after it."""
+    """One triggered sweep: start frequency before it, stop frequency for a time after it."""
 
     start_hz: float
     stop_hz: float
@@ -139,7 +139,7 @@ class TriggeredSweepPhase:
     hold_s: float
     spacing: Spacing
     begin_s: float
-    """When it was triggered; ``math.inf`` while it waits."""
+    """Time of the trigger; ``math.inf`` while waiting."""
     anchor_s: float
     offset: float
     """Phase at ``anchor_s`` [cycles]."""
@@ -167,7 +167,7 @@ class TriggeredSweepPhase:
         return _fraction(cycles[:-1]), np.diff(cycles)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return where the sweep begins, ends and returns, and points between as its curvature asks for."""
+        """Return start, end and return of the sweep, and points between them as required by the curvature."""
         end_of_sweep_s = self.begin_s + self.sweep_s
         corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
         corners = corners[(corners > begin_s) & (corners < end_s)]

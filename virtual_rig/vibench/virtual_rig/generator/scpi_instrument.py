@@ -1,4 +1,4 @@
-"""An instrument that obeys a table of SCPI commands: messages in, replies out, errors in its queue."""
+"""An instrument with a table of SCPI commands: messages in, replies out, errors in its queue."""
 
 import math
 import socketserver
@@ -33,30 +33,30 @@ from .scpi_message import (
 
 CHANNELS = 2
 _RANGE_ROUNDING = 1e-9
-"""Relative slack at the ends of a range, for numbers that arrive in another unit."""
+"""Relative tolerance at range limits, for numbers in other units."""
 
 Parameters = tuple[bytes, ...]
 Setter = Callable[[Any, int, Parameters], None]
-"""Takes the generator, the channel, and what was sent."""
+"""Takes the generator, the channel, and the parameters."""
 Query = Callable[[Any, int, Parameters], bytes]
 
 
 @dataclass(frozen=True)
 class Command:
-    """One row; without ``write`` it can only be asked for, without ``ask`` only be sent."""
+    """One command; without ``write`` it is query-only, without ``ask`` write-only."""
 
     header: str
-    """Header as manuals print it, see `HeaderPattern`."""
+    """Header in the notation of manuals, see `HeaderPattern`."""
     source: str
-    """Where its behaviour is described."""
+    """Source of its description."""
     write: Setter | None
     ask: Query | None
     channels: int = CHANNELS
-    """The highest numeric suffix."""
+    """Highest numeric suffix."""
 
     @property
     def pattern(self) -> HeaderPattern:
-        """What matches a header that a program sends."""
+        """Pattern that matches the header in a message."""
         return HeaderPattern(self.header)
 
 
@@ -73,9 +73,9 @@ def number(
     scale: Callable[[ChannelSettings], float] = lambda _: 1.0,
     largest: float = math.nan,
 ) -> Command:
-    """Return the row of a number: a ``field`` of the settings, in ``units``, kept to this many ``decimals``.
+    """Return the command of a numeric ``field``, in ``units``, rounded to ``decimals``.
 
-    ``scale`` is the displayed number over the field's. A number of ``INFINITE`` sets ``largest``, if given.
+    ``scale`` is the displayed value over the field's. ``INFINITE`` sets ``largest``, if given.
     """
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
@@ -109,7 +109,7 @@ def choice(
     put: Callable[[ChannelSettings, Any], ChannelSettings],
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the row of a setting that is one of several words, the values of an enum."""
+    """Return the command of a setting whose values are the words of an enum."""
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
         word = text(only(parameters))
@@ -133,7 +133,7 @@ def switch(
     put: Callable[[ChannelSettings, bool], ChannelSettings],
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the row of something that is on or off."""
+    """Return the command of an on/off setting."""
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
         generator.configure(channel, put(generator.settings(channel), boolean(only(parameters))))
@@ -146,7 +146,7 @@ def switch(
 
 
 def action(header: str, source: str, act: Callable[[Any], None]) -> Command:
-    """Return the row of a command without parameters."""
+    """Return a command without parameters."""
 
     def write(generator: Any, _: int, parameters: Parameters) -> None:
         none(parameters)
@@ -156,7 +156,7 @@ def action(header: str, source: str, act: Callable[[Any], None]) -> Command:
 
 
 def report(header: str, source: str, tell: Callable[[Any], bytes]) -> Command:
-    """Return the row of a query without parameters."""
+    """Return a query without parameters."""
 
     def ask(generator: Any, _: int, parameters: Parameters) -> bytes:
         none(parameters)
@@ -166,7 +166,7 @@ def report(header: str, source: str, tell: Callable[[Any], bytes]) -> Command:
 
 
 def exactly(parameters: Parameters, count: int) -> Parameters:
-    """Return the parameters if there are as many as a command takes; -109 or -108 otherwise."""
+    """Return the parameters if their number is correct; -109 or -108 otherwise."""
     if len(parameters) < count or not all(parameters):
         raise ScpiError(ErrorCode.MISSING_PARAMETER)
     if len(parameters) > count:
@@ -175,23 +175,23 @@ def exactly(parameters: Parameters, count: int) -> Parameters:
 
 
 def only(parameters: Parameters) -> bytes:
-    """Return the one parameter that a command takes."""
+    """Return the only parameter of a command."""
     return exactly(parameters, 1)[0]
 
 
 def none(parameters: Parameters) -> None:
-    """Refuse parameters where none belong."""
+    """Refuse parameters of a command that takes none."""
     if parameters:
         raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
 
 
 LONGEST_REPLY = 1 << 20
-"""Bytes of the answers to one message; the longest that is of use has 17 kB."""
+"""Largest reply to one message in bytes; useful ones have up to 17 kB."""
 
 
 @dataclass(frozen=True)
 class Quirks:
-    """Documented habits of the family's firmware; the defaults are what FV:V1.0.2 does.
+    """Documented peculiarities of the firmware; the defaults are those of FV:V1.0.2.
 
     Sources: hardware reference, sections 1.1, 1.2 and 1.4.
     """
@@ -210,25 +210,26 @@ class Quirks:
 
 @dataclass(frozen=True)
 class Reply:
-    """What the instrument answers to one message; empty when nothing was asked."""
+    """Reply to one message; empty without a query."""
 
     data: bytes
     delay_s: float = 0.0
-    """How long the instrument lets its host wait."""
+    """Delay of the reply [s]."""
 
 
 class ScpiInstrument:
-    """Any thread may send it messages; they are carried out one after the other.
+    """Executes messages one after another; calls are thread-safe.
 
     Parameters
     ----------
     clock
-        Rig time [s]: when a command arrives. It is called outside the instrument's lock, so that it may
-        take a lock that is held while the instrument is asked for its output.
+        Rig time of a command's arrival [s]. It is called outside the instrument's lock, and may take a lock
+        that is
+        held while the output is rendered.
     identity
-        Answer to ``*IDN?``.
+        Reply to ``*IDN?``.
     commands
-        What it obeys besides the common commands.
+        Commands besides the common ones.
     """
 
     def __init__(
@@ -238,7 +239,7 @@ class ScpiInstrument:
         self.status = Status()
         self.lock = threading.RLock()
         self.now_s = 0.0
-        """When the message arrived that is carried out."""
+        """Arrival time of the current message."""
         self.clock = clock
         self.commands = (*commands, *COMMON_COMMANDS)
         self._patterns = [(command.pattern, command) for command in self.commands]
@@ -248,7 +249,7 @@ class ScpiInstrument:
         self._next_is_corrupted = False
 
     def execute(self, message: bytes) -> Reply:
-        """Carry out one complete message and return its reply."""
+        """Execute one complete message and return its reply."""
         now_s = self.clock()
         with self.lock:
             self.now_s = now_s
@@ -263,38 +264,38 @@ class ScpiInstrument:
             return Reply(data, delay_s)
 
     def report(self, code: ErrorCode) -> None:
-        """Queue an error that the interface has found: an unread reply, or a read without a query."""
+        """Queue an error of the interface: an unread reply, or a read without a query."""
         with self.lock:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Let the next reply come late; beyond the host's timeout it is found by the read after."""
+        """Delay the next reply; beyond the host's timeout, the following read receives it."""
         with self.lock:
             self._next_delay_s = delay_s
 
     def corrupt_next_reply(self) -> None:
-        """Spoil the next reply: its first byte and every second one after it, but not its end."""
+        """Corrupt the next reply: every second byte from the first on, except its end."""
         with self.lock:
             self._next_is_corrupted = True
 
     def identity(self) -> bytes:
-        """Return who the instrument is; the first time after ``*CLS`` it may say nothing."""
+        """Return the identity; empty at the first query after ``*CLS`` with that quirk."""
         is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
         return b"" if is_empty else self._identity.encode("ascii")
 
     def clear_status(self) -> None:
-        """Empty error queue and event register."""
+        """Clear error queue and event register."""
         self.status.clear()
         self._identity_is_due_empty = self.quirks.first_identity_after_clear_is_empty
 
     def reset(self) -> None:
-        """Return to the defaults."""
+        """Restore the defaults."""
 
     def trigger(self) -> None:
-        """Start what waits for a trigger of the bus."""
+        """Trigger what waits for the bus."""
 
     def _answers(self, message: bytes) -> list[bytes]:
-        """Carry out every unit of a message in order and collect the answers."""
+        """Execute all units of a message in order and return the replies."""
         path = HeaderPath()
         answers: list[bytes] = []
         room = LONGEST_REPLY
@@ -308,16 +309,16 @@ class ScpiInstrument:
                 self.status.report(error.code)
                 continue
             room -= sum(map(len, found))
-            if found and room < 0:  # nobody fetches them in the meantime (IEEE 488.2, 6.3.1.7)
+            if found and room < 0:  # no reader takes them meanwhile (IEEE 488.2, 6.3.1.7)
                 answers.clear()
                 self.status.report(ErrorCode.QUERY_DEADLOCKED)
         return answers
 
     def _obey(self, header: str, unit: Unit) -> list[bytes]:
-        """Carry out one unit; return its answer, if it asks."""
+        """Execute one unit; return the reply to a query."""
         command, suffix = self._find(header)
         if command is None or (command.ask if unit.asks else command.write) is None:
-            # Refuse a header that is not in the table, the way the firmware does.
+            # Refuse an unknown header as the firmware does.
             if not self.quirks.unknown_is_syntax_error:
                 raise ScpiError(ErrorCode.UNDEFINED_HEADER)
             self.status.report(ErrorCode.SYNTAX_ERROR)
@@ -340,7 +341,7 @@ class ScpiInstrument:
 
 
 def _spoil(reply: bytes) -> bytes:
-    """Invert every second byte, from the first on, and leave the newline that frames the reply."""
+    """Invert every second byte, from the first on, except the final newline."""
     return bytes(byte if place % 2 else byte ^ BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
 
 
@@ -363,36 +364,34 @@ COMMON_COMMANDS = (
     report("*ESR", "IEEE 488.2, 10.12", lambda instrument: _decimal(instrument.status.take_events())),
     report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
 )
-"""What every instrument obeys."""
+"""Commands of every instrument."""
 
 
-# The generator on a raw TCP socket, for programs outside Python: lines in, lines out.
-#
-# The real AFG1022 has no network port; this is a way into the simulation, opened with
-# ``TCPIP0::127.0.0.1::<port>::SOCKET`` and newline as the termination character.
+# The generator on a raw TCP socket, for programs without Python: lines in, lines out. The real AFG1022 has no
+# network port. Open it with ``TCPIP0::127.0.0.1::<port>::SOCKET`` and newline as termination character.
 
 LOOPBACK = "127.0.0.1"
 _RECEIVE_BYTES = 65536
 
 
 class ScpiDevice(Protocol):
-    """What stands behind the socket."""
+    """The device of a socket."""
 
     def execute(self, message: bytes) -> Reply:
-        """Carry out one complete message and return its reply."""
+        """Execute one complete message and return its reply."""
 
 
 class ScpiSocket:
-    """A server that listens on this machine only, unless another host is given; a context manager.
+    """A server, by default for this computer only; a context manager.
 
     Parameters
     ----------
     device
-        The instrument; several clients may talk to it at once.
+        The instrument; several clients may use it at once.
     port
-        0 takes a free one; see ``port`` and ``resource_name``.
+        0 selects a free one; see ``port`` and ``resource_name``.
     host
-        Address to listen on. SCPI has no password: anyone who reaches the port commands the generator.
+        Address to listen on. SCPI has no password: anyone who can reach the port controls the generator.
     """
 
     def __init__(self, device: ScpiDevice, port: int = 0, host: str = LOOPBACK) -> None:
@@ -403,7 +402,7 @@ class ScpiSocket:
 
     @property
     def port(self) -> int:
-        """The port that is listened on."""
+        """The port of the server."""
         return int(self._server.server_address[1])
 
     @property
@@ -412,7 +411,7 @@ class ScpiSocket:
         return f"TCPIP0::{self._server.server_address[0]!s}::{self.port}::SOCKET"
 
     def close(self) -> None:
-        """Stop listening. Legal at any time."""
+        """Stop the server; allowed at any time."""
         self._closing.set()
         self._server.shutdown()
         self._server.server_close()
@@ -428,7 +427,7 @@ class ScpiSocket:
 
 
 class _Server(socketserver.ThreadingTCPServer):
-    """One thread for each client, none of which keeps the process alive."""
+    """One thread per client; the threads do not keep the process alive."""
 
     daemon_threads = True
     allow_reuse_address = True
@@ -437,12 +436,12 @@ class _Server(socketserver.ThreadingTCPServer):
 
 def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Event) -> _Server:
     class Session(socketserver.BaseRequestHandler):
-        """One client: collects bytes until a message ends, and answers it."""
+        """One client: collects bytes until a message is complete, and answers it."""
 
         def handle(self) -> None:
-            """Serve until the client leaves or sends no end of message."""
+            """Serve until the client disconnects or exceeds the message length."""
             pending = b""
-            while len(pending) < LONGEST_MESSAGE:  # a client that never ends one is disconnected
+            while len(pending) < LONGEST_MESSAGE:  # a client that sends no end of message is disconnected
                 try:
                     received = self.request.recv(_RECEIVE_BYTES)
                 except ConnectionError:
@@ -457,9 +456,9 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
         def _answer(self, message: bytes) -> None:
             reply = device.execute(message)
             if reply.delay_s and closing.wait(reply.delay_s):
-                return  # the server closed while the instrument was still thinking
+                return  # the server closed while the message was executed
             if reply.data:
-                # A client that has left wants no answer.
+                # A disconnected client needs no reply.
                 with suppress(ConnectionError):
                     self.request.sendall(reply.data)
 

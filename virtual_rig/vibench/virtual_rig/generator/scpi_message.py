@@ -1,4 +1,4 @@
-"""Where one SCPI message ends and what it consists of: units, headers, parameters, binary blocks."""
+"""Parser of SCPI messages: their ends, units, headers, parameters and binary blocks."""
 
 import math
 import re
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 QUEUE_LENGTH = 20
-"""Errors kept before the last one becomes "Queue overflow" (the depth is assumed, SCPI asks for >= 2)."""
+"""Errors in the queue before "Queue overflow" (the depth is assumed; SCPI requires >= 2)."""
 
 
 class ErrorCode(IntEnum):
-    """SCPI-1999 error numbers (volume 2, chapter 21.8) that the instrument uses."""
+    """SCPI-1999 error numbers (volume 2, chapter 21.8) of the instrument."""
 
     NO_ERROR = 0
     SYNTAX_ERROR = -102
@@ -40,14 +40,14 @@ class ErrorCode(IntEnum):
 
     @property
     def text(self) -> str:
-        """The words that SYST:ERR? sends with the number."""
+        """Text of SYST:ERR? for the number."""
         words = self.name.replace("_", " ").capitalize()
         kind, _, problem = words.partition(" ")
         return f"{kind} {problem.upper()}" if kind == "Query" else words
 
 
 class ScpiError(Exception):
-    """A command was refused; carries the number that goes into the error queue."""
+    """A refused command, with the number for the error queue."""
 
     def __init__(self, code: ErrorCode) -> None:
         super().__init__(f'{int(code)},"{code.text}"')
@@ -91,20 +91,20 @@ class Status:
             self._errors[-1] = ErrorCode.QUEUE_OVERFLOW
 
     def next_error(self) -> ErrorCode:
-        """Take the oldest error from the queue; NO_ERROR when it is empty."""
+        """Return and remove the oldest error; NO_ERROR from an empty queue."""
         return self._errors.popleft() if self._errors else ErrorCode.NO_ERROR
 
     def take_events(self) -> Event:
-        """Read the event register, which clears it."""
+        """Return and clear the event register."""
         events, self._events = self._events, Event.NONE
         return events
 
     def operation_complete(self) -> None:
-        """Note that everything asked for is done (``*OPC``)."""
+        """Record that all operations are complete (``*OPC``)."""
         self._events |= Event.OPERATION_COMPLETE
 
     def clear(self) -> None:
-        """Empty queue and event register (``*CLS``)."""
+        """Clear queue and event register (``*CLS``)."""
         self._errors.clear()
         self._events = Event.NONE
 
@@ -114,10 +114,10 @@ _NODE = re.compile(r"(?P<short>\*?[A-Z]+)(?P<rest>[a-z]*)(?P<suffix>#?)")
 
 @dataclass(frozen=True)
 class HeaderPattern:
-    """A header as manuals print it: capitals are the short form, brackets are optional, # is a number.
+    """A header in the notation of manuals: capitals are the short form, brackets optional, # a number.
 
-    ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on. A missing
-    number means 1 (SCPI-1999, volume 1, 6.2.5.2).
+    ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on. A missing number
+    means 1 (SCPI-1999, volume 1, 6.2.5.2).
     """
 
     text: str
@@ -127,7 +127,7 @@ class HeaderPattern:
         object.__setattr__(self, "_expression", re.compile(_expression(self.text), re.IGNORECASE))
 
     def match(self, header: str) -> int | None:
-        """Return the numeric suffix (1 when absent) if the header is this command, else None."""
+        """Return the numeric suffix (1 if absent) if the header matches, else None."""
         found = self._expression.fullmatch(header)
         if found is None:
             return None
@@ -135,7 +135,7 @@ class HeaderPattern:
 
 
 def _expression(pattern: str) -> str:
-    """Translate the manual's notation into a regular expression."""
+    """Return a regular expression for the manual's notation."""
     expression = pattern.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
     return _NODE.sub(_node_expression, expression)
 
@@ -148,12 +148,12 @@ def _node_expression(node: re.Match[str]) -> str:
 
 @dataclass(frozen=True)
 class HeaderPath:
-    """Where in the command tree the next header of a message counts from (SCPI-1999, volume 1, 6.2.4)."""
+    """Position in the command tree to which the next header is relative (SCPI-1999, volume 1, 6.2.4)."""
 
     prefix: str = ""
 
     def resolve(self, header: str) -> tuple[str, "HeaderPath"]:
-        """Return the full header and the path for the unit after it."""
+        """Return the full header and the path for the next unit."""
         if header.startswith("*"):
             return header, self
         full = header[1:] if header.startswith(":") else self.prefix + header
@@ -167,7 +167,7 @@ def mnemonic_matches(word: str, mnemonic: str) -> bool:
 
 
 def short_form(mnemonic: str) -> str:
-    """Return the capitals of a mnemonic: what the instrument answers."""
+    """Return the capitals of a mnemonic, which are the instrument's reply."""
     return "".join(letter for letter in mnemonic if not letter.islower())
 
 
@@ -177,30 +177,30 @@ NEWLINE = ord("\n")
 BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
 LONGEST_MESSAGE = 1 << 22
-"""Bytes of one message (assumed); the longest that is of use is a waveform of a million points, 2 MB."""
+"""Largest message in bytes (assumed); the longest useful one, a million-point waveform, has 2 MB."""
 WHITE_SPACE = frozenset(b" \t\r")
 DIGITS = frozenset(b"0123456789")
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One command or query of a message, as it was written."""
+    """One command or query of a message, as written."""
 
     header: str
-    """``"SOUR1:FREQ"`` without the question mark, not yet resolved against a path."""
+    """``"SOUR1:FREQ"`` without the question mark, not yet resolved."""
     asks: bool
     """Whether the header ends in a question mark."""
     parameters: tuple[bytes, ...]
     """Raw parameters without surrounding white space; a block keeps its ``#`` header."""
     starts_line: bool
-    """Whether the unit opens a line, so that its header counts from the root."""
+    """Whether the unit starts a line, so that its header is relative to the root."""
 
 
 def block_length(data: bytes, start: int) -> int | None:
-    """Return how many bytes a block that begins at ``start`` occupies, or None while that is unknown.
+    """Return the length of a block that begins at ``start``, or None while it is unknown.
 
-    Definite: ``#<d><n><n bytes>``; indefinite: ``#0`` up to the end of the message
-    (IEEE 488.2-1992, 7.7.6). A ``#`` that begins no block occupies one byte.
+    Definite: ``#<d><n><n bytes>``; indefinite: ``#0`` up to the end of the message (IEEE 488.2-1992, 7.7.6).
+    A ``#`` that begins no block has length one.
     """
     if start + 1 >= len(data):
         return None
@@ -220,8 +220,8 @@ def block_length(data: bytes, start: int) -> int | None:
 def _marks(data: bytes, ends_blocks: int | None = None) -> Iterator[tuple[int, int]]:
     """Yield (position, byte) of every separator, comma and newline outside quotes and blocks.
 
-    Stops early, without a mark, at a block or string whose end has not arrived yet. A block of indefinite
-    length goes on to the end, or to a byte: a stream has no other sign for the end of its message.
+    Stops at a block or string whose end has not arrived. A block of indefinite length extends to the end, or
+    to the byte ``ends_blocks``, because a stream has no other sign for the end of its message.
     """
     position = 0
     while position < len(data):
@@ -246,10 +246,10 @@ def _marks(data: bytes, ends_blocks: int | None = None) -> Iterator[tuple[int, i
 
 
 def message_end(data: bytes) -> int | None:
-    """Return where the first complete message in a byte stream ends (after its newline), or None.
+    """Return the end of the first complete message (after its newline), or None.
 
-    A newline inside a quoted string or a binary block does not end a message: an uploaded waveform may
-    well contain the byte 0x0A. One of indefinite length ends at the first newline: nothing else ends it here.
+    A newline inside a quoted string or a binary block does not end a message, because an uploaded waveform
+    may contain the byte 0x0A. A block of indefinite length ends at the first newline.
     """
     for position, byte in _marks(data, ends_blocks=NEWLINE):
         if byte == NEWLINE:
@@ -258,7 +258,7 @@ def message_end(data: bytes) -> int | None:
 
 
 def units(message: bytes) -> list[Unit]:
-    """Split a complete message into its units; empty units vanish."""
+    """Return the units of a complete message without empty ones."""
     found: list[Unit] = []
     pieces: list[bytes] = []
     begin = 0
@@ -279,7 +279,7 @@ def units(message: bytes) -> list[Unit]:
 
 
 def _unit(pieces: list[bytes], *, starts_line: bool) -> Unit | None:
-    """Read header and parameters from the text between two separators."""
+    """Return header and parameters of the text between two separators."""
     first = _trim(pieces[0])
     if not first and len(pieces) == 1:
         return None
@@ -297,7 +297,7 @@ def _unit(pieces: list[bytes], *, starts_line: bool) -> Unit | None:
 
 
 def _trim(piece: bytes) -> bytes:
-    """Drop white space around a parameter, but never a byte of a block's data."""
+    """Remove white space around a parameter, but no bytes of a block's data."""
     piece = piece.lstrip(b" \t\r")
     if piece.startswith(b"#"):
         length = block_length(piece, 0) or len(piece)
@@ -306,7 +306,7 @@ def _trim(piece: bytes) -> bytes:
 
 
 INFINITE = 9.9e37
-"""What SCPI sends for infinity (SCPI-1999, volume 1, 7.2.1.4)."""
+"""SCPI's number for infinity (SCPI-1999, volume 1, 7.2.1.4)."""
 
 # SCPI multipliers: M is milli except before HZ, where it is mega (SCPI-1999, volume 1, 7.1.4.3).
 FREQUENCY_UNITS: Mapping[str, float] = {
@@ -333,7 +333,7 @@ _NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)\s*(?P<
 
 
 def text(parameter: bytes) -> str:
-    """Decode a parameter that must be plain text."""
+    """Return a parameter as text."""
     try:
         return parameter.decode("ascii")
     except UnicodeDecodeError:
@@ -341,9 +341,9 @@ def text(parameter: bytes) -> str:
 
 
 def number(parameter: bytes, units: Mapping[str, float]) -> float:
-    """Read ``1.5kHz`` or ``INF``: the value in the base unit.
+    """Return the value of ``1.5kHz`` or ``INF`` in the base unit.
 
-    Raises ScpiError: -131 for a unit that does not belong here, -104 for what is no number.
+    Raises ScpiError: -131 for a wrong unit, -104 for text that is no number.
     """
     if mnemonic_matches(text(parameter), "INFinity"):
         return INFINITE
@@ -354,14 +354,14 @@ def number(parameter: bytes, units: Mapping[str, float]) -> float:
 
 
 def _finite(value: float) -> float:
-    """Refuse what overflows: -123, the exponent is too large (SCPI-1999, volume 2, 21.8.9)."""
+    """Refuse an overflow: -123, the exponent is too large (SCPI-1999, volume 2, 21.8.9)."""
     if not math.isfinite(value):
         raise ScpiError(ErrorCode.EXPONENT_TOO_LARGE)
     return value
 
 
 def number_and_unit(parameter: bytes) -> tuple[float, str]:
-    """Split ``31 deg`` into 31.0 and ``"DEG"``."""
+    """Return 31.0 and ``"DEG"`` for ``31 deg``."""
     found = _NUMBER.fullmatch(text(parameter))
     if found is None:
         raise ScpiError(ErrorCode.DATA_TYPE_ERROR)
@@ -369,12 +369,12 @@ def number_and_unit(parameter: bytes) -> tuple[float, str]:
 
 
 def integer(parameter: bytes) -> int:
-    """Read a whole number; fractions are rounded, as SCPI asks."""
+    """Return an integer; fractions are rounded, as SCPI requires."""
     return round(number(parameter, NO_UNITS))
 
 
 def boolean(parameter: bytes) -> bool:
-    """Read ON, OFF or a number; anything that rounds to zero is OFF."""
+    """Return the value of ON, OFF or a number; a number that rounds to zero is OFF."""
     word = text(parameter).upper()
     if word in ("ON", "OFF"):
         return word == "ON"
@@ -395,13 +395,13 @@ def block(parameter: bytes) -> bytes:
 
 
 def as_block(data: bytes) -> bytes:
-    """Wrap data as a definite-length block."""
+    """Return data as a definite-length block."""
     count = str(len(data))
     return f"#{len(count)}{count}".encode("ascii") + data
 
 
 def as_number(value: float) -> bytes:
-    """Write a number the way the instrument answers: ``1.5E+03``, ``9.9E+37``, ``0.0E+00``."""
+    """Return a number in the instrument's format: ``1.5E+03``, ``9.9E+37``, ``0.0E+00``."""
     sign, digits, exponent = Decimal(repr(float(f"{value:.12g}"))).normalize().as_tuple()
     if not isinstance(exponent, int) or not any(digits):
         return b"0.0E+00"
@@ -424,7 +424,7 @@ _POWER_ON_POINTS = 1000
 
 
 class ArbitraryMemory:
-    """Edit memory and user memories; every stored waveform is immutable."""
+    """Edit memory and user memories; stored waveforms are immutable."""
 
     def __init__(self, most_points: int = MOST_POINTS, top_code: int = TOP_CODE) -> None:
         self.top_code = top_code
@@ -439,11 +439,11 @@ class ArbitraryMemory:
             raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE) from None
 
     def define(self, points: int) -> None:
-        """Make the edit memory ``points`` long and flat."""
+        """Set the edit memory to ``points`` zeros."""
         self._store(EDIT_MEMORY, _blank(self._checked_length(points)))
 
     def load(self, name: str, data: bytes) -> None:
-        """Fill a memory from big-endian 16-bit codes."""
+        """Store big-endian 16-bit codes in a memory."""
         if len(data) % 2:
             raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
         self._checked_length(len(data) // 2)
@@ -453,17 +453,17 @@ class ArbitraryMemory:
         self._store(name, codes)
 
     def copy(self, source: str, target: str) -> None:
-        """Copy one memory onto another."""
+        """Copy a memory to another."""
         self._waveforms[target] = self.codes(source)
 
     @property
     def catalogue(self) -> tuple[str, ...]:
-        """Names of all memories that hold a waveform, the edit memory first."""
+        """Names of all non-empty memories, the edit memory first."""
         users = [name for name in self._waveforms if name != EDIT_MEMORY]
         return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
 
     def hold(self, codes: Codes) -> None:
-        """Let the edit memory hold codes of any generator."""
+        """Store codes of any generator in the edit memory."""
         self._checked_length(len(codes))
         self._store(EDIT_MEMORY, codes)
 
@@ -478,7 +478,7 @@ class ArbitraryMemory:
 
 
 def memory_name(word: str) -> str | None:
-    """Return the canonical name of the memory that a word means, or None if it means none."""
+    """Return the canonical name of a memory; None for other words."""
     upper = word.upper()
     if upper in ("EMEM", "EMEMORY"):
         return EDIT_MEMORY
@@ -491,7 +491,7 @@ def memory_name(word: str) -> str | None:
 
 
 def big_endian(codes: Codes) -> bytes:
-    """Codes as they travel on the wire."""
+    """Return codes in the byte order of transfers."""
     return codes.astype(">u2").tobytes()
 
 

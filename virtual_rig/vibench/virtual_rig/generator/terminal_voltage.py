@@ -1,7 +1,7 @@
-"""What comes out of the generator's terminal: the exact mean voltage over consecutive intervals.
+"""Exact mean voltage at the generator's terminal over consecutive intervals.
 
-A timeline of immutable signals, each valid from the instant of the command that made it. Signals are
-functions of the generator's own time, so rendering in blocks of any size gives the same samples.
+A timeline of immutable signals, each valid from the time of its command. Signals are functions of the
+generator's own time, so block sizes do not affect the samples.
 """
 
 from bisect import bisect_right
@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from .phase_course import PhaseCourse, Samples, SteadyPhase
 from .scpi_message import TOP_CODE, Codes
 
-# Periodic shapes between -1 and 1 and their exact mean over any stretch of phase.
-#
-# Phase is counted in cycles. A mean over a stretch of length zero is the value at that phase.
+# Periodic shapes between -1 and 1 and their exact mean over any range of phase, in cycles. A mean over a
+# range of length zero is the value at that phase.
 
 
 class PeriodicShape(Protocol):
-    """A waveform that repeats every cycle."""
+    """A waveform with a period of one cycle."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the means from phases ``start`` (0 <= start < 1) over ``span`` >= 0 cycles."""
@@ -32,13 +31,13 @@ class Sine:
     """sin(2 pi phase)."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the sine at the middle, lowered by sinc(span)."""
+        """Return the mean: the sine at the middle, multiplied by sinc(span)."""
         return np.asarray(np.sin(np.pi * (2 * start + span)) * np.sinc(span))
 
 
 @dataclass(frozen=True)
 class Flat:
-    """Zero at every phase: the built-in DC shape, whose level is the offset alone."""
+    """Zero at every phase: the built-in DC shape, whose level is only the offset."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:  # noqa: ARG002 - every mean is zero
         """Return zeros."""
@@ -52,7 +51,7 @@ class Rectangle:
     duty: float = 0.5
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean from the share of the stretch that lies in the high part."""
+        """Return the mean from the share of the range in the high part."""
         end = start + span
         cycles = np.floor(end)
         high = cycles * self.duty + np.minimum(end - cycles, self.duty) - np.minimum(start, self.duty)
@@ -64,10 +63,10 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Triangle:
-    """Rises from 0 to 1 in a quarter of a cycle, falls to -1, returns to 0: the ramp with 50 % symmetry."""
+    """A ramp with 50 % symmetry: 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the middle value where no corner lies inside, else from the integral."""
+        """Return the mean: the middle value if the range contains no corner, else from the integral."""
         begin = start + 0.25  # counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
@@ -92,8 +91,8 @@ class Triangle:
 class Table:
     """A waveform memory played with a zero-order hold: each point lasts 1/N of the cycle.
 
-    Codes from 0 to ``top_code`` span -1..1. The integral is a cumulative sum of whole numbers, so means are
-    exact except for one rounding.
+    Codes from 0 to ``top_code`` span -1..1. The integral is a cumulative sum of integers, so means are exact
+    except for one rounding.
     """
 
     codes: Codes
@@ -120,7 +119,7 @@ class Table:
         return np.asarray(2 * mean_code / self.top_code - 1)
 
     def _sum(self, points_passed: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Sum of all codes before a point, across as many cycles as needed."""
+        """Return the sum of all codes before a point, over any number of cycles."""
         cycles, rest = np.divmod(points_passed, len(self.codes))
         return np.asarray(cycles * self._sums[-1] + self._sums[rest])
 
@@ -128,9 +127,9 @@ class Table:
 OUTPUT_RESISTANCE_OHM = 50.0
 NO_BLOCK = -1
 NOISE_BLOCK = 4096
-"""Samples of noise that one draw of the random generator makes; a block is drawn from its own seed."""
+"""Noise samples per draw; each block has its own seed."""
 _CONTINUES = 1e-3
-"""A block whose start is this close (in intervals) to the end of the last one continues it."""
+"""A block continues the previous one if its start is this close to the end (in intervals)."""
 
 
 class Relay(Enum):
@@ -142,7 +141,7 @@ class Relay(Enum):
 
 @dataclass(frozen=True)
 class Burst:
-    """The time during which a burst lets the shape run; outside it the level at the start phase stays."""
+    """Duration of a burst; outside, the output stays at the level of the start phase."""
 
     begin_s: float
     end_s: float
@@ -151,18 +150,18 @@ class Burst:
 
 @dataclass(frozen=True)
 class Signal:
-    """The open-circuit voltage from one command to the next, in the generator's own time."""
+    """Open-circuit voltage from one command to the next, in the generator's own time."""
 
     relay: Relay = Relay.OPEN
     course: PhaseCourse = field(default_factory=lambda: SteadyPhase(0, 0.0))
     shape: PeriodicShape = field(default_factory=Sine)
     amplitude_vpp: float = 0.0
-    """Peak to peak, without load."""
+    """Peak to peak, open circuit."""
     offset_v: float = 0.0
     burst: Burst | None = None
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return every instant inside (begin, end) at which the signal must be cut."""
+        """Return every time within (begin, end) at which the signal must be cut."""
         times = self.course.breakpoints(begin_s, end_s, interval_s)
         if self.burst is None:
             return times
@@ -182,30 +181,30 @@ class Signal:
 
 @dataclass(frozen=True)
 class Terminal:
-    """Everything about the output that no command changes."""
+    """Properties of the output that no command changes."""
 
     load_ohm: float = 15e3
-    """What the terminal really sees (``math.inf``: nothing); the default is the amplifier's input."""
+    """Actual load (``math.inf``: none); by default the amplifier's input."""
     clock_error_ppm: float = 0.0
-    """How fast the generator's clock runs against rig time."""
+    """Error of the generator's clock relative to rig time [ppm]."""
     noise_v_per_rt_hz: float = 50e-9
     """One-sided density of the output's own noise (assumed; the data sheet gives none)."""
     seed: int = 0
     clock_offset_s: float = 0.0
-    """What its clock has jumped by since it was switched on."""
+    """Total shift of its clock since switch-on [s]."""
 
     @property
     def divider(self) -> float:
-        """The share of the open-circuit voltage that reaches the terminal."""
+        """Voltage at the terminal over open-circuit voltage."""
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.load_ohm)
 
     def own_time(self, time_s: Samples) -> Samples:
-        """Return what the generator's clock says at a rig time."""
+        """Return the generator's time at a rig time."""
         return time_s + time_s * (self.clock_error_ppm * 1e-6) + self.clock_offset_s
 
 
 class Timeline:
-    """The signals of one output in the order of time, and their samples."""
+    """The signals of one output in time order, and their samples."""
 
     def __init__(self, terminal: Terminal, power_on: Signal) -> None:
         self.terminal = terminal
@@ -214,22 +213,22 @@ class Timeline:
         self._origin_s = 0.0
         self._interval_s = 0.0
         self._rendered = 0
-        """Samples since ``_origin_s``, all of one interval."""
+        """Samples since ``_origin_s``, all with the same interval."""
         self._noise_index = 0
         self._noise_block = NO_BLOCK, np.empty(0)
         self._end_s = -np.inf
 
     @property
     def latest(self) -> Signal:
-        """The signal that the last command made."""
+        """The signal of the last command."""
         return self._signals[-1]
 
     def jump(self, by_s: float) -> None:
-        """Let the generator's own clock jump, from what is rendered next on."""
+        """Shift the generator's clock from the next rendered sample on."""
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> float:
-        """Return when a command that arrives at a rig time acts: never before what is already rendered."""
+        """Return when a command acts that arrives at a rig time: never within the part already rendered."""
         return max(time_s, self._end_s, self._since_s[-1])
 
     def own_time(self, time_s: float) -> float:
@@ -237,7 +236,7 @@ class Timeline:
         return float(self.terminal.own_time(np.asarray(time_s)))
 
     def change(self, signal: Signal, time_s: float) -> None:
-        """Let a signal begin at a rig time, which ``effective`` has confirmed."""
+        """Start a signal at a rig time returned by ``effective``."""
         if time_s == self._since_s[-1]:
             self._signals[-1] = signal
         else:
@@ -251,7 +250,7 @@ class Timeline:
         if count == 0:
             return volts
         noise = self._noise(count)
-        # Drop signals that ended before a rig time.
+        # Remove signals that ended before a rig time.
         ended = max(bisect_right(self._since_s, edges_s[0]) - 1, 0)
         del self._since_s[:ended], self._signals[:ended]
         until = [*self._since_s[1:], np.inf]
@@ -262,7 +261,7 @@ class Timeline:
         return volts * self.terminal.divider
 
     def _edges(self, start_s: float, interval_s: float, count: int) -> Samples:
-        """Return the ends of the intervals, on one grid for as long as blocks follow each other."""
+        """Return the interval limits, on one grid for consecutive blocks."""
         expected_s = self._origin_s + self._rendered * self._interval_s
         if interval_s != self._interval_s or abs(start_s - expected_s) > _CONTINUES * interval_s:
             self._origin_s, self._interval_s, self._rendered = start_s, interval_s, 0
@@ -273,7 +272,7 @@ class Timeline:
     def _contribution(
         self, signal: Signal, edges_s: Samples, valid: tuple[float, float], noise: Samples
     ) -> Samples:
-        """Return what one signal adds to the mean of every interval (open circuit) [V]."""
+        """Return the contribution of one signal to the mean of every interval (open circuit) [V]."""
         begin_s, end_s = max(valid[0], edges_s[0]), min(valid[1], edges_s[-1])
         first = max(bisect_right(edges_s, begin_s) - 1, 0)
         last = int(np.searchsorted(edges_s, end_s, side="left"))
@@ -284,13 +283,13 @@ class Timeline:
         weights = np.diff(local) / self._interval_s
         means = signal.means(own) if len(cuts) == 0 else _mean_over_pieces(signal, own, cuts)
         volts = np.zeros(len(edges_s) - 1)
-        # Noise on average over one interval: density times the bandwidth 1/(2 interval).
+        # Rms noise of an interval's mean: density times the square root of the bandwidth 1/(2 interval).
         rms_v = self.terminal.noise_v_per_rt_hz / np.sqrt(2 * self._interval_s)
         volts[first:last] = weights * means + np.sqrt(weights) * rms_v * noise[first:last]
         return volts
 
     def _noise(self, count: int) -> Samples:
-        """Return unit noise that depends on the seed and the sample's number alone."""
+        """Return unit noise that depends only on the seed and the sample number."""
         begin, self._noise_index = self._noise_index, self._noise_index + count
         blocks = range(begin // NOISE_BLOCK, (self._noise_index - 1) // NOISE_BLOCK + 1)
         drawn = np.concatenate([self._drawn(block) for block in blocks])
@@ -298,7 +297,7 @@ class Timeline:
         return drawn[skip : skip + count]
 
     def _drawn(self, block: int) -> Samples:
-        """Return a block of unit noise; the last one is kept, for renderings shorter than a block."""
+        """Return a block of unit noise; the last one is cached."""
         if self._noise_block[0] != block:
             generator = np.random.default_rng((self.terminal.seed, block))
             self._noise_block = block, generator.standard_normal(NOISE_BLOCK)
@@ -306,7 +305,7 @@ class Timeline:
 
 
 def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samples:
-    """Return the mean over every interval of a signal that must be cut inside them."""
+    """Return the interval means of a signal that must be cut within intervals."""
     times = np.unique(np.concatenate((edges_s, cuts_s)))
     durations = np.diff(times)
     interval = np.searchsorted(edges_s, times[:-1], side="right") - 1
@@ -315,9 +314,9 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     pieces = np.bincount(interval, minlength=intervals)
     sums = np.bincount(interval, weights=durations * means, minlength=intervals)
     widths = np.bincount(interval, weights=durations, minlength=intervals)
-    # Edges that coincide (a signal that begins on one) make empty intervals, which weigh nothing.
+    # Coinciding edges give empty intervals without weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # An uncut interval keeps its mean to the last bit, as if no other interval had been cut.
+    # Keep the mean of an uncut interval to the last bit, independent of cuts in others.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

@@ -1,5 +1,5 @@
 """The whole virtual rig, switched on: generator on the USB bus, DAQ server, world, and scripted faults.
 
-`VirtualRig` joins the other rooms for a rig's configuration; `RigFaults` is everything that can go wrong
-on demand, a fault script plays it by rig time (docs/campaigns.md).
+`VirtualRig` assembles the other inner packages for a rig's configuration; `RigFaults` contains all faults on
+demand, and a fault script plays them by rig time (docs/campaigns.md).
 """

@@ -1,4 +1,4 @@
-"""A script of faults by rig time, so that a whole night can be rehearsed in minutes.
+"""A script of faults by rig time, to rehearse a long campaign in minutes.
 
 ::
 
@@ -29,52 +29,52 @@ from ..world.world import World
 DROPOUT_LEVEL = 0.0
 OVER_RANGE_LEVEL = 1.0
 Heal = Callable[[], None]
-"""Takes one fault back."""
-# Where a program first asks the driver for the device: setting it up, and starting on it.
+"""Ends one fault."""
+# Calls at which a program first accesses the device: creating a task's channels, and starting it.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 
 
 class RigFaults:
-    """Faults of a running virtual rig; each takes effect at once and may be called from any thread."""
+    """Faults of a running virtual rig; each acts at once, and calls are thread-safe."""
 
     def __init__(
         self, world: World, generator: AFG1022, cable: UsbTmcInstrument, daq: DaqServer, disk: DiskTrouble
     ) -> None:
-        """Take the parts that can fail."""
+        """Store the parts that can fail."""
         self._world = world
         self._generator = generator
         self._cable = cable
         self._daq = daq
         self.disk = disk
-        """Of the recordings that this process makes."""
+        """Disk of the recordings of this process."""
 
     def pull_usb_cable(self) -> None:
-        """Lose the generator: every transfer fails, and it plays on."""
+        """Disconnect the generator: every transfer fails, and its output continues."""
         self._cable.pull_cable()
 
     def plug_usb_cable(self) -> None:
-        """Put the generator's cable back."""
+        """Reconnect the generator."""
         self._cable.plug_cable()
 
     def hang_generator(self) -> None:
-        """Let the generator answer nobody; it plays on."""
+        """Make the generator unresponsive; its output continues."""
         self._cable.hang()
 
     def wake_generator(self) -> None:
-        """Let the generator answer again."""
+        """Make the generator responsive again."""
         self._cable.wake()
 
     def jump_clock(self, by_s: float) -> None:
-        """Let the generator's clock jump [s]: what plays jumps in phase."""
+        """Shift the generator's clock [s], and thus the phase of its output."""
         self._generator.jump_clock(by_s)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Let the generator's next reply come late."""
+        """Delay the generator's next reply."""
         self._generator.delay_next_reply(delay_s)
 
     def corrupt_next_reply(self) -> None:
-        """Let the generator's next reply be unreadable."""
+        """Corrupt the generator's next reply."""
         self._generator.corrupt_next_reply()
 
     def stick_output(self) -> None:
@@ -86,61 +86,61 @@ class RigFaults:
         self._generator.repair_output_relay()
 
     def turn_amplifier_gain(self, gain_db: float) -> None:
-        """Turn the amplifier's knob to something else than the configuration says."""
+        """Set the amplifier's gain to a value other than the configured one."""
         self._world.set_amplifier_gain_db(gain_db)
 
     def turn_gain_back(self) -> None:
-        """Turn the amplifier's knob to what the configuration says."""
+        """Restore the configured gain of the amplifier."""
         self._world.restore_amplifier_gain()
 
     def widen_gaps(self, by_m: float) -> None:
-        """Let the specimen's stops stand further from m1, or nearer [m]: a screw is loose, a stop worn."""
+        """Move the specimen's stops away from m1, or closer [m], as by a loose screw or wear."""
         self._world.widen_gaps(by_m)
 
     def drop_laser(self, duration_s: float) -> None:
-        """Take the light from the vibrometer: it shows nothing for a while."""
+        """Block the vibrometer's laser for a while; it gives no signal."""
         self._world.disturb_vibrometer(duration_s, DROPOUT_LEVEL)
 
     def over_range(self, duration_s: float) -> None:
-        """Let the vibrometer sit at its full scale for a while."""
+        """Hold the vibrometer at full scale for a while."""
         self._world.disturb_vibrometer(duration_s, OVER_RANGE_LEVEL)
 
     def disconnect(self, physical_channel: str) -> None:
-        """Pull the cable out of an input of the converter, ``"cDAQ1Mod1/ai2"`` for example."""
+        """Disconnect an input of the converter, such as ``"cDAQ1Mod1/ai2"``."""
         self._world.disconnect(physical_channel)
 
     def connect(self, physical_channel: str) -> None:
-        """Plug the cable of an input of the converter in again."""
+        """Reconnect an input of the converter."""
         self._world.connect(physical_channel)
 
     def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input of the converter; `connect` puts them right."""
+        """Swap the two wires of an input of the converter; `connect` restores them."""
         self._world.reverse(physical_channel)
 
     def overrun(self, from_s: float = 0.0) -> Heal:
-        """Let the converter's buffer be overwritten before it is read, from a rig time on [s]."""
+        """Overwrite the converter's buffer before it is read, from a rig time on [s]."""
         code = DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE.value
         return self._in_force(*(Fault(call, code, from_s=from_s) for call in _READS))
 
     def reserve_device(self) -> Heal:
-        """Let another program hold the converter: anyone who sets up or starts a task is refused."""
+        """Reserve the converter for another program: creating or starting a task fails."""
         code = DAQmxErrors.PAL_RESOURCE_RESERVED.value
         return self._in_force(*(Fault(call, code) for call in _RESERVING))
 
     def fail_daq(self, call: str, code: int, from_s: float = 0.0) -> Heal:
-        """Let a call of the DAQmx driver fail with a code (``nidaqmx.error_codes``), from a rig time on.
+        """Make a DAQmx call fail with a code (``nidaqmx.error_codes``), from a rig time on.
 
-        A fault of one call that reads samples is a fault of the other: which one a driver uses is its affair.
+        A fault of one call that reads samples also applies to the other, because drivers may use either.
         """
         calls = _READS if call in _READS else (call,)
         return self._in_force(*(Fault(each, code, from_s=from_s) for each in calls))
 
     def lose_daq_server(self, from_s: float = 0.0) -> Heal:
-        """Let the DAQ server answer nobody any more, from a rig time on [s]."""
+        """Stop the DAQ server from answering, from a rig time on [s]."""
         return self._in_force(ServerGone(from_s=from_s))
 
     def heal_daq(self) -> None:
-        """Take back every fault of the DAQ server."""
+        """End every fault of the DAQ server."""
         self._daq.faults.clear()
 
     def _in_force(self, *rules: Fault | ServerGone) -> Heal:
@@ -155,36 +155,36 @@ class RigFaults:
 
 
 def nothing_to_heal() -> None:
-    """Take back what is over by itself."""
+    """Do nothing, because the fault ends by itself."""
 
 
 class ScriptedFault(FrozenModel):
-    """When a fault begins, and for how long it lasts."""
+    """Start and duration of a fault."""
 
     at_s: NonNegativeFloat
-    """Rig time since the rig was switched on [s]."""
+    """Rig time since switch-on [s]."""
     for_s: PositiveFloat | None = None
-    """Rig time after which it heals [s]; absent: never, or by itself."""
+    """Duration in rig time [s]; absent: permanent, or ending by itself."""
 
 
 class PullUsbCable(ScriptedFault):
-    """The generator's cable is out: it cannot be reached, and plays on."""
+    """The generator's cable is disconnected: it cannot be reached, and its output continues."""
 
     fault: Literal["pull_usb_cable"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Pull it."""
+        """Disconnect the cable."""
         rig.pull_usb_cable()
         return rig.plug_usb_cable
 
 
 class HangGenerator(ScriptedFault):
-    """The generator answers nobody, and plays on."""
+    """The generator does not respond, and its output continues."""
 
     fault: Literal["hang_generator"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Hang."""
+        """Make it unresponsive."""
         rig.hang_generator()
         return rig.wake_generator
 
@@ -195,7 +195,7 @@ class StickOutput(ScriptedFault):
     fault: Literal["stick_output"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Weld it."""
+        """Block the relay."""
         rig.stick_output()
         return rig.free_output
 
@@ -207,7 +207,7 @@ class DelayReply(ScriptedFault):
     delay_s: PositiveFloat
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Delay the next one."""
+        """Delay the next reply."""
         rig.delay_next_reply(self.delay_s)
         return nothing_to_heal
 
@@ -218,56 +218,56 @@ class CorruptReply(ScriptedFault):
     fault: Literal["corrupt_reply"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Spoil the next one."""
+        """Corrupt the next reply."""
         rig.corrupt_next_reply()
         return nothing_to_heal
 
 
 class JumpClock(ScriptedFault):
-    """The generator's clock jumps: whatever plays jumps in phase."""
+    """The generator's clock jumps, and with it the phase of its output."""
 
     fault: Literal["jump_clock"]
     by_s: float
-    """Forwards when positive [s]."""
+    """Positive: forwards [s]."""
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Jump."""
+        """Shift the clock."""
         rig.jump_clock(self.by_s)
         return nothing_to_heal
 
 
 class DropLaser(ScriptedFault):
-    """The vibrometer has no light and shows nothing."""
+    """The vibrometer's laser is blocked, and it gives no signal."""
 
     fault: Literal["drop_laser"]
     for_s: PositiveFloat
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Take the light."""
+        """Block the laser."""
         rig.drop_laser(self.for_s)
         return nothing_to_heal
 
 
 class OverRange(ScriptedFault):
-    """The vibrometer sits at its full scale."""
+    """The vibrometer stays at full scale."""
 
     fault: Literal["over_range"]
     for_s: PositiveFloat
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Go there."""
+        """Hold it at full scale."""
         rig.over_range(self.for_s)
         return nothing_to_heal
 
 
 class TurnGain(ScriptedFault):
-    """Somebody turns the amplifier's knob."""
+    """The amplifier's gain is changed."""
 
     fault: Literal["turn_amplifier_gain"]
     gain_db: float = Field(ge=-60, le=60)
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Turn it; healing turns it back to where the configuration has it."""
+        """Change the gain; healing restores the configured one."""
         rig.turn_amplifier_gain(self.gain_db)
         return rig.turn_gain_back
 
@@ -277,23 +277,23 @@ class WidenGaps(ScriptedFault):
 
     fault: Literal["widen_gaps"]
     by_m: float = Field(ge=-1e-4, le=1e-3)
-    """Against what the configuration says [m]."""
+    """Change of the configured gaps [m]."""
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Move them; healing puts them back."""
+        """Move the stops; healing restores them."""
         rig.widen_gaps(self.by_m)
         return lambda: rig.widen_gaps(0.0)
 
 
 class Disconnect(ScriptedFault):
-    """A cable falls out of an input of the converter."""
+    """An input of the converter is disconnected."""
 
     fault: Literal["disconnect"]
     channel: str
     """``"cDAQ1Mod1/ai2"``."""
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Pull it; healing plugs it in."""
+        """Disconnect it; healing reconnects it."""
         rig.disconnect(self.channel)
         return lambda: rig.connect(self.channel)
 
@@ -309,12 +309,12 @@ class Overrun(ScriptedFault):
 
 
 class ReserveDevice(ScriptedFault):
-    """Another program takes the converter: tasks that run go on, new ones are refused."""
+    """Another program reserves the converter: running tasks continue, new ones are refused."""
 
     fault: Literal["reserve_device"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Take it."""
+        """Reserve it."""
         return rig.reserve_device()
 
 
@@ -326,17 +326,17 @@ class FailDaq(ScriptedFault):
     code: int
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Fail it."""
+        """Make the call fail."""
         return rig.fail_daq(self.call, self.code)
 
 
 class LoseDaqServer(ScriptedFault):
-    """The gRPC server of the converter answers nobody."""
+    """The gRPC server of the converter does not answer."""
 
     fault: Literal["lose_daq_server"]
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Go."""
+        """Stop answering."""
         return rig.lose_daq_server()
 
 
@@ -345,27 +345,27 @@ class FillDisk(ScriptedFault):
 
     fault: Literal["fill_disk"]
     refusals: PositiveInt | None = None
-    """How often it refuses before there is room again; absent: until healed."""
+    """Number of failing writes; absent: until healed."""
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Fill it."""
+        """Fill the disk."""
         return rig.disk.fill() if self.refusals is None else rig.disk.fill(self.refusals)
 
 
 class SlowDisk(ScriptedFault):
-    """Every write to the disk takes long."""
+    """Every write to the disk is slow."""
 
     fault: Literal["slow_disk"]
     delay_s: PositiveFloat
-    """On the wall's clock, since a disk knows no other [s]."""
+    """Delay in wall-clock time, as for any disk [s]."""
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Slow it down."""
+        """Slow down the disk."""
         return rig.disk.slow_down(self.delay_s)
 
 
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
-"""What befalls the program that records, not the rig."""
+"""Faults of the recording program, not of the rig."""
 
 FaultKind = Annotated[
     PullUsbCable
@@ -390,13 +390,13 @@ FaultKind = Annotated[
 
 
 class FaultScript(FrozenModel):
-    """What goes wrong, and when; in any order."""
+    """Faults and their times, in any order."""
 
     faults: tuple[FaultKind, ...] = ()
 
 
 def load_fault_script(path: Path | str) -> FaultScript:
-    """Read a script of faults: a TOML file, or by its name (``"night"``) one that comes with vibench.
+    """Return the faults of a TOML file, or of a shipped script by its name (``"night"``).
 
     Raises
     ------
@@ -408,23 +408,23 @@ def load_fault_script(path: Path | str) -> FaultScript:
 
 @dataclass(frozen=True)
 class PlayedFault:
-    """One fault that has started."""
+    """A fault that has started."""
 
     fault: str
     began_s: float
-    """Rig time [s]."""
+    """Start in rig time [s]."""
 
 
 @dataclass
 class FaultPlay:
-    """A script being played on a rig: each fault at its rig time, whatever advances it."""
+    """Plays a script on a rig: each fault at its rig time."""
 
     world: World
     rig: RigFaults
     played: list[PlayedFault] = field(default_factory=list)
 
     def begin(self, script: FaultScript) -> None:
-        """Make an appointment for every fault of the script."""
+        """Schedule every fault of the script."""
         for fault in script.faults:
             self.world.at(fault.at_s, lambda fault=fault: self._befall(fault))  # type: ignore[misc]
 

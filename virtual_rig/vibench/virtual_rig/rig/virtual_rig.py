@@ -29,43 +29,45 @@ from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, RigF
 
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
-"""Rig time that every refusal of the disk but the first takes: it is emptied in time for who tries again."""
+"""Rig time of every disk failure except the first, so that a program that retries sees the disk recover."""
 
 
 GENERATORS: Mapping[int, type[AFG1022]] = MappingProxyType({0x0699: AFG1022, 0x0957: Keysight33500B})
-"""The simulated generators, by the maker's number in their USB address."""
+"""The simulated generators, by vendor number in their USB address."""
 
 
 class DiskFaults(Enum):
-    """What becomes of a script's faults of the disk."""
+    """Handling of disk faults in a script."""
 
     PLAYED = auto()
-    """This process records, and meets them."""
+    """This process records, and its disk has the faults."""
     REFUSED = auto()
-    """Another process records, whose disk is out of reach."""
+    """Another process records, whose disk is not accessible."""
 
 
 class VirtualRig:
-    """Every simulated instrument of a rig, from entering its ``with`` to leaving it.
+    """All simulated instruments of a rig, available within the ``with`` statement.
 
-    Any pyvisa program of this process finds the generator at ``visa_resource``, any nidaqmx program
-    the converter at ``daq_address``. Programs of other processes find both at ``daq_address``: the
-    generator after ``plug_in_remote(daq_address)``, or without it at ``socket_resource``.
+    A pyvisa program of this process finds the generator at ``visa_resource``, a nidaqmx program the converter
+    at ``daq_address``. Programs of other processes find both at ``daq_address``: the generator after
+    ``plug_in_remote(daq_address)``, or without it at ``socket_resource``.
 
     Parameters
     ----------
     rig
-        With a ``[virtual]`` section.
+        A rig with a ``[virtual]`` section.
     address
-        ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default; anywhere else, every call
-        must carry `token`.
+        ``"host:port"`` of the server; port 0 selects a free one. Loopback by default; otherwise every call
+        needs
+        `token`.
     quirks, panel
-        Habits of the generator's firmware, and what only its front panel can set: a load that is set
-        to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
+        Peculiarities of the generator's firmware, and settings of its front panel: a load of 50 ohm that is
+        set
+        there, and cannot be set remotely, doubles the voltage at the amplifier.
     scpi_port
-        Of `socket_resource`; 0 takes a free one.
+        Port of `socket_resource`; 0 selects a free one.
     disk
-        Whether a script of faults may trouble the recordings that this process makes.
+        Whether a fault script may affect recordings of this process.
     """
 
     def __init__(
@@ -84,9 +86,9 @@ class VirtualRig:
         self._address = address
         self._scpi_port = scpi_port
         self.token = token_for(address)
-        """What calls from other computers must carry; None on loopback."""
+        """Token required from other computers; None on loopback."""
         self._pace = _pace(virtual)
-        # The generator and the world need each other: the clock is looked up when it is asked for.
+        # Generator and world refer to each other, so the clock is resolved at each call.
         usb_ids, serial = _address(rig.generator.resource)
         self.generator = GENERATORS[usb_ids[0]](
             lambda: self.world.time_s,
@@ -95,11 +97,11 @@ class VirtualRig:
             panel=panel,
             terminal=_terminal(rig, virtual),
         )
-        """What is behind the USB cable."""
+        """The generator behind the USB cable."""
         self.controller = _controller(rig, lambda: self.world.time_s)
-        """What closes a fast loop; None where the rig has none."""
+        """The controller of a fast loop; None without one."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
-        """What is behind the terminals."""
+        """The analogue world."""
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self._running: _Running | None = None
 
@@ -110,12 +112,12 @@ class VirtualRig:
 
     @property
     def daq_address(self) -> str:
-        """``"host:port"`` of the DAQ server, which serves the generator's USB cable as well."""
+        """``"host:port"`` of the DAQ server, which also serves the generator's USB cable."""
         return self._switched_on.daq.address
 
     @property
     def socket_resource(self) -> str:
-        """VISA name of the generator for programs that cannot use the USB bus in memory."""
+        """VISA name of the generator for programs without access to the simulated USB bus."""
         return self._switched_on.socket.resource_name
 
     @property
@@ -126,22 +128,22 @@ class VirtualRig:
 
     @property
     def faults(self) -> RigFaults:
-        """What can go wrong, on demand."""
+        """Faults on demand."""
         return self._switched_on.play.rig
 
     @property
     def played_faults(self) -> tuple[PlayedFault, ...]:
-        """What the script of the configuration has done to the rig so far."""
+        """Faults of the configuration's script that have started."""
         return tuple(self._switched_on.play.played)
 
     def let_pass(self, duration_s: float) -> None:
-        """Let rig time pass while nobody samples; a rig on the wall's clock needs nobody for that."""
+        """Advance rig time without sampling; a rig in real time advances by itself."""
         match self._pace:
             case OnDemandPace():
                 self._switched_on.daq.let_pass(duration_s)
 
     def __enter__(self) -> Self:
-        """Switch everything on, or nothing."""
+        """Switch everything on; after an error, everything is off."""
         with ExitStack() as starting:
             plug_in(self._usb)
             starting.callback(unplug, self._usb)
@@ -193,7 +195,7 @@ class VirtualRig:
 
 @dataclass(frozen=True)
 class _Running:
-    """What exists only while the rig is switched on."""
+    """State of a rig that is switched on."""
 
     daq: DaqServer
     socket: ScpiSocket
@@ -203,7 +205,7 @@ class _Running:
 
 
 def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
-    """Return what simulates a real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
+    """Return the simulated real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
     if rig.controller is None:
         return None
     simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")
@@ -231,7 +233,7 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
 
 
 def _address(resource: str) -> tuple[tuple[int, int], str]:
-    """Take maker, product and serial number out of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
+    """Return vendor, product and serial number of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
     fields = resource.split("::")
     try:
         ids = int(fields[1], 0), int(fields[2], 0)

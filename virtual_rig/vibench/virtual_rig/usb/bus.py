@@ -1,7 +1,6 @@
 """A USB bus in memory: what is plugged in here is found by any program that uses pyvisa-py or PyUSB.
 
-For a generator in another process, one line before (or after) pyvisa opens its resource manager is
-enough::
+For a generator in another process, one line before (or after) pyvisa opens its resource manager is enough::
 
     from vibench.virtual_rig.usb import usb_bus
     usb_bus.plug_in_remote("127.0.0.1:31763")
@@ -33,15 +32,14 @@ from vibench.acquisition.rig import TOKEN_KEY, given_token
 
 from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbDevice
 
-# A USB cable through the network: a device served over gRPC, and the proxy that a bus holds instead of it.
-#
-# Generic methods, bytes in and bytes out; every number is big-endian. An answer begins with the errno of
-# the transfer (zero: it worked), so that a pulled cable or a timeout looks the same on both ends.
+# A USB cable through the network: a device served over gRPC, and its proxy on a bus. Generic methods, bytes
+# in and bytes out; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
+# so that a disconnected cable or a timeout looks the same on both ends.
 
 SERVICE = "vibench.virtual.UsbDevice"
 CONNECT_TIMEOUT_S = 5.0
 NETWORK_MARGIN_S = 30.0
-"""How much longer than the transfer's own timeout the network may take before the device counts as gone."""
+"""Time beyond the transfer's own timeout after which the device counts as lost [s]."""
 _NEVER_MS = 2**32 - 1
 
 _ERRNO = struct.Struct(">i")
@@ -54,7 +52,7 @@ _Method = Callable[[bytes], bytes]
 
 
 def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
-    """Return the handler that serves one device; add it to any ``grpc.Server``, beside other services."""
+    """Return the handler that serves one device on a ``grpc.Server``."""
 
     def identify(_: bytes) -> bytes:
         found = device.identification
@@ -82,7 +80,7 @@ def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
 
 
 def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
-    """Put the outcome of a transfer in front of its answer."""
+    """Return a handler that prefixes the response with the outcome of the transfer."""
 
     def serve(request: bytes, context: grpc.ServicerContext) -> bytes:
         try:
@@ -101,7 +99,7 @@ def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext],
 
 
 class RemoteUsbDevice:
-    """A device in another process; raises InstrumentLost when nobody serves one at the address."""
+    """A device in another process; raises InstrumentLost when none is served at the address."""
 
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
@@ -120,7 +118,7 @@ class RemoteUsbDevice:
         vendor_id, product_id, packet_bytes = _IDENTIFICATION.unpack_from(body)
         maker, product, serial = body[_IDENTIFICATION.size :].decode().split(_TEXT_SEPARATOR)
         self.identification = Identification(vendor_id, product_id, maker, product, serial, packet_bytes)
-        """What the descriptors say, as of the connection."""
+        """The device's descriptors at the time of the connection."""
 
     def bulk_out(self, data: bytes) -> None:
         """Send one transfer."""
@@ -131,12 +129,12 @@ class RemoteUsbDevice:
         return self._call("BulkIn", _READ.pack(length, timeout_ms), timeout_ms)
 
     def control(self, setup: Setup, data: bytes) -> bytes:
-        """Carry out a class request."""
+        """Execute a class request."""
         packed = _SETUP.pack(setup.request_type, setup.request, setup.value, setup.index, setup.length)
         return self._call("Control", packed + data)
 
     def close(self) -> None:
-        """Close the connection; every later transfer fails with ENODEV. Legal at any time."""
+        """Close the connection; later transfers fail with ENODEV. Allowed at any time."""
         self._channel.close()
 
     def _method(self, name: str) -> grpc.UnaryUnaryMultiCallable:
@@ -145,7 +143,7 @@ class RemoteUsbDevice:
         return self._methods[name]
 
     def _call(self, name: str, request: bytes, timeout_ms: int = 0) -> bytes:
-        """Call a method; a dead server or connection is a device that is gone."""
+        """Call a method; a lost server or connection counts as a disconnected device."""
         deadline_s = None if timeout_ms == _NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
         try:
             answer = self._method(name)(request, timeout=deadline_s, metadata=self._metadata)
@@ -163,7 +161,7 @@ _REQUEST_TYPE_MASK = 0x60
 
 @dataclass(frozen=True, eq=False)
 class _Port:
-    """A place on the bus and the device in it."""
+    """A port of the bus with its device."""
 
     device: UsbDevice
     address: int
@@ -186,7 +184,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         self._lock = threading.RLock()
 
     def plug_in(self, device: UsbDevice) -> None:
-        """Put a device on the bus; its vendor, product and serial must be new there."""
+        """Connect a device; its vendor, product and serial must be unique on the bus."""
         name = device.identification.resource_name
         with self._lock:
             if any(port.device.identification.resource_name == name for port in self._ports):
@@ -197,14 +195,14 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
             self._ports.append(_Port(device, next(self._addresses)))
 
     def unplug(self, device: UsbDevice) -> None:
-        """Take a device off the bus; programs that hold it open get ENODEV. Legal when it is not there."""
+        """Disconnect a device; programs that use it get ENODEV. Allowed if it is not connected."""
         with self._lock:
             self._ports = [port for port in self._ports if port.device is not device]
 
     # Enumeration and descriptors
 
     def enumerate_devices(self) -> list[_Port]:
-        """Return everything that is plugged in."""
+        """Return all connected devices."""
         with self._lock:
             return list(self._ports)
 
@@ -229,7 +227,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         config: int,  # noqa: ARG002 - there is one
     ) -> SimpleNamespace:
         """Return an endpoint; IndexError past the last."""
-        # Bulk out or bulk in (table 9-13); IndexError past them.
+        # Bulk out or bulk in (table 9-13); IndexError for others.
         return SimpleNamespace(
             bLength=_ENDPOINT_BYTES,
             bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
@@ -245,33 +243,33 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
     # Opening and claiming
 
     def open_device(self, dev: _Port) -> _Handle:
-        """Open a device that is still plugged in."""
+        """Open a device that is still connected."""
         handle = _Handle(dev)
         self._present(handle)
         return handle
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close; a claim that was forgotten ends with it."""
+        """Close a device and end its claim."""
         self.release_interface(dev_handle, 0)
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:  # noqa: ARG002 - there is one
-        """Accept the one configuration."""
+        """Accept the only configuration."""
         self._present(dev_handle)
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        """Return the one configuration."""
+        """Return the only configuration."""
         self._present(dev_handle)
         return 1
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
-        """Take the interface for one handle alone; EBUSY if another one has it, as with libusb."""
+        """Claim the interface exclusively; EBUSY if another handle has it, as with libusb."""
         self._present(dev_handle)
         with self._lock:
             if self._owners.setdefault(dev_handle.port, dev_handle) is not dev_handle:
                 raise usb.core.USBError("Resource busy", errno=errno.EBUSY)
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
-        """Give the interface back."""
+        """Release the interface."""
         with self._lock:
             if self._owners.get(dev_handle.port) is dev_handle:
                 del self._owners[dev_handle.port]
@@ -279,14 +277,14 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
     # Transfers
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
-        """Send one transfer; return how many bytes went."""
+        """Send one transfer; return the number of bytes."""
         device = self._present(dev_handle)
         with _usb_errors():
             device.bulk_out(data.tobytes())
         return len(data) * data.itemsize
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
-        """Fill the buffer from one transfer; return how many bytes came."""
+        """Fill the buffer from one transfer; return the number of bytes."""
         device = self._present(dev_handle)
         with _usb_errors():
             return _fill(buff, device.bulk_in(len(buff), timeout))
@@ -301,7 +299,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         data: array,  # type: ignore[type-arg]
         timeout: int,  # noqa: ARG002 - control transfers are instantaneous
     ) -> int:
-        """Answer requests for string descriptors here, and hand class requests to the device."""
+        """Answer requests for string descriptors, and pass class requests to the device."""
         device = self._present(dev_handle)
         setup = Setup(bmRequestType, bRequest, wValue, wIndex, len(data))
         incoming = usb.util.ctrl_direction(bmRequestType) == usb.util.CTRL_IN
@@ -312,7 +310,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         return _fill(data, reply) if incoming else len(data)
 
     def _present(self, handle: _Handle) -> UsbDevice:
-        """Return the device of a handle, or fail with ENODEV if it was unplugged."""
+        """Return the device of a handle; ENODEV if it was disconnected."""
         with self._lock:
             if handle.port not in self._ports:
                 raise usb.core.USBError("No such device (it may have been disconnected)", errno=errno.ENODEV)
@@ -320,7 +318,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
 
 
 def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
-    """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall anything else, as PyUSB asks no more."""
+    """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall other requests, which PyUSB does not use."""
     kind, index = divmod(setup.value, 256)
     if setup.request == _GET_DESCRIPTOR and kind == usb.util.DESC_TYPE_STRING:
         descriptor = string_descriptor(device.identification, index)
@@ -330,19 +328,19 @@ def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
 
 
 def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
-    """Copy received bytes into PyUSB's buffer; return how many."""
+    """Copy received bytes into PyUSB's buffer; return their number."""
     buffer[: len(data)] = array("B", data)
     return len(data)
 
 
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
-    """Turns a device's OSError into what PyUSB's own backends raise.
+    """Converts a device's OSError to the errors of PyUSB's own backends.
 
-    No generator: from Python 3.13 on its frame keeps the handle of a session that failed to open.
+    Not a generator, because from Python 3.13 on its frame keeps the handle of a session that failed to open.
     """
 
     def __enter__(self) -> None:
-        """Nothing to prepare."""
+        """Do nothing."""
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         match error:
@@ -360,10 +358,10 @@ def _bus(find_library: object = None) -> UsbBus:  # noqa: ARG001 - signature of 
 
 
 def install() -> None:
-    """Let PyUSB, and pyvisa-py on top of it, see the virtual bus in this process from now on.
+    """Make PyUSB, and thus pyvisa-py, use the virtual bus in this process.
 
-    Without libusb pyvisa-py drops its USB sessions when it is first imported; if that has happened
-    already, they are registered now. Legal at any time, and done by ``plug_in``.
+    Without libusb, pyvisa-py omits its USB sessions at its first import; in that case they are registered
+    now. May be called repeatedly; ``plug_in`` does it.
     """
     usb.backend.libusb1.get_backend = _bus
     if "pyvisa_py" in sys.modules and "pyvisa_py.usb" not in sys.modules:
@@ -371,18 +369,18 @@ def install() -> None:
 
 
 def plug_in(device: UsbDevice) -> None:
-    """Put a device on the virtual bus, so that pyvisa lists and opens it."""
+    """Connect a device to the virtual bus, so that pyvisa lists and opens it."""
     _BUS.plug_in(device)
     install()
 
 
 def unplug(device: UsbDevice) -> None:
-    """Take a device off the virtual bus. Legal when it is not there."""
+    """Disconnect a device from the virtual bus. Allowed if it is not connected."""
     _BUS.unplug(device)
 
 
 def plug_in_remote(address: str) -> RemoteUsbDevice:
-    """Put the generator of a rig in another process on this process's bus.
+    """Connect the generator of a rig in another process to this process's bus.
 
     Parameters
     ----------
@@ -410,7 +408,7 @@ _ENDPOINTS = (BULK_OUT, BULK_IN)
 
 
 def device_descriptor(identification: Identification, address: int) -> SimpleNamespace:
-    """Return the device descriptor (table 9-8) and where on the bus the device sits."""
+    """Return the device descriptor (table 9-8) and the device's position on the bus."""
     return SimpleNamespace(
         bLength=_DEVICE_BYTES,
         bDescriptorType=usb.util.DESC_TYPE_DEVICE,
@@ -435,7 +433,7 @@ def device_descriptor(identification: Identification, address: int) -> SimpleNam
 
 
 def configuration_descriptor(config: int) -> SimpleNamespace:
-    """Return the one configuration (table 9-10); IndexError past it."""
+    """Return the only configuration (table 9-10); IndexError for others."""
     if config != 0:
         raise IndexError(config)
     return SimpleNamespace(
@@ -452,7 +450,7 @@ def configuration_descriptor(config: int) -> SimpleNamespace:
 
 
 def interface_descriptor(interface: int, alternate: int) -> SimpleNamespace:
-    """Return the one interface, USBTMC with the USB488 protocol (table 9-12); IndexError past it."""
+    """Return the only interface, USBTMC with the USB488 protocol (table 9-12); IndexError for others."""
     if (interface, alternate) != (0, 0):
         raise IndexError((interface, alternate))
     return SimpleNamespace(
@@ -470,7 +468,7 @@ def interface_descriptor(interface: int, alternate: int) -> SimpleNamespace:
 
 
 def string_descriptor(identification: Identification, index: int) -> bytes | None:
-    """Return a string descriptor (table 9-16), or None if there is none of that number."""
+    """Return a string descriptor (table 9-16), or None for an unknown number."""
     texts = {
         _MAKER: identification.maker,
         _PRODUCT: identification.product,

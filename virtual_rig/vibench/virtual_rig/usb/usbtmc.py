@@ -1,8 +1,7 @@
-"""The USB test-and-measurement class in front of an instrument: messages wrapped in bulk transfers.
+"""The USB test-and-measurement class for an instrument: messages in bulk transfers.
 
-Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are USBTMC's
-unless they say USB488. Waiting is not lived through: a transfer that would outlast the host's timeout
-fails at once.
+Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are USBTMC's unless
+they say USB488. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
 """
 
 import errno
@@ -17,11 +16,10 @@ from typing import NoReturn, Protocol
 from ..generator.scpi_instrument import Reply
 from ..generator.scpi_message import BYTE, LONGEST_MESSAGE, ErrorCode
 
-# What a USB device is to the bus: descriptors, and transfers that succeed or fail like the real ones.
-#
-# A device may live in this process or behind a network connection; the bus does not know which.
-# Transfers fail with OSError: ENODEV when the device is gone, EPIPE when it stalls an endpoint, and
-# TimeoutError (ETIMEDOUT) when it does not answer in time.
+# A USB device for the bus: descriptors, and transfers that succeed or fail like real ones. The bus does not
+# know whether a device is in this process or behind a network connection. Transfers fail with OSError: ENODEV
+# when the device is disconnected, EPIPE when it stalls an endpoint, and TimeoutError (ETIMEDOUT) when it does
+# not answer in time.
 
 BULK_OUT = 0x01
 BULK_IN = 0x82
@@ -29,7 +27,7 @@ BULK_IN = 0x82
 
 @dataclass(frozen=True)
 class Identification:
-    """What a device says about itself when the host enumerates it."""
+    """Identity of a device at enumeration."""
 
     vendor_id: int
     product_id: int
@@ -61,16 +59,16 @@ class UsbDevice(Protocol):
 
     @property
     def identification(self) -> Identification:
-        """What the descriptors say."""
+        """Content of the descriptors."""
 
     def bulk_out(self, data: bytes) -> None:
-        """Take one transfer from the host."""
+        """Receive one transfer from the host."""
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
-        """Hand one transfer of at most ``length`` bytes to the host."""
+        """Send one transfer of at most ``length`` bytes to the host."""
 
     def control(self, setup: Setup, data: bytes) -> bytes:
-        """Carry out a class request; return what the device sends back."""
+        """Execute a class request; return the device's response."""
 
 
 VENDOR_ID = 0x0699
@@ -83,7 +81,7 @@ NEVER_MS = 2**32 - 1
 
 
 class MessageId(IntEnum):
-    """What a bulk transfer is (table 2)."""
+    """Type of a bulk transfer (table 2)."""
 
     OUT = 1
     REQUEST_IN = 2
@@ -98,24 +96,24 @@ class Attributes(IntFlag):
 
 SUCCESS = 1
 TRANSFER_NOT_IN_PROGRESS = 0x81
-"""First byte of the answer to a class request (table 16)."""
+"""First byte of the response to a class request (table 16)."""
 
 _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
 """USBTMC 1.0 with termination character; USB488 1.0 with 488.2; eight reserved bytes."""
 
 
 class MessageDevice(Protocol):
-    """What stands behind the interface."""
+    """The instrument behind the interface."""
 
     serial: str
     maker: str
     model: str
 
     def execute(self, message: bytes) -> Reply:
-        """Carry out one complete message and return its reply."""
+        """Execute one complete message and return its reply."""
 
     def report(self, code: ErrorCode) -> None:
-        """Queue an error that the interface has found."""
+        """Queue an error detected by the interface."""
 
 
 @dataclass(frozen=True)
@@ -125,28 +123,28 @@ class _Request:
     tag: int
     length: int
     terminator: bytes
-    """Empty, or the character at which the transfer shall stop."""
+    """Empty, or the character that ends the transfer."""
 
 
 @dataclass
 class _Flight:
-    """Everything on its way between host and instrument; a device clear starts a new one."""
+    """Pending data between host and instrument; a device clear replaces it."""
 
     message: bytes = b""
-    """Pieces of a message whose end has not come."""
+    """Received parts of an incomplete message."""
     reply: bytes = b""
-    """What the host has not fetched yet."""
+    """Unread reply."""
     late_ms: float = 0.0
-    """How long the host still has to wait for the reply."""
+    """Remaining delay of the reply [ms]."""
     request: _Request | None = None
     rest: bytes = b""
-    """The part of a transfer that did not fit into the host's buffer."""
+    """Remainder of a transfer that did not fit into the host's buffer."""
     aborting: bool = False
-    """An aborted transfer still owes its short packet."""
+    """Whether an aborted transfer must still send its short packet."""
 
 
 class UsbTmcInstrument:
-    """An instrument at the end of a USB cable that can be pulled."""
+    """An instrument at a USB cable that can be disconnected."""
 
     def __init__(
         self,
@@ -158,30 +156,30 @@ class UsbTmcInstrument:
         self.identification = Identification(
             *usb_ids, device.maker, device.model, device.serial, packet_bytes
         )
-        """What the descriptors say."""
+        """Content of the descriptors."""
         self._lock = threading.RLock()
         self._is_plugged_in = True
         self._is_hung = False
         self._flight = _Flight()
 
     def pull_cable(self) -> None:
-        """Take the device off the bus: every transfer fails with ENODEV. The instrument itself plays on."""
+        """Disconnect the device: transfers fail with ENODEV; the output continues."""
         with self._lock:
             self._is_plugged_in = False
 
     def plug_cable(self) -> None:
-        """Put the cable back; whatever was in flight is gone."""
+        """Reconnect the cable; pending data are lost."""
         with self._lock:
             self._is_plugged_in = True
             self._flight = _Flight()
 
     def hang(self) -> None:
-        """Let the instrument take no notice of anybody: every transfer times out, and it plays on."""
+        """Make the instrument unresponsive: transfers time out; the output continues."""
         with self._lock:
             self._is_hung = True
 
     def wake(self) -> None:
-        """Let the instrument answer again; whatever was in flight is gone."""
+        """Make the instrument responsive again; pending data are lost."""
         with self._lock:
             self._is_hung = False
             self._flight = _Flight()
@@ -189,7 +187,7 @@ class UsbTmcInstrument:
     # Transfers
 
     def bulk_out(self, data: bytes) -> None:
-        """Take one bulk-OUT transfer: a piece of a message, or a request for a reply (3.2)."""
+        """Receive one bulk-OUT transfer: a part of a message, or a request for a reply (3.2)."""
         with self._lock:
             self._check_cable()
             if len(data) < HEADER.size:
@@ -207,10 +205,10 @@ class UsbTmcInstrument:
                 _stall()
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
-        """Hand over the reply that was asked for (3.3), or time out.
+        """Return the requested reply (3.3), or time out.
 
-        A read without a query queues -420 and times out. A reply that is late by longer than the
-        timeout stays in the instrument, that much less late.
+        A read without a query queues -420 and times out. A reply that exceeds the timeout remains, with its
+        delay reduced by the timeout.
         """
         with self._lock:
             self._check_cable()
@@ -240,17 +238,17 @@ class UsbTmcInstrument:
                 _stall()
             return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
 
-    # Inside
+    # Internal functions
 
     def _take(self, payload: bytes, attributes: Attributes) -> None:
-        """Collect a message; carry it out when its last piece has come."""
+        """Collect a message; execute it when it is complete."""
         self._flight.message += payload
         if len(self._flight.message) > LONGEST_MESSAGE:
             self._flight.message = b""
             _stall()
         if Attributes.END_OF_MESSAGE in attributes:
             message, self._flight.message = self._flight.message, b""
-            # Carry out a message; an unread reply before it is lost, with -410 (IEEE 488.2, 6.3.2.3).
+            # Execute a message; an unread earlier reply is lost, with -410 (IEEE 488.2, 6.3.2.3).
             if self._flight.reply or self._flight.rest:
                 self._flight.reply = self._flight.rest = b""
                 self._flight.request = None
@@ -259,7 +257,7 @@ class UsbTmcInstrument:
             self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
 
     def _transfer(self, request: _Request) -> bytes:
-        """Wrap as much of the reply as was asked for; the last piece carries the end-of-message bit."""
+        """Return a transfer with the requested part of the reply; the last one has the end-of-message bit."""
         end = min(request.length, len(self._flight.reply))
         if request.terminator:
             found = self._flight.reply.find(request.terminator, 0, end)
@@ -277,7 +275,7 @@ class UsbTmcInstrument:
         return transfer
 
     def abort_bulk_in(self, tag: int) -> bytes:
-        """Give up a transfer that the host no longer waits for; the reply stays."""
+        """Abort a transfer for which the host no longer waits; the reply remains."""
         if self._flight.request is None or self._flight.request.tag != tag:
             return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
         self._flight.request = None
@@ -302,7 +300,7 @@ def _time_out() -> NoReturn:
 
 _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
     3: UsbTmcInstrument.abort_bulk_in,  # INITIATE_ABORT_BULK_IN, 4.2.1.4
-    4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: it is done
+    4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: always complete
     7: lambda *_: _CAPABILITIES,  # GET_CAPABILITIES, 4.2.1.8
 }
-"""The class requests that pyvisa makes (table 15), by number; each is given the tag. Any other one stalls."""
+"""Class requests used by pyvisa (table 15), by number; each receives the tag. Others stall."""

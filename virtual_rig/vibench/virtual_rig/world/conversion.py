@@ -1,4 +1,4 @@
-"""A running conversion: the world's signals in, quantised samples of the configured inputs out."""
+"""A running conversion: from signals of the world to quantised samples of the configured inputs."""
 
 from collections import deque
 from collections.abc import Callable
@@ -17,57 +17,55 @@ from .sensors import IEPE_BIAS_V, NoiseStream
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 from .wiring import Behind, Cable
 
-# The converter's anti-alias filter: from the world's grid of means to samples at any lower rate.
-#
-# The world hands over means over its steps. A windowed sinc (Kaiser window) of linear phase, corrected
-# for the droop of those means, limits the band and is evaluated where the samples lie: at whole
-# divisors of the grid's rate that is one fixed set of weights, at any other rate a row of a table,
-# interpolated. A sensor's delay moves the place of evaluation and so is exact between grid points.
+# The converter's anti-alias filter: from means over the world's steps to samples at any lower rate. A
+# windowed sinc (Kaiser window) of linear phase, corrected for the droop of the means, limits the band. It is
+# evaluated at the sample times: for integer ratios with one fixed set of weights, for others with an
+# interpolated row of a table. A sensor's delay shifts the evaluation time, and is exact between grid points.
 
 GROUP_DELAY_SAMPLES = 40
-"""Delay of every channel alike, in samples of the rate converted to: typical of a delta-sigma converter."""
+"""Common delay of all channels, in output samples: typical of a delta-sigma converter."""
 
 _HALF_WIDTH_SAMPLES = 32
-"""With the Kaiser window below: pass band to 0.45, stop band from 0.55 of the sample rate, 100 dB down."""
+"""With the Kaiser window below: pass band to 0.45, stop band from 0.55 of the sample rate, at -100 dB."""
 _STOP_BAND_DB = 100.0
 _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
 """Kaiser 1974, as in Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
 
 _DROOP_REACH = 3
-"""Grid points to each side that the droop correction takes in."""
+"""Grid points on each side used by the droop correction."""
 _DROOP_BAND = 0.23
-"""The correction is fitted from zero to here, in cycles per step."""
+"""Upper end of the correction's fit, in cycles per step."""
 _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
-"""Rows of the table per output sample: linear interpolation between them is 110 dB below the signal."""
+"""Table rows per output sample: linear interpolation between them is 110 dB below the signal."""
 _LANES = 8
-"""The native engine takes weights in this many at a time."""
+"""Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""A channel may be this much early without the filter needing the future."""
+"""Largest advance of a channel for which the filter needs no future samples."""
 
 
 @dataclass(frozen=True)
 class Decimator:
-    """Samples of one channel out of its means over the steps of the world."""
+    """Computes samples of one channel from means over the world's steps."""
 
     ratio: float
-    """Steps per sample; whole numbers are the fast case."""
+    """Steps per sample; integers are faster."""
     start_step: int
-    """The first step after the conversion began."""
+    """First step of the conversion."""
     delay_steps: float
-    """Delay of the channel's sensor beyond what is in the means already."""
+    """Delay of the channel's sensor not included in the means."""
     table: FloatArray
-    """Shape (rows, weights): one row for a whole ratio, else one for each fraction of a step and one more."""
+    """Shape (rows, weights): one row for an integer ratio, else one row per fraction of a step, plus one."""
 
     @property
     def reach(self) -> int:
-        """Weights of one sample."""
+        """Number of weights per sample."""
         return int(self.table.shape[1])
 
     def centre(self, sample: int) -> float:
-        """Where a sample lies, in steps from the first one of the conversion, counted in means' middles."""
+        """Return the position of a sample in steps, relative to the middle of the first mean."""
         group_delay = GROUP_DELAY_SAMPLES * max(self.ratio, 1.0)
         return (sample + 1) * self.ratio - group_delay - self.delay_steps - 0.5
 
@@ -80,7 +78,7 @@ class Decimator:
         return _half_width_steps(self.ratio) + 1
 
     def convert(self, means: FloatArray, means_first_step: int, sample: int, count: int) -> FloatArray:
-        """Return ``count`` samples from number ``sample`` on, shape (count,); the means begin at a step."""
+        """Return ``count`` samples from number ``sample`` on, shape (count,), from means."""
         engine, samples = native_engine(), np.empty(count)
         origin = self.start_step - means_first_step + self._newest_offset - self.reach + 1
         engine.fill(self._work, means=means, origin=origin, first=sample, samples=samples)
@@ -89,14 +87,14 @@ class Decimator:
 
     @cached_property
     def _work(self) -> Structure:
-        """What is the same for every block."""
+        """Data common to all blocks."""
         return native_engine().new(
             "Decimation", table=self.table, reach=self.reach, ratio=self.ratio, begin=self.centre(-1)
         )
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
-    """Design the filter of one channel for ``ratio`` steps per sample."""
+    """Return the filter of one channel for ``ratio`` steps per sample."""
     delay = max(delay_steps, EARLIEST_STEPS)
     centre = Decimator(ratio, start_step, delay, np.zeros((1, 1))).centre(0)
     if ratio == round(ratio):
@@ -109,7 +107,7 @@ def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
-    """Count the steps before the beginning of a conversion that its first sample looks back on."""
+    """Return the number of steps before a conversion that its first sample needs."""
     filter_span = GROUP_DELAY_SAMPLES * max(ratio, 1.0) + _half_width_steps(ratio)
     return ceil(filter_span + max(delay_steps, 0.0)) + 2 * _LANES
 
@@ -119,11 +117,11 @@ def _half_width_steps(ratio: float) -> int:
 
 
 def _weights(ratio: float, fraction: float) -> FloatArray:
-    """Weights, oldest first, of a sample that lies ``fraction`` of a step behind a grid point."""
+    """Return the weights, oldest first, of a sample ``fraction`` of a step after a grid point."""
     newest = _half_width_steps(ratio) + 1
     count = ceil(2 * newest / _LANES) * _LANES
     positions = newest - np.arange(count - 1, -1, -1.0) - fraction
-    # Symmetric weights that undo sin(pi f)/(pi f), the gain of a mean over one step.
+    # Symmetric weights that invert sin(pi f)/(pi f), the gain of a mean over one step.
     frequency = np.linspace(0, _DROOP_BAND, _DROOP_FIT_POINTS)
     cosines = [np.ones_like(frequency)]
     cosines += [2 * np.cos(2 * np.pi * order * frequency) for order in range(1, _DROOP_REACH + 1)]
@@ -144,15 +142,15 @@ def _windowed_sinc(positions: FloatArray, ratio: float) -> FloatArray:
 
 
 AC_CUT_HZ = 0.5
-"""-3 dB of the coupling capacitor: NI 9234 and USB-4431 alike; first order here."""
+"""-3 dB frequency of the AC coupling, both for NI 9234 and USB-4431; first order here."""
 LEAST_EXCITATION_A = 1e-3
-"""Below, an IEPE sensor's electronics do not work."""
+"""Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder alike, over which excitation current drops."""
+"""Output resistance of generator, divider and decoder, which causes a voltage drop of the excitation."""
 COMPLIANCE_V = 19.0
-"""What an open input rises to when its excitation finds no sensor."""
+"""Voltage of an open input with excitation."""
 OVER_RANGE = 1.02
-"""The modulator follows this much beyond the range, whose end is where the numbers end."""
+"""Relative level at which the modulator clips; the numbers end at the range."""
 
 
 def clip_v(range_v: float) -> float:
@@ -161,10 +159,10 @@ def clip_v(range_v: float) -> float:
 
 
 class InputStage:
-    """One input from its connector to the converter, running along with the world."""
+    """One input from its connector to the converter, computed together with the world."""
 
     def __init__(self, configured: Input, cable: Cable, grid: TimeGrid = USUAL_GRID) -> None:
-        """``cable`` says what the input is connected to."""
+        """``cable`` is the connection of the input."""
         self.configured = configured
         self.cable = cable
         self._offset_v, self._gain = _operating_point(configured, cable)
@@ -175,16 +173,16 @@ class InputStage:
         )
 
     def plug(self, cable: Cable) -> None:
-        """Change what the input is connected to."""
+        """Replace the connection of the input."""
         self.cable = cable
         self._offset_v, self._gain = _operating_point(self.configured, cable)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Volts at the converter and whether they clip, from the world's signals, shape (signals, steps)."""
+        """Return volts at the converter, and whether they clip, from the signals, shape (signals, steps)."""
         signal = signals[self.cable.signal]
         match self.configured.coupling:
             case Coupling.AC:
-                # The capacitor has long been charged to the constant part when a conversion begins.
+                # At the start of a conversion, the capacitor is already charged to the constant part.
                 volts = self._capacitor.run(signal * self._gain)
             case Coupling.DC:
                 volts = signal * self._gain
@@ -194,7 +192,7 @@ class InputStage:
 
 
 def _operating_point(configured: Input, cable: Cable) -> tuple[float, float]:
-    """Constant volts at the input, and volts at the input per volt of the signal."""
+    """Return the constant volts at the input, and volts at the input per volt of the signal."""
     powered = configured.iepe_current_a >= LEAST_EXCITATION_A
     match cable.behind:
         case Behind.VOLTAGE_SOURCE:
@@ -212,7 +210,7 @@ _MOST_COUNTS = 2.0 ** (CONVERTER_BITS - 1)
 
 
 def volts_per_count(range_v: float) -> float:
-    """Smallest step of an input [V]: its range, plus and minus, in 24 bits, as the driver reports it."""
+    """Return the quantisation step of an input [V]: its range, plus and minus, in 24 bits."""
     return range_v / _MOST_COUNTS
 
 
@@ -220,7 +218,7 @@ class ConverterInput:
     """One channel: input stage, anti-alias filter, noise, quantiser."""
 
     def __init__(self, stage: InputStage, filtered: Decimator, noise_v: float, noise: NoiseStream) -> None:
-        """``noise_v`` is the rms of the converter's own noise, in its band."""
+        """``noise_v`` is the rms noise of the converter, in its band."""
         self.has_clipped = False
         self._stage = stage
         self._filter = filtered
@@ -231,22 +229,22 @@ class ConverterInput:
         self._means_first_step = 0
 
     def plug(self, physical_channel: str, cable: Cable) -> None:
-        """Change what is connected, if this is the channel; the filter's delay stays as it began."""
+        """Replace the connection of this channel; the filter keeps its delay."""
         if self._stage.configured.physical_channel == physical_channel:
             self._stage.plug(cable)
 
     def begin(self, history: FloatArray, first_step: int) -> None:
-        """Take in what the signals were before the conversion began; clipping in it does not count."""
+        """Process the signals before the conversion; clipping in them is ignored."""
         self._means, _ = self._stage.pass_on(history)
         self._means_first_step = first_step
 
     def take(self, signals: FloatArray, sample: int, count: int) -> FloatArray:
-        """Take in the next steps of the world and hand out the ``count`` samples they complete [V]."""
+        """Process the next steps of the world and return the ``count`` samples that they complete [V]."""
         volts, clips = self._stage.pass_on(signals)
         self.has_clipped |= clips
         self._means = np.concatenate([self._means, volts])
         samples = self._filter.convert(self._means, self._means_first_step, sample, count)
-        # The next sample may fall between grid points: one more step is kept than it needs.
+        # The next sample may lie between grid points, so keep one more step than it needs.
         done = self._filter.first_step(sample + count) - 1 - self._means_first_step
         self._means = self._means[max(done, 0) :]
         self._means_first_step += max(done, 0)
@@ -262,7 +260,7 @@ class ConverterInput:
 
 
 class Conversion:
-    """A `Sampler` on the world: its samples become ready as the world advances, and wait to be read."""
+    """A `Sampler` of the world: samples are computed while the world advances, and stored until read."""
 
     def __init__(
         self,
@@ -272,7 +270,7 @@ class Conversion:
         advance: Callable[[int], None],
         end: Callable[["Conversion"], None],
     ) -> None:
-        """``advance`` lets the world go on up to a step; ``end`` takes this conversion off the world."""
+        """``advance`` advances the world to a step; ``end`` removes this conversion from the world."""
         self._inputs = inputs
         self._steps_per_sample = steps_per_sample
         self._start_step = start_step
@@ -283,7 +281,7 @@ class Conversion:
         self._waiting: deque[FloatArray] = deque()
 
     def read(self, count: int) -> FloatArray:
-        """Next ``count`` samples, shape (inputs, count) [V]; the world advances as far as they need."""
+        """Return the next ``count`` samples, shape (inputs, count) [V]; the world advances as necessary."""
         self._advance(self._step_after(self._handed_out + count))
         parts, missing = [np.empty((len(self._inputs), 0))], count
         while missing > 0:
@@ -297,25 +295,25 @@ class Conversion:
         return np.concatenate(parts, axis=1)
 
     def overloaded(self) -> NDArray[np.bool_]:
-        """Which inputs have clipped since the last call, shape (inputs,)."""
+        """Return which inputs have clipped since the last call, shape (inputs,)."""
         clipped = np.array([channel.has_clipped for channel in self._inputs], dtype=np.bool_)
         for channel in self._inputs:
             channel.has_clipped = False
         return clipped
 
     def plug(self, physical_channel: str, cable: Cable) -> None:
-        """Change what one input is connected to, from now on."""
+        """Replace the connection of one input from now on."""
         for channel in self._inputs:
             channel.plug(physical_channel, cable)
 
     def close(self) -> None:
-        """Stop converting. Legal at any time."""
+        """Stop the conversion; allowed at any time."""
         self._end(self)
 
     def take(self, signals: FloatArray, first_step: int) -> None:
-        """Convert what the world has just computed, shape (signals, steps), from ``first_step`` on."""
+        """Convert new signals of the world, shape (signals, steps), from ``first_step`` on."""
         done = first_step + signals.shape[1] - self._start_step
-        # The last sample whose last step is computed; the rounding guards a step that ends on a sample.
+        # The last sample whose steps are complete; the tolerance handles a step that ends on a sample.
         complete = int(np.floor(done / self._steps_per_sample + _ROUNDING))
         count = complete - self._converted
         parts = [channel.take(signals, self._converted, count) for channel in self._inputs]
@@ -328,12 +326,12 @@ class Conversion:
 
 
 _ROUNDING = 1e-6
-"""In steps: far more than rounding, far less than anything that matters."""
+"""Tolerance in steps, far above rounding errors and far below any relevant length."""
 
 
 def converter_input(
     stage: InputStage, steps_per_sample: float, start_step: int, noise_v: float, noise: NoiseStream
 ) -> ConverterInput:
-    """Put one channel together for a conversion that begins at a step of the world."""
+    """Return a channel for a conversion that begins at a step of the world."""
     filtered = decimator(steps_per_sample, start_step, stage.cable.delay_steps)
     return ConverterInput(stage, filtered, noise_v, noise)

@@ -1,4 +1,4 @@
-"""Sensors: the laser vibrometer that measures m0, and the accelerometer on the base."""
+"""Sensors: the laser vibrometer at m0, and the accelerometer on the base."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,19 +16,18 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Samples drawn together: a compromise between the cost of a generator and of what is thrown away."""
+"""Samples per draw: a compromise between the cost of a generator and of unused samples."""
 
 
 class NoiseStream:
     """White Gaussian noise of unit variance for one place in the rig.
 
-    A counter-based generator (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC11)
-    gives any page of the stream directly, so that two runs agree bit for bit whatever block sizes
-    they are read in.
+    A counter-based generator (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC11) gives any
+    page of the stream directly, so that runs agree bit for bit for all block sizes.
     """
 
     def __init__(self, seed: int, place: str) -> None:
-        """``place`` names the stream: streams of different places are independent."""
+        """``place`` is the name of the stream; streams of different places are independent."""
         self._key = SeedSequence([seed, crc32(place.encode())]).generate_state(2, np.uint64)
         self._page_number = -1
         self._page = np.empty(0)
@@ -44,8 +43,8 @@ class NoiseStream:
         return np.asarray(drawn[offset : offset + count])
 
     def generator(self, page_number: int) -> Generator:
-        """Make a random generator for one page: for events rather than samples."""
-        # The page counts in the third word: no page can draw enough to reach into the next one.
+        """Return a random generator for one page, for events."""
+        # The page number is in the third word, so that draws of one page cannot reach the next.
         return Generator(Philox(key=self._key, counter=np.array([0, 0, page_number, 0], dtype=np.uint64)))
 
     def _samples_of(self, page_number: int) -> NDArray[np.float64]:
@@ -57,19 +56,19 @@ class NoiseStream:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """The output is held at a level from one step to another."""
+    """A constant output level from one step to another."""
 
     first_step: int
     stop_step: int
     """The first step after it."""
     level: float
-    """Part of full scale, -1 to 1."""
+    """Share of full scale, -1 to 1."""
 
 
 class RandomDropouts:
-    """Moments at which speckle leaves the laser without light: a Poisson process in time.
+    """Times at which speckle interrupts the laser signal: a Poisson process.
 
-    The decoder then follows noise instead of a carrier. Each dropout holds an arbitrary level for an
+    The decoder then follows noise in place of a carrier. Each drop-out holds an arbitrary level for an
     exponentially distributed time.
     """
 
@@ -83,10 +82,10 @@ class RandomDropouts:
         self._stream = stream
 
     def between(self, first: int, stop: int) -> list[Disturbance]:
-        """Every dropout that reaches into the steps from ``first`` to before ``stop``."""
+        """Return every drop-out that overlaps the steps from ``first`` to before ``stop``."""
         if self._per_page == 0.0:
             return []
-        # None is longer than a page, so the page before is as far back as one can begin.
+        # None is longer than a page, so only the previous page needs to be searched.
         pages = range(max(first // PAGE - 1, 0), stop // PAGE + 1)
         found = [dropout for page in pages for dropout in self._of(page)]
         return [dropout for dropout in found if dropout.stop_step > first and dropout.first_step < stop]
@@ -104,9 +103,9 @@ class RandomDropouts:
 
 
 _FIT_BAND = 0.2
-"""The fit covers zero to this part of the grid's rate: what a converter at half the rate can pass."""
+"""Upper end of the fit, as a share of the grid's rate: the pass band of a converter at half the rate."""
 _FIT_FLOOR = 1e-2
-"""Its lower end: below, the exact gain at zero hertz leads."""
+"""Lower end of the fit; below it, the exact gain at zero frequency dominates."""
 _FIT_POINTS = 64
 _ZEROS = 6
 """Numerator weights fitted."""
@@ -125,18 +124,18 @@ class LowPass:
         return float(-sum(1 / pole for pole in self.poles).real) if self.poles else 0.0
 
     def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Complex gain, shape of ``frequency_hz``."""
+        """Return the complex gain, shape of ``frequency_hz``."""
         s = 2j * np.pi * np.asarray(frequency_hz)
         return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
 
 
 def first_order(cut_hz: float) -> LowPass:
-    """Build one real pole, -3 dB at ``cut_hz``."""
+    """Return one real pole, -3 dB at ``cut_hz``."""
     return LowPass((complex(-2 * np.pi * cut_hz),))
 
 
 def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
-    """Build the response of a mass on a spring, below, at and above its resonance."""
+    """Return the response of a mass on a spring."""
     omega = 2 * np.pi * resonance_hz
     imaginary = omega * np.sqrt(1 - damping_ratio**2)
     pole = complex(-damping_ratio * omega, imaginary)
@@ -144,12 +143,11 @@ def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
 
 
 def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
-    """Design a low-pass for a grid of ``step_s``, at rest to begin with.
+    """Return a low-pass filter for a grid of ``step_s``, initially at rest.
 
-    The poles are mapped exactly (z = exp(s T)), so a resonance sits where it belongs even close to
-    the grid's Nyquist frequency; one that lies beyond has no place there, and would ring at another. The
-    zeros are the least-squares fit to the analogue response, phase included, with the gain at zero hertz
-    exact.
+    The poles are mapped exactly (z = exp(s T)), so a resonance keeps its frequency even close to the grid's
+    Nyquist frequency; one beyond it is omitted, because it would appear at another frequency. The zeros are
+    the least-squares fit to the analogue response including phase, with exact gain at zero frequency.
     """
     poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
     denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
@@ -161,11 +159,11 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
     target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
     powers = z[:, np.newaxis] ** np.arange(_ZEROS)
-    # The weights sum to the denominator's: unit gain at zero hertz, taken out of the unknowns.
+    # The weights sum to the denominator's for unit gain at zero frequency, which eliminates one unknown.
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
-    weight = (1 / frequency_hz)[:, np.newaxis]  # errors as delays: the low end counts as much as the high
+    weight = (1 / frequency_hz)[:, np.newaxis]  # errors as delays: low frequencies count like high ones
     matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
     aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
     weights, *_ = np.linalg.lstsq(matrix, aim)
@@ -173,28 +171,28 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
 
 
 ACCELEROMETER_DAMPING_RATIO = 0.02
-"""Of a piezoelectric accelerometer's mounted resonance; assumed, usual for the kind."""
+"""Damping ratio of a piezoelectric accelerometer's mounted resonance; assumed typical value."""
 IEPE_BIAS_V = 10.0
 """Constant voltage of a powered IEPE sensor; 8 to 12 V is usual."""
 LONGEST_DELAY_S = 5e-3
-"""Of a sensor: what the converter keeps for the beginning of a conversion at its lowest rate."""
+"""Largest sensor delay, limited by the history kept for a conversion at its lowest rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class SensorParts:
-    """What a stretch of motion is shown with."""
+    """Data to convert a section of motion to sensor volts."""
 
     filter: RecursiveFilter
     noise: FloatArray
     """In units of the motion, shape (steps,)."""
     instead: FloatArray
-    """Shown where it is a number, likewise; empty where there is none."""
+    """Values in place of the motion where finite, in its units; empty without any."""
     full_scale: float
     """In units of the motion."""
     full_scale_v: float
 
     def showing(self, motion: FloatArray, volts: FloatArray) -> Structure:
-        """Describe to the native engine that the means of a motion are shown as these volts."""
+        """Return the native engine's structure for the conversion of this motion to volts."""
         return native_engine().new(
             "Sensor",
             filter=self.filter.parts,
@@ -208,14 +206,14 @@ class SensorParts:
 
 
 class Sensor(Protocol):
-    """What shows a motion."""
+    """Converts a motion to volts."""
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return what the motion is shown with in the next steps."""
+        """Return the conversion data for the next steps."""
 
 
 def sensor_volts(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
-    """Output volts for the means of a motion over the next steps, shape (steps,)."""
+    """Return output volts for the means of a motion over the next steps, shape (steps,)."""
     volts = np.empty(len(values))
     parts = sensor.parts(first_step, len(values))
     native_engine().call("show", parts.showing(values, volts))
@@ -223,11 +221,11 @@ def sensor_volts(sensor: Sensor, values: FloatArray, first_step: int) -> FloatAr
 
 
 class Vibrometer:
-    """A laser vibrometer with its velocity decoder.
+    """A laser vibrometer with velocity decoder.
 
-    Velocity, the decoder's bandwidth (first order), white noise, dropouts, volts, clipping at full
-    scale, in this order. What is left of the decoder's delay, beyond that of its bandwidth, is a
-    plain delay (``delay_steps``), which the converter's filter applies exactly.
+    Order: velocity, bandwidth of the decoder (first order), white noise, drop-outs, volts, clipping at full
+    scale. The remainder of the decoder's delay beyond that of its bandwidth is a plain delay
+    (``delay_steps``), which the converter's filter applies exactly.
     """
 
     def __init__(
@@ -255,15 +253,15 @@ class Vibrometer:
         self._demanded: list[Disturbance] = []
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """Show a level instead of the velocity for some steps: a dropout or an over-range on demand."""
+        """Replace the velocity by a level for some steps: a drop-out or an over-range on demand."""
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return what the velocity [m/s] is shown with in the next steps."""
+        """Return the conversion data of the velocity [m/s] for the next steps."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
         disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
-        # Put the disturbances into ``values``, whose first belongs to ``first_step``, in place.
+        # Insert the disturbances into ``values``, which start at ``first_step``, in place.
         for disturbance in disturbed:
             begin = max(disturbance.first_step - first_step, 0)
             stop = max(disturbance.stop_step - first_step, 0)
@@ -292,7 +290,7 @@ class Accelerometer:
         self._noise = noise
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return what the acceleration [m/s2] is shown with in the next steps, without bias."""
+        """Return the conversion data of the acceleration [m/s2] for the next steps, without bias."""
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_v / self._sensitivity, self._full_scale_v
         return SensorParts(self._filter, noise, np.empty(0), *scale)

@@ -1,4 +1,4 @@
-"""The grid of time on which the analogue world is computed."""
+"""Time grid of the analogue world."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
 FULL_BAND_HZ = 25_600.0
-"""The band in which the rig's configuration gives the noise of instruments: half the fastest usual rate."""
+"""Band of the noise figures in the rig's configuration: half the highest usual rate."""
 
 PPM = 1e-6
 
@@ -19,12 +19,12 @@ PPM = 1e-6
 class TimeGrid:
     """Equal steps of rig time.
 
-    Rig time is what the converter's clock counts, so that a sample lies on a whole number of steps for
-    ever. Physical time differs by the clock's error, and the laws of physics get the physical step.
+    Rig time is counted by the converter's clock, so that samples always lie at integer numbers of steps.
+    Physical time differs by the clock's error, and the equations of motion use the physical step.
 
-    The usual grid has twice the fastest usual sample rate: whole divisors give every rate of an NI 9234,
-    its anti-alias filter has room for its transition band, and a step (9.8 us) is short against the
-    specimen's shortest period (2 ms), while contacts, which are shorter, are resolved inside a step.
+    The usual grid has twice the highest usual sample rate: integer ratios give every rate of an NI 9234, its
+    anti-alias filter has room for its transition band, and a step (9.8 us) is short compared with the
+    specimen's shortest period (2 ms). Contacts, which are shorter, are resolved within a step.
     """
 
     rate_hz: float = USUAL_GRID_RATE_HZ
@@ -36,15 +36,15 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """Return the true length of a step when the converter's clock is fast by this part [s]."""
+        """Return the physical length of a step for a clock that is fast by this amount [s]."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:
-        """Convert the rms of white noise in ``FULL_BAND_HZ`` to its rms on the grid."""
+        """Return the rms on the grid of white noise with a given rms in ``FULL_BAND_HZ``."""
         return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
 
     def step_at(self, time_s: float) -> int:
-        """Find the grid point nearest to a rig time."""
+        """Return the grid point nearest to a rig time."""
         return round(time_s * self.rate_hz)
 
 
@@ -52,7 +52,7 @@ USUAL_GRID = TimeGrid()
 
 
 def relative_clock_ppm(clock_ppm: float, converter_clock_ppm: float) -> float:
-    """Error of another instrument's clock as rig time, the converter's count, sees it [ppm]."""
+    """Return another instrument's clock error relative to rig time, which the converter counts [ppm]."""
     return ((1.0 + clock_ppm * PPM) / (1.0 + converter_clock_ppm * PPM) - 1.0) / PPM
 
 
@@ -60,7 +60,7 @@ FloatArray = NDArray[np.float64]
 
 
 class RecursiveFilter:
-    """A ratio of polynomials in the delay by one step (direct form II, transposed), at rest to begin with."""
+    """A rational filter in steps (direct form II, transposed), initially at rest."""
 
     def __init__(self, numerator: ArrayLike, denominator: ArrayLike) -> None:
         """Take the weights of the present value first; the denominator begins with 1."""
@@ -73,7 +73,7 @@ class RecursiveFilter:
             denominator=self.denominator,
             state=np.zeros(order),
         )
-        """What the native engine runs."""
+        """Structure of the native engine."""
 
     def run(self, values: FloatArray) -> FloatArray:
         """Return the next output values, one for each input value."""

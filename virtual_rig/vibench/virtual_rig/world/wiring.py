@@ -1,4 +1,4 @@
-"""Which cable ends at which input of the converter."""
+"""Connections of the converter's inputs."""
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
@@ -6,7 +6,7 @@ from enum import Enum, IntEnum
 from vibench.acquisition.rig import Rig, Role
 
 SECOND_DEVICE = "Dev1"
-"""The second converter of the virtual system: the same cables end at it, by way of T-pieces."""
+"""The second converter of the virtual system, connected to the same cables by T-pieces."""
 _USUAL_OUTPUT = f"{SECOND_DEVICE}/ao0"
 
 
@@ -20,7 +20,7 @@ class Signal(IntEnum):
 
 
 class Behind(Enum):
-    """What sits at the far end of a cable."""
+    """Source at the far end of a cable."""
 
     VOLTAGE_SOURCE = "voltage source"
     IEPE_SENSOR = "IEPE sensor"
@@ -29,7 +29,7 @@ class Behind(Enum):
 
 @dataclass(frozen=True)
 class Cable:
-    """What one input of the converter is connected to."""
+    """Connection of one input of the converter."""
 
     behind: Behind
     signal: Signal = Signal.DRIVE
@@ -49,12 +49,12 @@ _SIGNAL_OF_ROLE = {
 
 
 def amplifier_input(rig: Rig) -> str:
-    """Name the analogue output whose voltage is added to the generator's at the amplifier's input."""
+    """Return the analogue output whose voltage is added to the generator's at the amplifier's input."""
     return rig.daq.output_channel or _USUAL_OUTPUT
 
 
 def cables_of(rig: Rig, vibrometer_delay_steps: float) -> dict[str, Cable]:
-    """Every connected input by its physical name, ``"cDAQ1Mod1/ai0"``."""
+    """Return every connected input by its physical name, ``"cDAQ1Mod1/ai0"``."""
     delays = {Role.M0_VELOCITY: vibrometer_delay_steps}
     sensors = {Role.BASE_ACCELERATION: _accelerometer(rig)}
     return {

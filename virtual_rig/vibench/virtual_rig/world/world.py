@@ -1,4 +1,4 @@
-"""The analogue world: everything between the generator's terminal and the samples of the converter."""
+"""The analogue world between the generator's terminal and the samples of the converter."""
 
 import heapq
 import threading
@@ -39,10 +39,10 @@ from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
 
 class AnalogueOutput:
-    """A queue of samples, played at their own rate on the world's grid; at zero when it is empty.
+    """A queue of samples, played at their own rate on the world's grid; zero when it is empty.
 
-    The voltage is exact on average over every step, whatever the rate. A converter with an
-    interpolating output filter would show weaker images than this plain hold.
+    The voltage is exact on average over every step, at any rate. A converter with an interpolating output
+    filter would have weaker images than this zero-order hold.
     """
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
@@ -50,12 +50,12 @@ class AnalogueOutput:
         self._queue = np.empty(0)
         self._steps_per_sample = 1.0
         self._begin_step = 0.0
-        """Where the first queued sample begins; fractions of a step are kept."""
+        """Start of the first queued sample in steps, including fractions."""
 
     def queue(self, volts: FloatArray, sample_rate_hz: float, now_step: int) -> None:
-        """Append samples; they begin now when nothing is left to play.
+        """Append samples; they start now if none is left to play.
 
-        A rate that differs from that of what still plays takes over the samples that are left.
+        A different rate also applies to the samples left to play.
         """
         left = self.unplayed(now_step)
         if left == 0:
@@ -68,16 +68,16 @@ class AnalogueOutput:
         self._queue = np.concatenate([self._queue, np.asarray(volts, dtype=np.float64)])
 
     def unplayed(self, now_step: int) -> int:
-        """Count the samples that have not ended yet."""
+        """Return the number of samples that have not ended."""
         ended = int(max(now_step - self._begin_step, 0.0) / self._steps_per_sample + _ROUNDING)
         return max(len(self._queue) - ended, 0)
 
     def drop(self) -> None:
-        """Forget what is queued; the output goes to zero."""
+        """Clear the queue; the output returns to zero."""
         self._queue = np.empty(0)
 
     def render(self, first_step: int, steps: int) -> FloatArray:
-        """Mean voltage over each of the next steps, shape (steps,); what has been played is forgotten."""
+        """Return the mean voltage over each of the next steps, shape (steps,), and discard played samples."""
         if not len(self._queue):
             return np.zeros(steps)
         edges = (first_step + np.arange(steps + 1) - self._begin_step) / self._steps_per_sample
@@ -94,11 +94,11 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""In samples: a sample that ends on a step has ended."""
+"""Tolerance in samples for a sample that ends on a step."""
 
 
 class EventSchedule:
-    """Actions by the step at which they are due; those of one step keep the order they were given in."""
+    """Actions by due step; those of one step keep their order."""
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
         self._grid = grid
@@ -106,41 +106,41 @@ class EventSchedule:
         self._number = count()
 
     def add(self, time_s: float, action: Callable[[], None]) -> None:
-        """Let ``action`` happen at a rig time; one that has passed is kept at the next step."""
+        """Schedule ``action`` at a rig time; a past time means the next step."""
         heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
 
     def run_due(self, step: int) -> None:
-        """Do everything that is due at a step."""
+        """Run all actions that are due at a step."""
         while self._due and self._due[0][0] <= step:
             heapq.heappop(self._due)[2]()
 
     def stop_before(self, step: int) -> int:
-        """Return how far the world may be computed towards ``step`` without missing one."""
+        """Return how far the world may be computed towards ``step`` before the next action."""
         return min(step, self._due[0][0]) if self._due else step
 
 
 LOWEST_RATE_HZ = 500.0
-"""Slowest conversion: its filter looks back a tenth of a second."""
+"""Lowest rate of a conversion, whose filter needs a tenth of a second of history."""
 HIGHEST_RATE_HZ = 250e3
-"""Fastest conversion; beyond the world's own rate it interpolates."""
+"""Highest rate of a conversion; above the world's own rate it interpolates."""
 
 _STRETCH_STEPS = 8192
-"""Steps computed in one go: long enough to amortise the calls, short enough to stay in the cache."""
+"""Steps per block: long enough to amortise calls, short enough for the cache."""
 
 
 class TerminalVoltage(Protocol):
-    """The generator as the amplifier sees it."""
+    """The generator at the amplifier's input."""
 
     def render(self, start_s: float, interval_s: float, count: int) -> FloatArray:
-        """Mean terminal voltage over each of ``count`` intervals [V]; calls follow each other in time."""
+        """Return the mean terminal voltage over each of ``count`` intervals [V]; calls go forward in time."""
 
 
 class ClosedLoop(Protocol):
-    """A simulated instrument that answers what it samples with the volts at the amplifier."""
+    """A simulated instrument that computes the amplifier voltage from its samples."""
 
     @property
     def is_on(self) -> bool:
-        """Whether it plays, or volts are still on their way; the world does not stop for it else."""
+        """Whether it plays or delayed voltages remain; otherwise the world omits it."""
 
     def move(
         self,
@@ -152,19 +152,19 @@ class ClosedLoop(Protocol):
         motion: ShakenMotion,
         signals: FloatArray,
     ) -> int:
-        """Move the shaker from a step of the world on, the loop closed; gives the steps done.
+        """Advance the shaker from a step of the world with the loop closed; return the number of steps.
 
-        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0; ``signals`` holds at first what
-        else drives the amplifier, and at last all that there was.
+        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0. ``signals`` contains the other
+        drive of the amplifier on entry, and all signals on return.
         """
 
 
 class World:
-    """The simulated rig in rig time, advancing only when asked to.
+    """The simulated rig; its time advances only on request.
 
-    Rig time is counted by the converter's clock (see `_time_grid`). Two worlds of one configuration
-    agree bit for bit, whatever sizes of blocks they are read in. Safe to use from several threads;
-    `time_s` never waits, so an instrument may ask for it while it is being rendered.
+    Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
+    for bit for all block sizes. Thread-safe; `time_s` never waits, so an instrument may read it while it is
+    being rendered.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class World:
         specimen: Specimen | None = None,
         loop: ClosedLoop | None = None,
     ) -> None:
-        """``specimen`` defaults to the one the rig describes; ``loop``: a controller beside the generator."""
+        """``specimen`` is by default that of the rig; ``loop`` is a controller beside the generator."""
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
@@ -212,11 +212,11 @@ class World:
 
     @property
     def time_s(self) -> float:
-        """Rig time: how far the world has been computed [s]."""
+        """Current rig time [s]."""
         return self._step * self._grid.step_s
 
     def advance(self, duration_s: float) -> None:
-        """Let rig time pass; fractions of a step add up until they are one."""
+        """Advance rig time; fractions of a step are accumulated."""
         with self._turn:
             wanted = self._unspent_steps + duration_s * self._grid.rate_hz
             steps = max(round(wanted), 0)
@@ -224,17 +224,16 @@ class World:
             self._compute_to(self._step + steps)
 
     def at(self, time_s: float, action: Callable[[], None]) -> None:
-        """Let something happen at a rig time, to the step; a time that has passed is the next step."""
+        """Schedule an action at a rig time, rounded to steps; a past time means the next step."""
         with self._turn:
             self._schedule.add(time_s, action)
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
-        """Begin a conversion now.
+        """Start a conversion now.
 
-        Any rate from 500 Hz to 250 kHz, and to half the grid's on a coarser grid than the usual one; whole
-        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the grid's
-        rate counted), as behind a delta-sigma converter. Raises ConfigurationError when the rate lies
-        outside.
+        Rates from 500 Hz to 250 kHz are possible, and up to half the grid's rate on a coarser grid; integer
+        ratios are faster. All inputs share a delay of 40 samples (at most the grid's rate counted), as behind
+        a delta-sigma converter. Raises ConfigurationError for other rates.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
@@ -265,65 +264,65 @@ class World:
             return conversion
 
     def play(self, physical_channel: str, volts: FloatArray, sample_rate_hz: float) -> None:
-        """Queue samples of an analogue output behind what it still has to play; they start now if idle."""
+        """Append samples to the queue of an analogue output; an idle output starts now."""
         with self._turn:
             self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
 
     def unplayed(self, physical_channel: str) -> int:
-        """How many queued samples of that output have not been played yet."""
+        """Return the number of queued samples that have not been played."""
         with self._turn:
             return self._output(physical_channel).unplayed(self._step)
 
     def silence(self, physical_channel: str) -> None:
-        """Drop what is queued and hold that output at zero."""
+        """Clear the queue and hold the output at zero."""
         with self._turn:
             self._output(physical_channel).drop()
 
     def set_amplifier_gain_db(self, gain_db: float) -> None:
-        """Turn the amplifier's knob."""
+        """Set the amplifier's gain."""
         with self._turn:
             self.plant.gain = 10 ** (gain_db / 20)
 
     def restore_amplifier_gain(self) -> None:
-        """Turn the amplifier's knob to what the rig's configuration says."""
+        """Restore the amplifier's configured gain."""
         self.set_amplifier_gain_db(self._gain_db)
 
     def widen_gaps(self, by_m: float) -> None:
-        """Widen both gaps by this distance, from those that the rig began with [m]."""
+        """Increase both gaps by this distance, relative to the initial ones [m]."""
         began = self._specimen
         lower, upper = began.gaps_m
         with self._turn:
             self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
     def disturb_vibrometer(self, duration_s: float, level: float) -> None:
-        """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
+        """Make the vibrometer output ``level`` (share of full scale) for a while."""
         with self._turn:
             self.vibrometer.disturb(
                 Disturbance(self._step, self._step + self._grid.step_at(duration_s), level)
             )
 
     def connect(self, physical_channel: str) -> None:
-        """Plug the cable of an input in, as the rig describes it."""
+        """Connect an input as described by the rig."""
         self._plug(physical_channel, self._plan.get(physical_channel, OPEN_INPUT))
 
     def disconnect(self, physical_channel: str) -> None:
-        """Pull the cable out of an input: it shows nothing, or its own excitation."""
+        """Disconnect an input: it shows zero, or its own excitation."""
         self._plug(physical_channel, OPEN_INPUT)
 
     def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input: it shows the opposite sign."""
+        """Swap the two wires of an input, which inverts its sign."""
         cable = self._plan.get(physical_channel, OPEN_INPUT)
         self._plug(physical_channel, replace(cable, attenuation=-cable.attenuation))
 
     def keep_truth(self) -> None:
-        """Begin to write down what no instrument shows: 72 bytes a step, 7.4 MB a second."""
+        """Start recording the true motion: 72 bytes per step, 7.4 MB per second."""
         with self._turn:
             self._truth = []
 
     def truth(self) -> FloatArray:
-        """Hand over what was written down and go on with a clean sheet, shape (steps, 9).
+        """Return and clear the recorded true motion, shape (steps, 9).
 
-        Columns as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
+        Columns are those of ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
         """
         with self._turn:
             kept, self._truth = self._truth or [], []
@@ -368,7 +367,7 @@ class World:
             conversion.take(signals, first)
 
     def _move(self, first: int, signals: FloatArray) -> None:
-        """Fill in what the drive in its row of ``signals`` makes of amplifier and sensors."""
+        """Compute the rows of amplifier and sensors from the drive in ``signals``, in place."""
         steps = signals.shape[1]
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
         motion = ShakenMotion.of(steps, steps if self._truth is not None else 0)
@@ -399,12 +398,12 @@ class World:
 
 
 def _history_steps(grid: TimeGrid) -> int:
-    """Count the steps that the slowest conversion looks back on when it begins."""
+    """Return the number of steps of history for the slowest conversion."""
     return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
 
 
 def virtual_section(rig: Rig) -> VirtualConfig:
-    """Return how the rig's instruments are simulated; ConfigurationError when they are real."""
+    """Return how the rig's instruments are simulated; ConfigurationError for real ones."""
     if rig.virtual is None:
         raise ConfigurationError(
             f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and none was "
