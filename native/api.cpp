@@ -1,5 +1,5 @@
-// The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
-// calls, so that threads may share tables. What is given is checked, and refused with a code.
+// The C interface, with plain numbers only. No function throws, allocates, or keeps state between calls, so
+// threads may share tables. Arguments are checked, and refused with a code.
 #include "batch.hpp"
 #include "chain.hpp"
 #include "cubic.hpp"
@@ -18,7 +18,7 @@ using namespace vibench;
 namespace {
 
 constexpr double LATEST = 1e12;  // [s]
-constexpr int64_t MOST_PARTS = 1000000;  // of an interval between readings
+constexpr int64_t MOST_PARTS = 1000000;  // parts of an interval between readings
 
 bool is_positive(double x) { return x > 0.0 && is_finite(x); }
 bool is_not_negative(double x) { return x >= 0.0 && is_finite(x); }
@@ -95,7 +95,7 @@ bool is_usable(const Readings &readings) {
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
 
-// Calls `act` with a run of the motion under the stops of the specimen.
+// Calls `act` with a run of the motion for the stops of the specimen.
 template <class T, class Act>
 Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record &record, const Act &act) {
   auto with = [&](const auto &stops) {
@@ -169,19 +169,19 @@ constexpr int64_t STRUCTURE_COUNT = sizeof STRUCTURES / sizeof *STRUCTURES;
 
 }  // namespace
 
-// Text and size of all structures, those that others hold first.
+// Text and size of all structures, each after those that it contains.
 VIBENCH_API const char *vibench_structure(int64_t index) {
   return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].text : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
   return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].size : 0;
 }
-// Bytes of the tables of a `Law`.
+// Size of the tables of a `Law` [bytes].
 VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
   return sizeof(Tables) + (law == POWERS ? sizeof(PowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_tables(law) bytes; the shapes of collisions and steps must outlive them.
+// Fills `tables`, of vibench_size_of_tables(law) bytes; the shapes of collisions and steps must remain valid.
 VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   fill_tables(*tables, *scene);
@@ -193,7 +193,7 @@ VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   return REACHED_END;
 }
 
-// Decides whether the motion in `state` starts on a stop, and fills the rest of `state`.
+// Determines whether the motion in `state` starts on a stop, and fills the rest of `state`.
 VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double tolerance) {
   if (tables == nullptr || state == nullptr || !is_tolerance(tolerance)) return REFUSED;
   Motion<double> motion = motion_of(*state);
@@ -202,14 +202,14 @@ VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double toler
   return REACHED_END;
 }
 
-// Advances `state` to the instant `until` [s], and fills `record`; an `Outcome`.
+// Advances `state` to the time `until` [s], and fills `record`; returns an `Outcome`.
 VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record) {
   if (tables == nullptr || state == nullptr || record == nullptr) return REFUSED;
   if (!is_usable(*state, until, tolerance) || !is_usable(*record)) return REFUSED;
   return advance(*state, *tables, until, tolerance, *record);
 }
 
-// Does the same, and carries the changes of `tangent` along.
+// Does the same, and integrates the changes of `tangent` too.
 VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state, double until, double tolerance,
                                              Record *record, Tangent *tangent) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr) return REFUSED;
@@ -217,7 +217,7 @@ VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state,
   return advance(*state, *tangent, *tables, until, tolerance, *record);
 }
 
-// Takes readings of how the changes grow, up to reading `last`; an `Outcome`.
+// Takes readings of the growth of changes, up to reading `last`; returns an `Outcome`.
 VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, double tolerance, Record *record,
                                           Tangent *tangent, Readings *readings, int64_t last) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr || readings == nullptr)
@@ -229,7 +229,7 @@ VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, do
   });
 }
 
-// The largest |p| while no stop is touched, from now on [m]: free phasors only shrink. Infinite on a stop.
+// Upper bound of |p| until a stop is touched [m], because free phasors only decay; infinite on a stop.
 VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   if (tables == nullptr || state == nullptr || state->side != 0.0) return INFINITE;
   Clock<double> clock{state->clock_high, state->clock_low, 0.0};
@@ -242,7 +242,7 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
 
 namespace {
 
-constexpr double MOST_PIECES = 1e15;  // of an interval
+constexpr double MOST_PIECES = 1e15;  // pieces of an interval
 
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
@@ -269,12 +269,12 @@ bool is_usable(const CubicDrive &drive, double interval) {
 
 }  // namespace
 
-// Bytes of the tables of a `Law` for such a base.
+// Size of the tables of a `Law` for such a base [bytes].
 VIBENCH_API int64_t vibench_size_of_cubic_tables(int64_t law) {
   return sizeof(CubicTables) + (law == POWERS ? sizeof(CubicPowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes; the shapes of steps must outlive them.
+// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes; the shapes of steps must remain valid.
 VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   bool has_powers = scene->specimen.law == POWERS;
@@ -282,7 +282,7 @@ VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables 
   return REACHED_END;
 }
 
-// Advances `state` over the intervals of `drive`, and fills `record`, which watches nothing; an `Outcome`.
+// Advances `state` over the intervals of `drive`, and fills `record` without observation; returns an `Outcome`.
 VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, CubicDrive *drive, double tolerance,
                                        Record *record) {
   if (tables == nullptr || state == nullptr || drive == nullptr || record == nullptr) return REFUSED;
@@ -301,9 +301,9 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
 
 namespace {
 
-constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // of a batch
-constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // of a motion of a batch
-constexpr int64_t LAST_STEP = int64_t(1) << 60;  // of a world
+constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // motions of a batch
+constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // drive periods of a motion in a batch
+constexpr int64_t LAST_STEP = int64_t(1) << 60;  // last step of a world
 constexpr int64_t MOST_SMALL_STEPS = 100000;
 constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
 constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
@@ -484,7 +484,7 @@ bool is_usable(const ChainMotion &chain) {
   return has_clock && has_drive && has_pieces && has_samples && has_impacts && has_watch && has_sums;
 }
 
-// Decides which cells of a chain start on a stop.
+// Determines which cells of a chain start on a stop.
 int64_t start_chain(ChainMotion &chain) {
   ChainRun(chain).start();
   return REACHED_END;
@@ -493,20 +493,20 @@ int64_t follow_chain(ChainMotion &chain) { return ChainRun(chain).advance(); }
 
 }  // namespace
 
-// Moves the shaker of a loop, closed, over the rest of a stretch; a `LoopEnd`, or REFUSED.
+// Moves the shaker of a closed loop over the rest of a stretch; returns a `LoopEnd`, or REFUSED.
 VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
   if (loop == nullptr || loop->shaker == nullptr || !is_usable(*loop) || !is_usable(*loop->shaker)) return REFUSED;
   if (loop->shaker->drive.at != loop->drive.at || loop->shaker->drive.size != loop->drive.size) return REFUSED;
   return close_loop(*loop);
 }
 
-// Numbers of the memory that a chain lends.
+// Size of the memory that a chain needs, in numbers.
 VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
   bool is_chain = cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells;
   return is_chain ? chain_memory(cells, kinds) : int64_t(REFUSED);
 }
 
-// Each returns what its function does, or REFUSED.
+// Each returns the result of its function, or REFUSED.
 #define OF_ONE_STRUCTURE(function, Structure)                                 \
   VIBENCH_API int64_t vibench_##function(Structure *of) {                     \
     return of != nullptr && is_usable(*of) ? function(*of) : int64_t(REFUSED); \

@@ -1,8 +1,8 @@
-// Eight motions of one specimen side by side in vector registers, by their states alone (decision 0061). A flight is
-// p = Re sum of four turning terms. All lanes march on the grid until all, or all but one, have come near a stop; then
-// these look for their touch, collide by polynomials and depart together, by masks. A lane that has finished takes
-// the next motion. The rules are those of flight.hpp. A motion is the same whatever lies beside it: no number and no
-// decision of a lane depends on another lane, which only makes it wait.
+// Eight motions of one specimen in parallel in vector registers, without derivatives (decision 0061). A
+// flight is p = Re sum of four rotating terms. All lanes advance on the grid until at most one is still clear
+// of the stops. The others then search their touch, collide by polynomials and depart together, under masks.
+// A lane that has finished takes the next motion. The rules are those of flight.hpp. A motion does not depend
+// on the motions beside it: other lanes never change its numbers or decisions, and only make it wait.
 #pragma once
 #include "collision_fit.hpp"
 #include "motion.hpp"
@@ -12,15 +12,15 @@ namespace vibench {
 constexpr int LANES = 8;
 constexpr unsigned ALL_LANES = (1u << LANES) - 1;
 constexpr int DRIVEN = 3, FLYING = 4;     // terms of p: three modes, and the drive as the last
-constexpr int ORDERS = 12;                // of a series over a grid step: the next adds 0.25^12 / 12!
-constexpr double FOUR = 4.0;              // grid steps at once where the stops are far
+constexpr int ORDERS = 12;                // terms of a series over a grid step: the next adds 0.25^12 / 12!
+constexpr double FOUR = 4.0;              // grid steps at once far from the stops
 constexpr int SHORT = 6, LONG = 10;       // terms of cosine and sine for angles up to 0.25 and up to 1 [rad]
-constexpr int WAITING = 1;                // lanes that may still march while the others wait for the next event
-constexpr int TOUCH_CORRECTIONS = 3;      // from a guess of second order; what they leave is checked
-constexpr int ROOT_CORRECTIONS = 3;       // to the fifth root, from a guess within some per cent
-constexpr int HIGHEST = 8;                // derivative of p that is taken at a touch
-constexpr double LONGEST_PART = 0.25;     // of a drive period that a collision may take: as far LONG terms hold
-constexpr int64_t MOST_EVENTS = 10000;    // in a drive period, on average: far beyond any motion of a specimen
+constexpr int WAITING = 1;                // lanes that may still advance while the others wait for the next event
+constexpr int TOUCH_CORRECTIONS = 3;      // from a second-order guess; the remainder is checked
+constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root, from a guess within a few per cent
+constexpr int HIGHEST = 8;                // highest derivative of p at a touch
+constexpr double LONGEST_PART = 0.25;     // longest collision, as a part of a drive period: the limit of LONG terms
+constexpr int64_t MOST_EVENTS = 10000;    // events per drive period, on average: far beyond any motion of a specimen
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
 using Lanes = Vector<LANES>;
@@ -57,7 +57,7 @@ template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   return {cosine, sine * angle};
 }
 
-// exp(rate time). A mode that turns shrinks little meanwhile.
+// exp(rate time), for a mode with little decay during `time`.
 template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes time) {
   Lanes shrinks = rate.re * time, size = INVERSE_FACTORIALS.of[6];
   for (int k = 5; k >= 0; k--) size = fused(size, shrinks, INVERSE_FACTORIALS.of[k]);
@@ -79,45 +79,45 @@ class BatchRun {
   void follow();
 
  private:
-  // States that are due once a drive period wait here, as terms, until eight can be formed together.
+  // States due once per drive period are stored here as terms until eight can be computed together.
   struct DueStates {
     LanePhasor term[FLYING];
-    Lanes later;  // how long after its instant each was kept: negative [s]
+    Lanes later;  // time of each state relative to its due time: negative [s]
   };
 
   const Batch &batch;
   const CollisionFit &fit;
-  const Tables &tables;  // of the first motion; the specimen is that of all
+  const Tables &tables;  // of the first motion; all motions have the same specimen
   double lower, upper;   // gaps [m]
 
-  // Of each lane, what its motion comes with.
+  // Per lane: constants of its motion.
   BatchMotion *motion[LANES] = {};
   LanePhasor rate[FLYING] = {};              // [1/s]
-  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // what a term is multiplied with
+  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // factors of a term per step
   LanePhasor series[ORDERS][FLYING] = {};    // Taylor coefficients of exp(rate t)
   Lanes square[FLYING] = {}, cube[FLYING] = {};  // of |rate|
-  LanePhasor kick[DRIVEN] = {};              // what a unit impulse over the pair's mass adds to a term
-  LanePhasor drive = {};                     // its term once a drive period
+  LanePhasor kick[DRIVEN] = {};              // change of a term by a unit impulse over the pair's mass
+  LanePhasor drive = {};                     // its term once per drive period
   Lanes period = {}, frequency = {}, grid = {};
   Phasor shapes[LANES][FLYING][6] = {};      // motion of a unit of each term
 
-  // And where it is.
+  // Per lane: current state.
   LanePhasor term[FLYING] = {};              // p = Re of their sum [m]
   Lanes left = {};                           // time until the next state is due [s]
-  Lanes reach = {}, bound = {}, jerk = {};   // no |p|, |d2p/dt2| or |d3p/dt3| is larger until a stop is touched
-  Lanes low = {}, high = {};                 // between these p must be at both ends of a step for that to be clear
-  Lanes low_four = {}, high_four = {};       // and of four steps
+  Lanes reach = {}, bound = {}, jerk = {};   // bounds of |p|, |d2p/dt2| and |d3p/dt3| until a stop is touched
+  Lanes low = {}, high = {};                 // a step is clear if p is within these limits at both ends
+  Lanes low_four = {}, high_four = {};       // limits for four steps
   Lanes touch = {};                          // time until the stop is touched [s]
   DueStates due_states[LANES] = {};
-  int waiting[LANES] = {};                   // of them
+  int waiting[LANES] = {};                   // number of waiting terms
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
 
   int64_t taken = 0;  // motions
-  unsigned moving = 0, careful = 0;  // lanes that march; those that have found four steps too many
+  unsigned moving = 0, careful = 0;  // lanes that advance; lanes for which four steps were too many
 
   // ---- One lane
 
-  // Whether a motion is over within as many steps as a run may make.
+  // Returns whether a motion can be finished within the steps allowed for a run.
   static bool is_short_enough(const BatchMotion &next) {
     const Tables &t = *next.tables;
     return double(next.periods) < double(MOST_STEPS) * t.flight.grid * t.drive.frequency;
@@ -151,7 +151,7 @@ class BatchRun {
 
   Phasor term_of(int lane, int j) const { return {term[j].re[lane], term[j].im[lane]}; }
 
-  // Keeps the state that is due in a lane in flight; returns whether all that are wanted have been kept.
+  // Stores the due state of a lane in flight; returns whether all requested states are stored.
   bool keep_due(int lane) {
     DueStates &due = due_states[lane];
     int place = waiting[lane]++;
@@ -166,7 +166,7 @@ class BatchRun {
     return is_all;
   }
 
-  // Keeps a state that is due in a contact.
+  // Stores a due state within a contact.
   bool keep_due(int lane, const double (&at)[6]) {
     form_states(lane);
     __builtin_memcpy(motion[lane]->sections + 6 * kept[lane], at, sizeof at);
@@ -174,7 +174,7 @@ class BatchRun {
     return ++kept[lane] == motion[lane]->periods;
   }
 
-  // Writes the states of the terms that wait.
+  // Computes the states of the waiting terms.
   void form_states(int lane) {
     const DueStates &due = due_states[lane];
     double *to = motion[lane]->sections + 6 * (kept[lane] - waiting[lane]);
@@ -192,7 +192,7 @@ class BatchRun {
     waiting[lane] = 0;
   }
 
-  // Ends a motion: in flight, or on a stop.
+  // Ends a motion in flight or on a stop.
   void end(int lane, const Contact<double> &contact) {
     BatchMotion &of = *motion[lane];
     Motion<double> last{};
@@ -207,7 +207,7 @@ class BatchRun {
 
   enum class SlowContact { LEFT, ENDED, LOST };
 
-  // Carries a lane through a contact by steps; what is due meanwhile is kept.
+  // Integrates a contact of one lane by steps, and stores the states due meanwhile.
   SlowContact contact_by_steps(int lane) {
     const Tables &own = *motion[lane]->tables;
     double at[6];
@@ -215,10 +215,10 @@ class BatchRun {
     Contact<double> contact{};
     double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
     begin_contact(contact, at, side, batch.tolerance, own);
-    contact.w = 0.0;  // the touch was found a hair before or after the gap closed
+    contact.w = 0.0;  // removes the rounding error of the touch
     HertzForce force{own.specimen.contact_stiffness};
     while (contact.side != 0.0) {
-      // The clock is at zero when the next state is due, where the drive is what it was at the start.
+      // The clock is zero when the next state is due, with the drive's phase of the start.
       Clock<double> clock{-left[lane], 0.0, 0.0};
       double longest = STRETCH_TURN / own.omega, passed = 0.0;
       bool is_due = left[lane] <= longest;
@@ -249,7 +249,7 @@ class BatchRun {
     }
   }
 
-  // ---- Some lanes; each function leaves the others as they are
+  // ---- Several lanes; each function leaves the others unchanged
 
   unsigned keep_due(unsigned due) {
     unsigned over = 0;
@@ -261,7 +261,7 @@ class BatchRun {
     return over;
   }
 
-  // From the lanes' terms: what bounds their flights from now on.
+  // Computes the bounds of the flights from their terms.
   void bound_flights(unsigned lanes) {
     Mask of = Mask::of(lanes);
     Lanes sizes = 0.0, squares = 0.0, cubes = 0.0;
@@ -277,7 +277,7 @@ class BatchRun {
     high_four = select(of, upper - FOUR * FOUR * margin, high_four);
   }
 
-  // Marches until `enough` lanes or fewer are still clear of the stops; returns those in which a state is due.
+  // Advances until at most `enough` lanes are clear of the stops; returns the lanes with a due state.
   unsigned march(int enough) {
     Mask going = Mask::of(moving), one_by_one = Mask::of(careful);
     LanePhasor now[FLYING], next[FLYING];
@@ -306,7 +306,7 @@ class BatchRun {
     return (of[0].re + of[1].re) + (of[2].re + of[3].re);
   }
 
-  // p and its derivatives over their factorials.
+  // p and its derivatives, each divided by the factorial of its order.
   INLINE void fill_course(Lanes (&course)[ORDERS]) const {
     course[0] = sum_of_terms(term);
     for (int k = 1; k < ORDERS; k++) {
@@ -319,7 +319,7 @@ class BatchRun {
     for (int k = ORDERS - 2; k >= 0; k--) rate = fused(rate, time, p), p = fused(p, time, course[k]);
   }
 
-  // Finds the first touch of lanes within the next step, as `first_touch` does; returns those that have one.
+  // Finds the first touch of lanes within the next step, as `first_touch` does; returns the lanes with one.
   unsigned look_closely(unsigned lanes) {
     Lanes course[ORDERS];
     fill_course(course);
@@ -354,10 +354,10 @@ class BatchRun {
     return touched;
   }
 
-  // Lets time pass, and puts the drive's term where it is then: its rounding never adds up.
+  // Advances time, and recomputes the drive's term, so that its rounding errors do not accumulate.
   void pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
-    // Half a turn on the angle lies within half a turn: the fourth power of its quarter.
+    // Half a turn on, the angle lies within half a turn: use the fourth power of its quarter.
     LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
     LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
     LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};
@@ -372,7 +372,7 @@ class BatchRun {
     pass(of, later);
   }
 
-  // Flies a grid step; returns the lanes in which a state is due.
+  // Advances a flight by a grid step; returns the lanes with a due state.
   unsigned fly_step(unsigned lanes) {
     Mask of = Mask::of(lanes);
     for (int j = 0; j < FLYING; j++) term[j] = select(of, fused_product(term[j], one_step[j]), term[j]);
@@ -380,7 +380,7 @@ class BatchRun {
     return (of & ~(0.0 < left)).bits();
   }
 
-  // Carries lanes that touch a stop to the end of their collision; returns those that the polynomials do not hold.
+  // Computes the collisions of lanes that touch a stop; returns those outside the range of the polynomials.
   // `last` lanes stop when their next state is due, also within a collision.
   unsigned collide(unsigned lanes, unsigned last) {
     Lanes approach = 0.0;
@@ -407,8 +407,8 @@ class BatchRun {
     return lanes & ~inside.bits();
   }
 
-  // The acceleration at the middle of a collision and its derivatives, in units of the collision, and u. `scale` is
-  // side over speed: what the rate of p is multiplied with to be 1.
+  // The acceleration at the middle of a collision, its derivatives, and u, in units of the collision. `scale`
+  // is side over speed, which normalises the rate of p to 1.
   INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
     for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
     variables[DERIVATIVES] = unit;
@@ -425,7 +425,7 @@ class BatchRun {
     }
   }
 
-  // Lets modes fly half of a collision, take its push about the middle, and fly the other half.
+  // Advances modes by half a collision, applies its push about the middle, and advances the other half.
   INLINE void kick_modes(Mask of, Lanes half, Lanes unit, Lanes push, const Lanes (&values)[POLYNOMIALS]) {
     for (int j = 0; j < DRIVEN; j++) {
       LanePhasor by = grown_by_series<SHORT>(rate[j], half), turn{rate[j].re * unit, rate[j].im * unit};
@@ -442,7 +442,7 @@ class BatchRun {
     }
   }
 
-  // Lanes whose first step away from the stop that was just left is surely clear.
+  // Returns the lanes whose first step after a contact is provably clear of the stop.
   unsigned leaves_clear(unsigned lanes) const {
     Lanes rate_of_p = 0.0, half_bend = 0.0;
     for (int j = 0; j < FLYING; j++) {

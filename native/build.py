@@ -1,9 +1,9 @@
-"""Compile the native engine with the clang of the `ziglang` package, once for each family of processors.
+"""Compile the native engine with the clang of the `ziglang` package, once per processor family.
 
     python native/build.py [FAMILY ...]
 
-Without a family, for this processor. hatch_build.py calls this while a package is built. VIBENCH_CXX names
-another compiler; its digits may then differ from everybody else's.
+By default for this processor. hatch_build.py calls this during a package build. VIBENCH_CXX names another
+compiler, whose results may differ in the last digits.
 """
 
 import argparse
@@ -22,19 +22,19 @@ ENGINE = ROOT / "sim" / "vibench" / "sim" / "engine"
 LIBRARIES = ENGINE / "libraries"
 FLAGS = (
     *("-std=c++20", "-O3", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-fvisibility=hidden"),
-    "-Wno-psabi",  # wide vectors are passed to inlined functions only, so no convention of calls matters
-    # Digits: no sum and product are contracted but where the source says so.
+    "-Wno-psabi",  # wide vectors are passed to inlined functions only: no calling convention matters
+    # Reproducible digits: sums and products are contracted only where the source does so.
     *("-ffp-contract=off", "-fno-math-errno"),
-    # No C++ library: it takes a minute to compile, and is another on every system.
+    # No C++ library: it takes a minute to compile, and differs between systems.
     *("-fno-exceptions", "-fno-rtti", "-nostdinc++", "-nostdlib++"),
 )
-ZIG_FLAGS = ("-fno-sanitize=undefined", "-s")  # zig's default build traps; tests run g++'s sanitizers instead
+ZIG_FLAGS = ("-fno-sanitize=undefined", "-s")  # zig's default build traps; tests use g++'s sanitizers
 SYSTEMS = {"linux": "linux-gnu.2.17", "win32": "windows-gnu", "darwin": "macos"}
 ENDINGS = {"linux": "so", "win32": "dll", "darwin": "dylib"}
 
 
 def sources_digest() -> str:
-    """Return a digest of all that decides what a library does."""
+    """Return a digest of everything that determines a library's behaviour."""
     digest = hashlib.sha256()
     for path in sorted([*NATIVE.glob("*.hpp"), NATIVE / "api.cpp", NATIVE / "build.py"]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
@@ -42,7 +42,7 @@ def sources_digest() -> str:
 
 
 def own_families() -> tuple[str, ...]:
-    """Return the families that this processor runs, the fastest first."""
+    """Return the families that this processor supports, the fastest first."""
     spec = importlib.util.spec_from_file_location("vibench_processor", ENGINE / "processor.py")
     processor = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(processor)
@@ -50,7 +50,7 @@ def own_families() -> tuple[str, ...]:
 
 
 def compiler(family: str, system: str) -> list[str]:
-    """Return the compiler's command for a family and a system (as `sys.platform` calls it)."""
+    """Return the compiler command for a family and a system (a value of `sys.platform`)."""
     if os.environ.get("VIBENCH_CXX"):
         return [*shlex.split(os.environ["VIBENCH_CXX"]), f"-march={family.replace('_', '-')}"]
     if importlib.util.find_spec("ziglang") is None:
@@ -62,11 +62,11 @@ def compiler(family: str, system: str) -> list[str]:
 
 
 def compile_engine(family: str, system: str = sys.platform) -> Path:
-    """Compile the library of a family, unless it is there, and remove those of other sources."""
+    """Compile the library of a family if it is missing, and remove those of other sources."""
     target = LIBRARIES / f"engine-{family}-{sources_digest()}.{ENDINGS[system]}"
     if not target.is_file():
         LIBRARIES.mkdir(exist_ok=True)
-        # Two processes may build at once: each into a folder of its own, and the last one to finish counts.
+        # Two processes may build at once, each in a separate folder; the last one to finish wins.
         with tempfile.TemporaryDirectory(dir=LIBRARIES) as folder:
             made = Path(folder) / target.name
             command = [*compiler(family, system), *FLAGS, str(NATIVE / "api.cpp"), "-o", str(made)]

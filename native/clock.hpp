@@ -5,7 +5,7 @@
 
 namespace vibench {
 
-// `slip` holds the derivatives of the instant: a changed motion strikes a little earlier or later.
+// `slip` holds the derivatives of the time: a changed motion strikes slightly earlier or later.
 template <class T> struct Clock {
   double high, low;
   T slip;
@@ -23,7 +23,7 @@ template <class T> INLINE T time_until(const Clock<T> &clock, double instant) {
   return ((instant - clock.high) - clock.low) - clock.slip;
 }
 
-// What a product of two doubles rounds off.
+// The rounding error of a product of two doubles.
 INLINE double product_error(double a, double b, double product) {
   constexpr double SPLITTER = 134217729.0;  // 2^27 + 1 cuts a double into halves whose products are exact
   double a_big = SPLITTER * a, b_big = SPLITTER * b;
@@ -32,7 +32,7 @@ INLINE double product_error(double a, double b, double product) {
   return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
 
-// Phase of a harmonic at clock time plus `later`, in (-2 pi, 4 pi) [rad]: whole turns are dropped exactly.
+// Phase of a harmonic at clock time plus `later`, in (-2 pi, 4 pi) [rad]; whole turns are removed exactly.
 INLINE double angle_at(double high, double low, double later, double frequency) {
   double turns = frequency * high, extra = frequency * later;
   double rest = product_error(frequency, high, turns) + frequency * low;

@@ -1,25 +1,25 @@
-// A whole Hertz collision in one: depths at sixteen points and the duration, by Newton's method (decision 0008).
-// With time = duration (1 - cos phi) / 2 the depth is smooth in phi, square roots at both ends included, and sixteen
-// Gauss points hold it. Measured by their own depth and time collisions differ only by how hard the other springs
-// press; shapes, and how they answer a misfit, are tabulated by that press and then corrected.
+// A complete Hertz collision: depths at sixteen points and the duration, by Newton's method (decision 0008). With time
+// = duration (1 - cos phi) / 2 the depth is smooth in phi, including the square roots at both ends, and sixteen Gauss
+// points represent it. Normalised by their depth and duration, collisions differ only by the force of the other springs
+// ("press"). Shapes, and their response to a misfit, are tabulated over that press and then corrected.
 #pragma once
 #include "flight.hpp"
 
 namespace vibench {
 
 enum { POINTS = 16, SLOW_TERMS = 6, MOST_SHAPE_CORRECTIONS = 8 };
-// Rows of `CollisionShapes::shapes` below the sixteen that answer the misfits of depth.
+// Rows of `CollisionShapes::shapes` below the sixteen responses to misfits of depth.
 enum ShapeRow { TO_DURATION = POINTS, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING };
 enum DurationColumn { DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY };
 constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // presses of the shapes
-constexpr double LONGEST = 3.5;         // duration of the collision pressed hardest, over its depth and speed
-constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration: what the series bears [rad]
+constexpr double LONGEST = 3.5;         // duration of the hardest pressed collision, over its depth and speed
+constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration: the limit of the series [rad]
 constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed: m v^2 / 2 = 2 k d^(5/2) / 5
-constexpr double LEAST_TOLERANCE = 1e-7;  // stricter ones ask for more of the duration than sixteen points know
+constexpr double LEAST_TOLERANCE = 1e-7;  // stricter tolerances need more accuracy than sixteen points have
 constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
-constexpr double LAG = 3e-6;  // what slow springs make of the force is found anew while depths change by more
+constexpr double LAG = 3e-6;  // the slow springs' effect on the force is recomputed while depths change by more
 
-// Seen from its own side: whatever the stop, p is positive.
+// In coordinates of the stop: p is positive on either side.
 template <class T> struct Collision {
   Wide<T, POINTS> depths;  // over `unit`
   Wide<T, POINTS> force;   // at the points [N]
@@ -28,7 +28,7 @@ template <class T> struct Collision {
   Wide<T, TERMS> course;   // Taylor terms of p without force, in fastest * t
   Wide<T, TERMS> moments;  // integrals of the force up to the end
   T duration;              // [s]
-  double unit;             // depth of a collision of this speed with nothing else acting [m]
+  double unit;             // depth of a collision of this speed without other forces [m]
   double pace;             // unit over speed [s]
   int press;               // row of the tables
 };
@@ -48,7 +48,7 @@ INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<
   return sum;
 }
 
-// What the force at the points does to a number of the motion there, by some terms of the series.
+// The effect of the force at the points on a number of the motion there, by some terms of the series.
 template <class T>
 INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last, int number, const T &duration,
                               const CollisionTables &t) {
@@ -62,7 +62,7 @@ INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last,
   return sum;
 }
 
-// Whether a correction was the last: by the value's change; for derivatives by theirs.
+// Whether a correction was the last: by the change of the values or, for derivatives, of the derivatives.
 INLINE bool is_settled(const Vector<POINTS> &change, const Vector<POINTS> &, double close) {
   return total(change * change) <= close * close;
 }
@@ -73,8 +73,8 @@ INLINE bool is_settled(const Dual<Vector<POINTS>, M> &change, const Dual<Vector<
   return true;
 }
 
-// Corrects depths and duration until the equations of the collision hold; `begun` is p - gap at the start [m].
-// With derivatives the values have been found already, and stay: both kinds of motion are the same to the last bit.
+// Corrects depths and duration until the collision's equations hold; `begun` is p - gap at the start [m]. With
+// derivatives, the values are already solved and stay unchanged, so both kinds of motion agree to the last bit.
 template <class T> inline bool correct(Collision<T> &c, const T &begun, double close, const Tables &tables) {
   const CollisionTables &t = tables.collision;
   const auto &shape = t.shapes->shapes[c.press];
@@ -108,7 +108,7 @@ template <class T> inline bool correct(Collision<T> &c, const T &begun, double c
   return false;
 }
 
-// Depths and duration as far as they are known beforehand, to the first order.
+// Predicts depths and duration from the tables, to first order.
 inline void foresee(Collision<double> &c, double press, const Tables &tables) {
   const CollisionTables &t = tables.collision;
   c.press = int((press - SOFTEST) / SPACING + 0.5);
@@ -144,9 +144,9 @@ template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
           value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
-// Finds the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false where a few
-// corrections do not suffice: next to no speed, springs as fast as the collision, an instant to stop at in the midst of
-// it, the reference level. Then the steps of contact.hpp resolve it.
+// Solves the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false if a few
+// corrections do not suffice: nearly zero speed, springs as fast as the collision, a requested end within it,
+// the reference level. Then the steps of contact.hpp resolve it.
 template <class T>
 inline bool find_collision(Collision<T> &c, double gap, double pace, double longest, double tolerance,
                            const Tables &tables) {
@@ -175,8 +175,8 @@ inline bool find_collision(Collision<T> &c, double gap, double pace, double long
   }
 }
 
-// Carries a motion that has just touched the stop on `side` to the end of its collision; false, with nothing changed,
-// where it is not found.
+// Advances a motion that has just touched the stop on `side` to the end of its collision; returns false, and
+// changes nothing, if it is not solved.
 template <class T>
 inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
                     double tolerance, const Tables &tables) {

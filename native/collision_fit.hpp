@@ -1,24 +1,24 @@
-// A Hertz collision as polynomials, for batches: nothing is iterated (decision 0061). In units of the depth and the
-// time u that a collision of its speed would have with nothing else acting, a collision depends on the acceleration
-// that all other springs give the pair meanwhile, and on u. That acceleration about the middle, its first four
-// derivatives, and u are the variables; the duration, and the moments of the force about the middle, are polynomials
-// of them, which `vibench.sim.engine` fits to collisions that it has solved.
+// A Hertz collision as polynomials for batches, without iteration (decision 0061). Units are depth and time u
+// of a collision of the same speed without other forces. In these units a collision depends on u and on the
+// acceleration of the pair by all other springs. The variables are that acceleration at the middle, its first
+// four derivatives, and u. Duration and moments of the force about the middle are polynomials of them, which
+// `vibench.sim.engine` fits to solved collisions.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
-constexpr int DERIVATIVES = 5;              // of the acceleration, itself among them
-constexpr int VARIABLES = DERIVATIVES + 1;  // and u
+constexpr int DERIVATIVES = 5;              // derivatives of the acceleration, including itself
+constexpr int VARIABLES = DERIVATIVES + 1;  // plus u
 constexpr int MOMENTS = 5;
 constexpr int POLYNOMIALS = 1 + MOMENTS;    // the duration over u, and the moments
-constexpr double COLLISION_MIDDLE = 1.47;   // of a collision, in u
+constexpr double COLLISION_MIDDLE = 1.47;   // middle of a collision, in u
 constexpr int MONOMIALS = 289;
 constexpr int COEFFICIENTS = sizeof(CollisionFit::coefficients) / sizeof(double);
 
-// By how much each power of a variable adds less than the one before.
+// Decay of the contributions with each power of a variable.
 constexpr double ADDS[VARIABLES] = {0.3, 0.08, 0.015, 0.002, 2e-4, 0.03};
-// Monomials that would add less are left out of each polynomial. Higher moments count less.
+// Monomials with smaller contributions are omitted from each polynomial. Higher moments count less.
 constexpr double LEAST_ADDED[POLYNOMIALS] = {1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05};
 
 // An earlier monomial times a variable; the first is 1.
@@ -28,13 +28,13 @@ struct Monomial {
   int before, variable;
 };
 struct Monomials {
-  Monomial of[MONOMIALS];    // those that add most first
-  int counts[POLYNOMIALS];   // how many, from the first on, each polynomial has
+  Monomial of[MONOMIALS];    // sorted by contribution, the largest first
+  int counts[POLYNOMIALS];   // number of leading monomials in each polynomial
   int first[POLYNOMIALS];    // place of its first coefficient
   int count, coefficients;
 };
 
-// Adds the monomials whose powers of the variables before `variable` are those of `partly`, in order of what they add.
+// Adds the monomials whose powers of the variables before `variable` are those of `partly`, sorted by contribution.
 constexpr void add_monomials(Monomials &to, Monomial partly, int variable) {
   if (variable == VARIABLES) {
     int place = to.count++;
@@ -71,7 +71,7 @@ constexpr Monomials make_monomials() {
 constexpr Monomials THE_MONOMIALS = make_monomials();
 static_assert(THE_MONOMIALS.count == MONOMIALS && THE_MONOMIALS.coefficients == COEFFICIENTS);
 
-// Tells Python the monomials, to which it fits; returns their number.
+// Passes the monomials to Python, which fits them; returns their number.
 inline int64_t describe_collisions(const CollisionMonomials &to) {
   for (int k = 0; k < MONOMIALS; k++)
     for (int i = 0; i < VARIABLES; i++) to.powers.at[k * VARIABLES + i] = THE_MONOMIALS.of[k].powers[i];
@@ -79,11 +79,11 @@ inline int64_t describe_collisions(const CollisionMonomials &to) {
   return MONOMIALS;
 }
 
-// The polynomials of eight points at once. Where the loop is written out every place is a constant, and sums stay in
-// registers; g++, which only tests, keeps the loop and the same order of sums.
+// The polynomials of eight points at once. In the unrolled loop every place is a constant, and sums stay in
+// registers; g++, used only for tests, keeps the loop and the same order of sums.
 inline void evaluate(Vector<8> (&values)[POLYNOMIALS], const Vector<8> (&variables)[VARIABLES],
                      const double (&coefficients)[COEFFICIENTS]) {
-  constexpr int CHAINS = 4;  // of sums that do not wait for each other
+  constexpr int CHAINS = 4;  // independent sums
   Vector<8> found[MONOMIALS], sums[POLYNOMIALS][CHAINS] = {};
 #if defined(__clang__)
 #pragma clang loop unroll(full)

@@ -1,6 +1,6 @@
-// Contact with a stop that yields, in steps: from touching it to leaving it, with controlled error (0004, 0008).
-// With |p| = gap + w^2 and dt = w ds the force of eq. 2 is k w^3 and every rate a polynomial: the kink of
-// penetration^(3/2) is gone, and onset and exit are simple zeros of w.
+// Contact with a compliant stop, integrated by steps with controlled error from touch to release (0004,
+// 0008). With |p| = gap + w^2 and dt = w ds the force of eq. 2 is k w^3 and every rate a polynomial: this
+// removes the kink of penetration^(3/2), and makes onset and exit simple zeros of w.
 #pragma once
 #include "dormand_prince.hpp"
 #include "flight.hpp"
@@ -14,8 +14,8 @@ struct HertzForce {
   double stiffness;
   template <class T> INLINE T operator()(const T &w, const T &) const { return stiffness * (w * w * w); }
 };
-// A spring beside a Hertz contact, each of which may be nothing, with the loss of Hunt and Crossley, J. Appl. Mech. 42
-// (1975) 440, eq. 8.
+// A spring in parallel with a Hertz contact, either of which may be zero, with the loss of Hunt and Crossley,
+// J. Appl. Mech. 42 (1975) 440, eq. 8.
 struct YieldingForce {
   double spring, hertz, loss;  // [N/m], [N/m^1.5], [s/m]
   template <class T> INLINE T operator()(const T &w, const T &r) const {
@@ -25,13 +25,13 @@ struct YieldingForce {
 
 // ---- A contact
 
-constexpr double SLOWEST_TOUCH = 1e-12;  // [m/s]: at exactly w = r = 0 the flow in s stands still
+constexpr double SLOWEST_TOUCH = 1e-12;  // [m/s]: at exactly w = r = 0 the flow in s is at rest
 constexpr double ROOT_FLOOR = 1e-6;      // added to the error scale of w [m^0.5]: a penetration of 1 pm
 constexpr double RATE_FLOOR = 1e-6;      // added to the error scale of r [m/s]
-constexpr double STANDARD_TOLERANCE = 3e-7;  // for which steps are foreseen; they scale with its eighth root
+constexpr double STANDARD_TOLERANCE = 3e-7;  // tolerance of the predicted steps, which scale with its eighth root
 constexpr int MOST_CONTACT_STEPS = 100000;   // within one call; a contact takes about ten
 constexpr int MOST_CORRECTIONS = 100;        // a bracketed Newton iteration ends by bisection before this
-constexpr double LANDING = 1e-11;            // an exit is found when |w| is below this part of its scale
+constexpr double LANDING = 1e-11;            // an exit is accepted when |w| is below this part of its scale
 constexpr double STRETCH_TURN = 0.3;  // longest stretch, as drive phase [rad]: the base force is a polynomial of
                                       // degree 7 about its middle, whose first term left out is 6e-12 of it
 
@@ -41,28 +41,28 @@ template <class T> struct Contact {
   double step, root_scale, rate_scale, pace;
 };
 
-// Errors of steps take energy and do not give it, so that they add up; those of whole collisions do not. Steps may use
-// this part of the tolerance, but need not be finer than the finest.
+// Errors of steps only remove energy, so they accumulate; those of whole collisions do not. Steps use this
+// part of the tolerance, but need not be finer than the finest.
 constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
 
 INLINE double careful(double tolerance) { return smaller(tolerance, larger(STEP_CARE * tolerance, FINEST_STEP)); }
-// A damped motion forgets the errors of its steps; an undamped one keeps them all.
+// A damped motion forgets the errors of its steps; an undamped one accumulates them.
 INLINE double step_tolerance(double tolerance, const Specimen &s) {
   return s.c0 + s.c1 + s.c2 + s.loss > 0.0 ? tolerance : careful(tolerance);
 }
 
 INLINE double step_scale(double tolerance) { return eighth_root(tolerance / STANDARD_TOLERANCE); }
 
-// Longest step that will do, over the collision's pace, at a depth over the largest. Contacts are all alike: the
-// errors of the last step know nothing of the turn ahead, where steps must be half as long. Measured on Hertz
-// collisions of any speed; on stops that are springs it is a little less than allowed.
+// Longest sufficient step, over the collision's time scale, at a depth over the largest. The error estimate
+// of the last step cannot predict the turning point, where steps must be half as long; but all contacts are
+// similar. Measured on Hertz collisions of any speed; slightly conservative for stops that are springs.
 INLINE double foreseen_step(double depth, double rate) {
   if (rate > 0.0) return larger(1.02 - 0.95 * depth, 0.46);
   return depth > 0.93 ? 0.48 : depth > 0.65 ? 0.6 : 0.9;
 }
 
-// Enters a contact from the state of a flight. The first step resolves whichever is faster: the elastic collision
-// (a half-wave in s about 5.1 w_max / v long), or the other springs that press a slow contact (w'' = -(a / 2) w).
+// Starts a contact from the state of a flight. The first step resolves whichever is faster: the elastic collision (a
+// half-wave in s about 5.1 w_max / v long), or the other springs that press a slow contact (w'' = -(a / 2) w).
 template <class T>
 inline void begin_contact(Contact<T> &c, const T *motion, double side, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
@@ -76,7 +76,7 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
     c.r = c.r + (SLOWEST_TOUCH - r);
     r = SLOWEST_TOUCH;
   }
-  // The largest speed and depth, each spring taken alone: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5.
+  // The largest speed and depth, with each spring alone: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5.
   double hertz = 0.8 * s.contact_stiffness / t.pair, spring = s.linear_stiffness / t.pair, w2 = w * w;
   double speed = square_root(r * r + hertz * w2 * w2 * w + spring * w2 * w2);
   double deepest = smaller(fifth_root(speed * speed / hertz), square_root(speed / square_root(spring)));
@@ -89,7 +89,7 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
   c.step = step_scale(step_tolerance(tolerance, s)) * foreseen_step(w / c.root_scale, r) * smaller(c.pace, pressed);
 }
 
-// k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N]; one that is a cubic, about its start.
+// k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N]; for a cubic, about its start.
 struct BaseForce {
   double middle, terms[8];
   Phasor drive;  // the drive's phasor at the middle
@@ -106,7 +106,7 @@ struct BaseForce {
   BaseForce(double middle_s, const double *series) : middle(middle_s), terms{}, drive{} {
     __builtin_memcpy(terms, series, sizeof terms);
   }
-  // Summed in pairs: the shortest chain of products that wait for each other.
+  // Summed in pairs, which gives the shortest chain of dependent products.
   template <class T> INLINE T at(const T &tau) const {
     T u = tau - middle, u2 = u * u;
     T low = (terms[0] + terms[1] * u) + u2 * (terms[2] + terms[3] * u);
@@ -117,8 +117,8 @@ struct BaseForce {
 
 enum { W, R, CX, CZ, CVX, CVZ, TIME, UNKNOWNS };
 
-// Gong et al. 2025, eq. 1, in contact and in s: the rates of w, r, x, z, vx, vz and t. The stop's push is formed on
-// the positive side and its sign set once, so that a mirrored motion is mirrored to the last bit.
+// Gong et al. 2025, eq. 1, in contact and in s: the rates of w, r, x, z, vx, vz and t. The stop's force is
+// formed on the positive side and its sign set once, so that a mirrored motion is mirrored to the last bit.
 template <class T, class Force> struct ContactEquations {
   const Body &t;
   const BaseForce &base;
@@ -152,7 +152,7 @@ template <class T, class Force> struct ContactSteps {
 
   void take(const T &h) { dormand_prince_step(stages, point, h, trial, rates); }
 
-  // On w, r and vx: m0 feels no contact, but a light one is faster than the contact itself.
+  // On w, r and vx, because with a light m0 the motion of m0 is faster than the contact.
   double error(double h, const Contact<T> &c) const {
     StepError error;
     error.add(stages, W, tolerance * (c.root_scale + magnitude(value_of(point[W]))));
@@ -161,8 +161,9 @@ template <class T, class Force> struct ContactSteps {
     return error.of_step(h, 2.0);
   }
 
-  // Shortens the trial step until `off` is zero, which has been passed: bracketed Newton on its length. Values decide,
-  // and are those of a plain motion to the last bit; one correction at the end gives the length its derivatives.
+  // Shortens the trial step to the zero of `off`, which lies within it: bracketed Newton on its length.
+  // Values decide, and equal those of a motion without derivatives to the last bit; a final correction gives
+  // the length its derivatives.
   template <class Off> T land(const T &longest, double close, double slope_sign, const Off &off) {
     double low = 0.0, high = value_of(longest);
     T h = longest;
@@ -192,7 +193,7 @@ template <class T, class Force> struct ContactSteps {
   }
   T land_on_time(const T &longest, const T &limit) {
     struct Off { T late, slope; };
-    // A few units in the last place of the stretch: closer than that, time itself has no digits.
+    // A few units in the last place of the stretch, the resolution of time.
     double close = 4.0 * EPSILON * (magnitude(value_of(limit)) + magnitude(value_of(point[TIME])));
     T h = land(longest, close, 1.0, [&] { return Off{T(trial[TIME] - limit), trial[W]}; });
     trial[TIME] = limit;
@@ -200,8 +201,8 @@ template <class T, class Force> struct ContactSteps {
   }
 };
 
-// Advances a contact from time `tau` until m1 leaves the stop (then `contact.side` is 0) or the time is `limit`,
-// on the clock of `base`. `seen(steps, h)` is called with every accepted step before it becomes the point.
+// Advances a contact from time `tau` until m1 leaves the stop (then `contact.side` is 0) or the time is `limit`, on the
+// clock of `base`. `seen(steps, h)` is called with every accepted step before it becomes the point.
 template <class T, class Force, class Seen>
 inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &limit, const BaseForce &base,
                                   const Force &force, double allowed, const Body &t, const Seen &seen) {
@@ -232,7 +233,7 @@ inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &lim
       end = ContactEnd::HELD;
     }
     if (value_of(trial[TIME]) < value_of(point[TIME])) {
-      // Time runs backwards where w < 0: the step leapt over the exit and came back.
+      // Time runs backwards where w < 0: the step passed the exit and returned.
       step *= 0.5;
       end = ContactEnd::STALLED;
       continue;
@@ -244,7 +245,7 @@ inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &lim
     steps.rates(point, steps.stages[0]);
     step *= factor;
     double depth = value_of(point[W]) / c.root_scale;
-    // Up to the foreseen depth a contact is the collision that was foreseen.
+    // Up to the predicted depth, the prediction for the step holds too.
     if (depth < 1.05) step = smaller(step, longest * foreseen_step(depth, value_of(point[R])));
   }
   c.w = point[W], c.r = point[R], c.step = step;

@@ -1,17 +1,17 @@
 // Motion under a base whose displacement is a cubic polynomial on each of equal intervals: sweeps, recordings, and the
-// table of a shaker (decision 0004). Intervals are cut in pieces so short that a Taylor series holds the motion. There a
-// flight is one product with a matrix, clear of the stops by a bound on its acceleration, or its series is searched.
+// table of a shaker (decision 0004). Intervals are divided into pieces short enough for a Taylor series. Within a piece
+// a flight is one matrix product, if a bound on its acceleration excludes a touch; otherwise its series is searched.
 #pragma once
 #include "run.hpp"
 
 namespace vibench {
 
 constexpr int CUBIC = 4;  // terms of a cubic
-constexpr int MOST_PHASES = 100000;  // flights and contacts in a piece: far beyond any motion, chatter included
-constexpr double ALMOST = 1.0 - 1e-12;  // an interval is whole although its length rounds differently
+constexpr int MOST_PHASES = 100000;  // flights and contacts in a piece: far beyond any motion, including chatter
+constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for an interval whose length has rounding errors
 constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // in steps of the last level, under a power law
 constexpr int PIECE_ORDER = 16;  // terms of a series that a piece needs under a power law
-constexpr double TRY_TWICE = 5e-4;  // a misfit of this part of what is allowed is followed by a step twice as long
+constexpr double TRY_TWICE = 5e-4;  // a misfit below this part of the allowed one doubles the next step
 
 // ---- The base
 
@@ -35,7 +35,7 @@ template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force,
 
 // ---- Taylor series of a motion
 
-// Gong et al. 2025, eq. 1 without F, with a `push` on m0: d/dt of (x, y, z, vx, vy, vz).
+// Gong et al. 2025, eq. 1 without F, with a force `push` on m0: d/dt of (x, y, z, vx, vy, vz).
 template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -46,7 +46,7 @@ template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates
   rates[VZ] = t.inverse2 * (hold - pull);
 }
 
-// The same while a rigid stop makes one body of m1 and m2.
+// The same while m1 rests on a rigid stop and forms one body with m2.
 template <class T> INLINE void held_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -74,12 +74,12 @@ template <class T> struct Course {
   }
 };
 
-// ---- What a run needs ready
+// ---- Data of a run
 
-// What the base adds to a step under a power law, by terms of its force.
+// Effect of the base on a step under a power law, by terms of its force.
 struct BaseNumbers {
-  double places[CUBIC][GAUSS];  // to p at the points
-  double ends[CUBIC][WIDE];     // to the motion at the end
+  double places[CUBIC][GAUSS];  // on p at the points
+  double ends[CUBIC][WIDE];     // on the motion at the end
 };
 
 struct CubicPowerTables : PowerTables {
@@ -91,9 +91,9 @@ struct CubicTables : Body {
   double fastest;   // rate of the specimen [1/s]
   int64_t pieces;   // of an interval
   double length;    // of a piece [s]
-  double across[6 + CUBIC][WIDE];  // what the motion and the force's terms at its start add to the motion at its end
+  double across[6 + CUBIC][WIDE];  // effect of the motion and the force's terms at its start on the motion at its end
   double bound_per_root_energy;    // largest |d2p/dt2| over sqrt(2 energy) [m/s^2 / J^0.5]
-  const CubicPowerTables *power;   // right behind these tables; of a power law
+  const CubicPowerTables *power;   // after these tables; of a power law
 };
 
 // Largest |d2p/dt2| in flight over sqrt(2 energy): the norm of its row in the coordinates sqrt(k) e and sqrt(m) v, e
@@ -111,8 +111,8 @@ inline double bound_per_root_energy(const Body &t) {
   return square_root(sum);
 }
 
-// From the same series as the motion: f_k t^k, put in after s = 0, moves a number by f_k (A^m / m!) c t^(m+k+1)
-// m! k! / (m+k+1)!, where c is the place of the force.
+// From the same series as the motion: f_k t^k, substituted after s = 0, changes a number by f_k (A^m / m!) c
+// t^(m+k+1) m! k! / (m+k+1)!, where c is the place of the force.
 inline void fill_base(BaseNumbers &base, double length, const PowerTables &t, const Body &body) {
   base = {};
   double turn = t.fastest * length;
@@ -207,7 +207,7 @@ template <class T, class Stops> class CubicRun {
     return outcome;
   }
 
-  // Each sample is the end of a shorter piece, which a copy of the motion passes.
+  // Each sample is the end of a shorter piece, computed with a copy of the motion.
   void keep_samples_of(const CubicForce<double> &force, double length) {
     keep_samples(record, {m.clock.high, m.clock.low, 0.0}, length, [&](double later, double *sample) {
       Motion<double> copy = values_of(m);
@@ -219,8 +219,8 @@ template <class T, class Stops> class CubicRun {
     });
   }
 
-  // Bound of |d2p/dt2| over one piece in flight, from the energy at its start: d/dt sqrt(2E) <= |f| / sqrt(m0), and
-  // damping only takes from it.
+  // Bound of |d2p/dt2| over one piece in flight, from the energy at its start: d/dt sqrt(2E) <= |f| /
+  // sqrt(m0); damping only reduces it.
   template <class F> double acceleration_bound(const CubicForce<F> &force) const {
     const Specimen &s = t.specimen;
     double x = value_of(m.at[X]), y = value_of(m.at[Y]), z = value_of(m.at[Z]), h = t.length;
@@ -231,7 +231,7 @@ template <class T, class Stops> class CubicRun {
     return t.bound_per_root_energy * (square_root(kinetic + elastic) + h * push * square_root(t.inverse0));
   }
 
-  // Carries a flight across a whole piece, or leaves the motion alone where a touch cannot be excluded.
+  // Advances a flight across a whole piece; changes nothing if a touch cannot be excluded.
   bool cross(const CubicForce<double> &force) {
     if (m.contact.side != 0.0) return false;
     double margin = acceleration_bound(force) * t.length * t.length / 8.0;
@@ -303,7 +303,7 @@ template <class T, class Stops> class CubicRun {
 
   Outcome stay(const CubicForce<double> &force, double length, T &tau) {
     if constexpr (is_same<Stops, HardStops>) return stay_held(force, length, tau);
-    else if constexpr (is_same<Stops, WithoutStops>) return NOT_FINITE;  // there is no stop to be on
+    else if constexpr (is_same<Stops, WithoutStops>) return NOT_FINITE;  // there is no stop
     else {
       record.steps_left -= RESOLVED_STEP;
       auto seen = [](auto &&...) {};
@@ -316,7 +316,7 @@ template <class T, class Stops> class CubicRun {
     }
   }
 
-  // The stop lets go where the acceleration that presses m1 on it falls to zero.
+  // The stop releases m1 where the acceleration that presses m1 on it becomes zero.
   Outcome stay_held(const CubicForce<double> &force, double length, T &tau) {
     const Specimen &s = t.specimen;
     double side = m.contact.side, gap = gap_at(s, side), left = length - value_of(tau), path[AHEAD];
@@ -338,7 +338,7 @@ template <class T, class Stops> class CubicRun {
     return REACHED_END;
   }
 
-  // Under a power law: the piece as one step, or as halves of halves of it.
+  // Under a power law: the piece as one step, or bisected repeatedly.
   Outcome push_on(const CubicForce<double> &force, double length, bool is_whole, T &tau) {
     const CubicPowerTables &of = *t.power;
     PowerStep<T> step{t, of, fit_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
@@ -390,7 +390,7 @@ template <class T, class Stops> class CubicRun {
   }
 };
 
-// Advances over the intervals of a drive that are left.
+// Advances over the remaining intervals of a drive.
 template <class Run> inline Outcome follow(Run &run, const Motion<double> &motion, CubicDrive &drive, double interval,
                                            const Record &record) {
   int64_t intervals = drive.base.size / CUBIC;
@@ -406,7 +406,7 @@ template <class Run> inline Outcome follow(Run &run, const Motion<double> &motio
   return REACHED_END;
 }
 
-// Calls `act` with a run of the motion under the stops of the specimen.
+// Calls `act` with a run of the motion for the stops of the specimen.
 template <class T, class Act>
 inline Outcome with_cubic_stops(Motion<T> &motion, const CubicTables &t, double tolerance, Record &record,
                                 const Act &act) {

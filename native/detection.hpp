@@ -1,7 +1,7 @@
-// Whether, and when, a flight touches a stop: proved by a bound on the acceleration of p, never sampled (0004).
-// Over a stretch p is a Taylor polynomial (exact to rounding) and |d2p/dt2| <= bound. Two rules follow: the stretch
-// is clear if both end gaps exceed bound h^2 / 8; and from the gap g with approach speed v no stop can be reached
-// sooner than 2 g / (v + sqrt(v^2 + 2 bound g)).
+// Whether, and when, a flight touches a stop: proved by a bound on the acceleration of p, not sampled (0004).
+// On a stretch p is a Taylor polynomial (exact to rounding) and |d2p/dt2| <= bound. Two rules follow: the
+// stretch is clear if both end gaps exceed bound h^2 / 8; and from the gap g with approach speed v no stop is
+// reached before 2 g / (v + sqrt(v^2 + 2 bound g)).
 #pragma once
 #include "tables.hpp"
 
@@ -9,19 +9,19 @@ namespace vibench {
 
 constexpr double NEVER = -1.0;
 constexpr double TOUCH = 1e-12;              // a gap below this part of the stop's distance counts as closed
-constexpr double ROUNDING = 8.0 * EPSILON;   // and one below this part of the largest term of p
+constexpr double ROUNDING = 8.0 * EPSILON;   // so does one below this part of the largest term of p
 constexpr double JUST_SHORT = 0.999;         // part of the earliest possible return after leaving a stop
 constexpr double SHORTEST_ADVANCE = 1e-15;   // [s], so that a search always ends
-constexpr int TIGHTER_AFTER = 4;             // advances after which a tighter bound is worth its cost
+constexpr int TIGHTER_AFTER = 4;             // advances after which computing a tighter bound pays
 constexpr int PATIENCE = 400;                // a tangency followed for longer has no crossing ...
-constexpr double IMPATIENT = 1e-4;           // ... and is crossed in steps of this part of the stretch
-constexpr int NEWTON_STEPS = 6;              // corrections to a touch; two are the rule
+constexpr double IMPATIENT = 1e-4;           // ... and is passed in steps of this part of the stretch
+constexpr int NEWTON_STEPS = 6;              // corrections of a touch; usually two
 
 struct ValueAndRate {
   double value, rate;
 };
 
-// A polynomial of AHEAD terms. Even and odd powers are summed apart: two short chains take half the time of one.
+// A polynomial of AHEAD terms. Even and odd powers are summed separately: two short chains take half the time of one.
 INLINE ValueAndRate polynomial_at(const double *series, double tau) {
   double square = tau * tau, even = 0.0, odd = 0.0, even_slope = 0.0, odd_slope = 0.0;
   for (int k = AHEAD - 2; k >= 0; k -= 2) {
@@ -45,24 +45,24 @@ inline double derivative_bound(const double *series, double length, int derivati
   return bound;
 }
 
-// Earliest time [s] at which a gap [m] can close that closes now at `approach` [m/s].
+// Earliest time [s] at which a gap [m] with the present speed `approach` [m/s] can close.
 INLINE double earliest_closing(double gap, double approach, double bound) {
   if (gap == INFINITE) return INFINITE;
   double root = square_root(approach * approach + 2.0 * bound * gap);
   return approach > 0.0 ? 2.0 * gap / (approach + root) : JUST_SHORT * (root - approach) / bound;
 }
 
-// Where p may go on one stretch.
+// Limits of p on one stretch.
 struct Room {
   double lower, upper;  // distances of the stops [m]; infinite for none
   double bound;         // of |d2p/dt2| [m/s^2]
-  double reach;         // size of the terms that p is summed from [m]: its rounding decides what is a touch
+  double reach;         // size of the summands of p [m], whose rounding limits the detection of a touch
 
   INLINE double nearer() const { return smaller(lower, upper); }
   INLINE double closed() const { return TOUCH * nearer() + ROUNDING * reach; }
 };
 
-// The first touch on [0, length], or NEVER. A stop that is being left at the start is no touch.
+// The first touch on [0, length], or NEVER. A stop left at the start is not a touch.
 inline double first_contact(const double *series, double length, const Room &room) {
   if (room.nearer() == INFINITE) return NEVER;
   double closed = room.closed(), shortest = smaller(SHORTEST_ADVANCE, IMPATIENT * length);
@@ -74,17 +74,17 @@ inline double first_contact(const double *series, double length, const Room &roo
     double advance = smaller(earliest_closing(larger(above, 0.0), rate, bound),
                              earliest_closing(larger(below, 0.0), -rate, bound));
     tau += larger(advance, shortest);
-    // What bounds the terms of p knows nothing of how they cancel; the polynomial does.
+    // The bounds on p's terms ignore cancellation; the polynomial does not.
     if (advances == TIGHTER_AFTER) bound = smaller(bound, derivative_bound(series, length, 2) + 1e-300);
     if (advances == PATIENCE) shortest = IMPATIENT * length;
   }
   return NEVER;
 }
 
-// The same on a stretch of at most LONGEST_TURN. Where p surely does not turn, only the stop ahead can be touched,
-// and only once, so that Newton's method may be trusted.
+// The same on a stretch of at most LONGEST_TURN. Where p provably does not turn, only the stop ahead can be
+// touched, and only once, so Newton's method is safe.
 inline double first_touch(const double *series, double length, const Room &room) {
-  double change = room.bound * LONGEST_TURN;  // d2p/dt2 changes by no more in this time
+  double change = room.bound * LONGEST_TURN;  // largest change of d2p/dt2 in this time
   double side = series[1] > 0.0 ? 1.0 : -1.0;
   double speed = side * series[1], bend = 2.0 * side * series[2], stop = side > 0.0 ? room.upper : room.lower;
   if (!(smaller(speed, speed + bend * length) > change * length)) return first_contact(series, length, room);
@@ -99,14 +99,14 @@ inline double first_touch(const double *series, double length, const Room &room)
     if (tau == length && gap > closed) return NEVER;
     double step = gap / (side * rate);
     tau += step;
-    // What this correction leaves of the gap is at most half of bound step^2.
+    // After this correction, the remaining gap is at most half of bound step^2.
     if (room.bound * step * step <= closed) return smaller(tau, length);
   }
   return first_contact(series, length, room);
 }
 
-// Side of the stop that is touched: the nearer one, not the one moved towards, for at a grazing touch the sign of
-// the speed is rounding. Where there is no room between the stops p is rounding in its turn, and the speed decides.
+// Side of the touched stop: the nearer one, and not that of the velocity, whose sign is rounding error at a
+// grazing touch. Without room between the stops p is rounding error, and the velocity decides.
 INLINE double touched_side(double p, double rate, const Specimen &specimen) {
   if (specimen.upper_gap == INFINITE) return -1.0;
   if (specimen.lower_gap == INFINITE) return 1.0;

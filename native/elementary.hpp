@@ -1,7 +1,7 @@
-// exp, logarithm, sine and cosine, from additions and multiplications in a fixed order: the same digits on every processor.
-// Cody and Waite, Software Manual for the Elementary Functions (1980): x is reduced by a constant in two or three
-// parts, of which the first have so few digits that their products are exact. Errors are below 1.5 units in the
-// last place (native/test_engine.cpp compares with libm).
+// exp, logarithm, sine and cosine, from additions and multiplications in a fixed order: the same digits on
+// every processor. Cody and Waite, Software Manual for the Elementary Functions (1980): x is reduced by a
+// constant in two or three parts, the first of which have so few digits that their products are exact. Errors
+// are below 1.5 units in the last place (native/test_engine.cpp compares with libm).
 #pragma once
 #include "numbers.hpp"
 
@@ -46,7 +46,7 @@ INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
   return {cosine, sine};
 }
 
-// Of any angle [rad]. Beyond 10^6 rad the product with the first part rounds, as the angle itself has.
+// Of any angle [rad]. Beyond 10^6 rad the product with the first part is rounded, like the angle itself.
 inline CosineSine cosine_sine(double angle) {
   constexpr double PI_2_HIGH = 1.57079632673412561417e+00;  // 33 bits
   constexpr double PI_2_MIDDLE = 6.07710050630396597660e-11;  // the next 33

@@ -1,5 +1,5 @@
-// Hidden motion from two channels: a Kalman filter over the tracked motion, and the smoother back over it.
-// Notation of the equations: docs/hidden-motion.md.
+// Hidden motion from two channels: a Kalman filter for the tracked motion, and a backward smoother. Notation
+// of the equations: docs/hidden-motion.md.
 #pragma once
 #include "tracking.hpp"
 
@@ -10,8 +10,8 @@ constexpr int MOST_STATES = TRACKED + MOST_PARAMETERS;
 
 using StateRow = Vector<TRACKED>;
 
-// P -> F P F' + Q for the tracked states, in place. Parameters do not move: their rows stay. The step's noise is Q, and
-// that of an unknown force held over it.
+// P -> F P F' + Q for the tracked states, in place. Parameters are constant, so their rows are unchanged. Q
+// is the noise of the step plus that of an unknown force held over it.
 INLINE void spread(double *covariance, const double (&whole)[TRACKED][MOST_STATES], const MotionFilter &f,
                    double force_variance, int size) {
   double product[TRACKED][MOST_STATES], turned[MOST_STATES][TRACKED];
@@ -29,7 +29,7 @@ INLINE void spread(double *covariance, const double (&whole)[TRACKED][MOST_STATE
   }
 }
 
-// Adds what an error of the impulse [N s] between m1 and m2 does.
+// Adds the effect of an error of the impulse [N s] between m1 and m2.
 INLINE void add_impulse_error(double *covariance, double error, const TrackedStop &stop, int size) {
   double of_m1 = error * stop.inverse_m1, of_m2 = error * stop.inverse_m2;
   covariance[VY * size + VY] += of_m1 * of_m1;
@@ -83,7 +83,7 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
     const double *of_m0 = covariance + VX * size, *of_base = covariance + BASE_VELOCITY * size;
     double variance =
         of_m0[VX] + 2.0 * of_m0[BASE_VELOCITY] + of_base[BASE_VELOCITY] + f.velocity_variance;
-    // In contact, and where nothing was measured, the motion goes on without a sample.
+    // In contact, and without a measurement, the motion continues without a sample.
     bool is_used = kind != IN_CONTACT && is_finite(innovation);
     if (const TrackRecord &kept = f.record; kept.states.size > 0) {
       __builtin_memcpy(kept.states.at + k * TRACKED, state, sizeof moved);
@@ -100,9 +100,9 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
   return f.velocity.size;
 }
 
-// Filters sample by sample, each at the end of a step; returns how many were done before the motion was lost.
+// Filters sample by sample, each at the end of a step; returns the number of samples until the motion was lost.
 inline int64_t filter_motion(MotionFilter &f) {
-  // Without parameters all sizes are known to the compiler: half the time.
+  // Without parameters all sizes are known at compile time, which halves the time.
   return f.state.size == TRACKED ? filter_samples(f, TRACKED) : filter_samples(f, int(f.state.size));
 }
 
@@ -133,7 +133,7 @@ INLINE StateMatrix transposed(const StateMatrix &a) {
 }
 INLINE double inner_product(const StateRow &x, const StateRow &y) { return total(x * y); }
 
-// Takes the adjoint of a state, and its matrix M, back over the step F that led to it: F' adjoint, F' M F.
+// Propagates the adjoint of a state, and its matrix M, backwards over the step F: F' adjoint, F' M F.
 INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &step) {
   adjoint = adjoint * step;
   StateMatrix product, turned = transposed(step), whole;
@@ -143,7 +143,7 @@ INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix
   for (int i = 0; i < TRACKED; i++) matrix.rows[i] = 0.5 * (whole.rows[i] + turned.rows[i]);
 }
 
-// Takes both back over the use of a sample: (I - K H)' M (I - K H) + H' H / S, with H of the velocity of m0.
+// Propagates both backwards over the use of a sample: (I - K H)' M (I - K H) + H' H / S, with H of the velocity of m0.
 INLINE void use_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &covariance, double innovation,
                      double variance) {
   if (variance == 0.0) return;

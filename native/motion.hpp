@@ -1,13 +1,13 @@
-// Where a motion is, between two steps of a run, and what is kept of it on the way.
+// State of a motion between two steps of a run, and the record of the run.
 #pragma once
 #include "contact.hpp"
 
 namespace vibench {
 
-// What a run under a power law goes on with.
+// Memory of a run under a power law.
 struct PowerMemory {
-  double level;     // one more than that of the next step; 0 before the first
-  double sizes[3];  // how large p, x, z have lately been [m]
+  double level;     // one more than the level of the next step; 0 before the first
+  double sizes[3];  // recent sizes of p, x, z [m]
 };
 
 template <class T> struct Motion {
@@ -15,10 +15,10 @@ template <class T> struct Motion {
   Clock<T> clock;
   Contact<T> contact;
   PowerMemory powers;
-  double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
+  double growth[6];  // logarithm of a factor that was removed from each derivative
 };
 
-// From and to the C interface.
+// Conversion from and to the C interface.
 inline Motion<double> motion_of(const State &state) {
   Motion<double> motion;
   __builtin_memcpy(motion.at, state.motion, sizeof motion.at);
@@ -50,8 +50,8 @@ template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &
   return values;
 }
 
-// Moves a factor that has become very large or small from the derivatives into its logarithm: their products with
-// anything physical stay finite. Returns whether anything changed.
+// Moves a very large or small factor from the derivatives into its logarithm, so that products with physical
+// numbers stay finite. Returns whether anything changed.
 template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
   bool is_changed = false;
@@ -67,16 +67,16 @@ template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   return is_changed;
 }
 
-constexpr int64_t MOST_STEPS = 2000000000;  // of flight in a run
-constexpr int64_t RESOLVED_STEP = 50;       // steps of flight that a contact counts as: it takes as long
+constexpr int64_t MOST_STEPS = 2000000000;  // steps of flight in a run
+constexpr int64_t RESOLVED_STEP = 50;       // steps of flight equivalent to a contact step in time
 
-// Grid steps that a flight counts as; all of them where its length or its grid is no number.
+// Grid steps that a flight counts as; the maximum if its length or its grid is not finite.
 INLINE int64_t steps_of(double length, double grid) {
   double steps = length / grid;
   return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
 }
 
-// Counts an impact, and keeps its time where times are kept; false when no more are allowed.
+// Counts an impact, and stores its time if requested; false when no more are allowed.
 INLINE bool keep_impact(Record &record, double time) {
   if (record.impacts == record.impact_room) return false;
   if (record.impact_times != nullptr) record.impact_times[record.impacts] = time;
@@ -84,7 +84,7 @@ INLINE bool keep_impact(Record &record, double time) {
   return true;
 }
 
-// Keeps the samples that fall into the next `length` seconds: `place_sample(later, sample)` writes one.
+// Stores the samples within the next `length` seconds: `place_sample(later, sample)` computes one.
 template <class PlaceSample>
 inline void keep_samples(Record &record, const Clock<double> &clock, double length, const PlaceSample &place_sample) {
   while (record.samples_kept < record.sample_room) {

@@ -1,11 +1,11 @@
-// The few functions of plain numbers that the engine needs. No C++ library and no libm: digits do not depend on
-// the system, and the library loads on every Linux with glibc 2.17 (decision 0077).
+// Elementary functions of numbers for the engine. No C++ library and no libm: results do not depend on the
+// system, and the library loads on every Linux with glibc 2.17 (decision 0077).
 #pragma once
 #include <stddef.h>
 #include <stdint.h>
 
 #if defined(__SANITIZE_ADDRESS__)
-#define INLINE inline  // g++ takes minutes to watch every inlined copy
+#define INLINE inline  // g++ takes minutes to compile every inlined copy
 #else
 #define INLINE inline __attribute__((always_inline))
 #endif
@@ -25,21 +25,21 @@ INLINE double eighth_root(double x) { return square_root(square_root(square_root
 INLINE bool is_finite(double x) { return magnitude(x) < INFINITE; }  // false for NaN
 INLINE double with_sign_of(double size, double sign) { return __builtin_copysign(size, sign); }
 
-// Largest whole number that is not above x. Doubles of 2^52 and more are whole already.
+// Largest integer not above x. Doubles of 2^52 and more are integers already.
 INLINE double whole_part(double x) {
   if (!(magnitude(x) < 4503599627370496.0)) return x;
   double whole = double(int64_t(x));
   return whole > x ? whole - 1.0 : whole;
 }
 
-// Nearest whole number; halves go up.
+// Nearest integer; halves are rounded up.
 INLINE double nearest(double x) { return whole_part(x + 0.5); }
 
-// x^(1/5) for x >= 0: a guess from the exponent, corrected by Newton's method until rounding.
+// x^(1/5) for x >= 0: a guess from the exponent, corrected by Newton's method to rounding.
 inline double fifth_root(double x) {
   if (!(x > 0.0) || !is_finite(x)) return x;
   double scale = 1.0;
-  if (x < 1e-290) x *= 0x1p300, scale = 0x1p-60;  // subnormal numbers have no exponent to start from
+  if (x < 1e-290) x *= 0x1p300, scale = 0x1p-60;  // subnormal numbers have no usable exponent
   int64_t bits = __builtin_bit_cast(int64_t, x);
   constexpr int64_t ONE = int64_t(1023) << 52;
   double root = __builtin_bit_cast(double, ONE + (bits - ONE) / 5);

@@ -1,19 +1,19 @@
-// What is observed while a run goes by, without keeping the motion: extremes of x and p, and what the stops add to
-// their lines at the drive's frequency. All of it is seen by values alone, and none of it changes a step.
+// Observation of a run without storing the motion: extremes of x and p, and the stops' contribution to their
+// lines at the drive's frequency. It uses values only, and never changes a step.
 #pragma once
 #include "collision.hpp"
 #include "motion.hpp"
 
 namespace vibench {
 
-constexpr int SECANTS = 4;            // to an extreme: its value then errs by less than rounding
-constexpr int APEX_SECANTS = 6;       // to where a contact in steps is deepest
-constexpr double SMALL_EXPONENT = 1e-3;  // below it (exp(q) - 1) / q is a series whose fifth term is rounding
-constexpr double ABOVE_POINTS = 1.03;  // the largest depth is at most this many times the largest at the points
+constexpr int SECANTS = 4;            // iterations to an extreme, whose value then errs by less than rounding
+constexpr int APEX_SECANTS = 6;       // iterations to the deepest point of a contact in steps
+constexpr double SMALL_EXPONENT = 1e-3;  // below it (exp(q) - 1) / q is a series whose fifth term is below rounding
+constexpr double ABOVE_POINTS = 1.03;  // the largest depth is at most this multiple of the largest at the points
 
 // ---- Extremes
 
-// Largest magnitude of a polynomial on [low, high], on which it turns once at most; `best` if that is larger.
+// Largest magnitude of a polynomial on [low, high] with at most one extreme; `best` if that is larger.
 inline double series_peak(double best, const double *series, double low, double high) {
   ValueAndRate first = polynomial_at(series, low), last = polynomial_at(series, high);
   best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
@@ -27,7 +27,7 @@ inline double series_peak(double best, const double *series, double low, double 
   return best;
 }
 
-// The same of the cubic through both ends of a step with their rates.
+// The same for the cubic through both ends of a step with their rates.
 inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double rise = (last.value - first.value) / step;
   double series[AHEAD] = {first.value, first.rate, (3.0 * rise - 2.0 * first.rate - last.rate) / step,
@@ -36,7 +36,7 @@ inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndR
   return larger(best, larger(magnitude(first.value), magnitude(last.value)));
 }
 
-// Whether a step on which a motion turns may beat `best`: it stays below the tangents of both ends.
+// Whether a step with an extreme may exceed `best`: it stays below the tangents of both ends.
 INLINE bool may_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double above = smaller(magnitude(first.value) + step * magnitude(first.rate),
                          magnitude(last.value) + step * magnitude(last.rate));
@@ -49,8 +49,8 @@ template <int N> INLINE ValueAndRate value_and_rate(const PhasorSum<N> &sum) {
   return {sum.now(), rate};
 }
 
-// Largest magnitude of one displacement over a linear motion of `length` seconds. A grid step is looked at only
-// where the bound on the acceleration lets it beat `best`, and closely only where the rate changes its sign.
+// Largest magnitude of one displacement over a linear motion of `length` seconds. A grid step is examined only where
+// the bound on the acceleration allows more than `best`, and closely only where the rate changes its sign.
 template <int N>
 inline double linear_peak(double best, const Phasor *shape, const Phasor *phasors, const Clock<double> &clock,
                           double length, const LinearTables &t, const Tables &tables) {
@@ -96,7 +96,7 @@ INLINE double peak_of(double best, const Phasor *shape, const Phasor *phasors, c
 
 // ---- Impulses against the drive: integrals of the push f on p times exp(-i (omega t + phase)) [N s]
 
-// Integral over `length` of what grows as exp(rate t) from `first` to `last`.
+// Integral over `length` of a quantity that grows as exp(rate t) from `first` to `last`.
 INLINE Phasor integral(const Phasor &rate, double length, const Phasor &first, const Phasor &last) {
   Phasor exponent = length * rate;
   if (exponent.re * exponent.re + exponent.im * exponent.im < SMALL_EXPONENT * SMALL_EXPONENT) {
@@ -108,7 +108,7 @@ INLINE Phasor integral(const Phasor &rate, double length, const Phasor &first, c
   return quotient(last - first, rate);
 }
 
-// Integral of Re sum weights_j e_j against the drive, e_j turning from `first` to `last`.
+// Integral of Re sum weights_j e_j against the drive, with e_j rotating from `first` to `last`.
 inline Phasor line_of(const Phasor *weights, const Phasor *first, const Phasor *last, double length,
                       const LinearTables &t) {
   Phasor drive = t.rates[t.modes], sum{0.0, 0.0};
@@ -122,7 +122,7 @@ inline Phasor line_of(const Phasor *weights, const Phasor *first, const Phasor *
   return sum;
 }
 
-// ---- What a run has seen
+// ---- Results of the observation
 
 struct Observer {
   Record &record;
@@ -134,12 +134,12 @@ struct Observer {
 
   void see_flight(const Phasor *phasors, const Clock<double> &clock, double length) {
     record.peak_x = peak_of(record.peak_x, t.flight.across, phasors, clock, length, t.flight, t);
-    // Between stops p is nowhere larger than at a stop.
+    // Between stops, |p| is largest at a stop.
     if (record.peak_p < larger(t.specimen.lower_gap, t.specimen.upper_gap))
       record.peak_p = peak_of(record.peak_p, t.flight.path, phasors, clock, length, t.flight, t);
   }
 
-  // m1 on a stop that holds it, or that is a spring. The phasors know nothing of the constant part of p.
+  // m1 on a stop that is rigid or a spring. The phasors do not include the constant part of p.
   void see_held(const Phasor *first, const Phasor *last, const Clock<double> &clock, double side, double length) {
     double gap = gap_at(t.specimen, side), rests = t.rests * gap;
     record.peak_x = peak_of(record.peak_x, t.held.across, first, clock, length, t.held, t);
@@ -158,7 +158,7 @@ struct Observer {
     if (wants_lines()) impulse = impulse - (t.pair * jump) * conjugate(drive);
   }
 
-  // x and p in a whole collision; `course()` gives the Taylor terms of x without force.
+  // x and p in a complete collision; `course()` gives the Taylor terms of x without force.
   template <class Course> void see_shape(const Collision<double> &c, double gap, const Course &course) {
     const CollisionTables &of = t.collision;
     see_x_of(c, course);
@@ -191,8 +191,8 @@ struct Observer {
     if (wants_lines()) impulse = impulse + impulse_of(steps, h);
   }
 
-  // Lines of x and p over a stretch, from what moved at its ends and from the impulse. With s' = A s + b f + drive and
-  // u = s - steady: (i omega - A) integral(u e^-i.) = b impulse - [u e^-i.].
+  // Lines of x and p over a stretch, from the motion at its ends and from the impulse. With s' = A s + b f +
+  // drive and u = s - steady: (i omega - A) integral(u e^-i.) = b impulse - [u e^-i.].
   struct End {
     double motion[6];
     Clock<double> clock;
@@ -217,9 +217,9 @@ struct Observer {
   }
 
  private:
-  // A polynomial of depth about the middle of a collision: its largest value.
+  // Largest value of a polynomial of depth about the middle of a collision.
   static double top_of(const Vector<TERMS> &terms) {
-    constexpr double FARTHEST_TOP = 0.5;  // from the middle of phi: eight terms hold a depth there to 1e-7
+    constexpr double FARTHEST_TOP = 0.5;  // from the middle of phi: eight terms represent a depth up to there to 1e-7
     double at = 0.0, value = 0.0;
     for (int n = 0; n < SECANTS; n++) {
       double slope = 0.0, bend = 0.0;
@@ -233,7 +233,7 @@ struct Observer {
     return value;
   }
 
-  // x in a whole collision: where it turns, looked for between the points.
+  // x in a complete collision: its extremes between the points.
   template <class Course> void see_x_of(const Collision<double> &c, const Course &course_of_x) {
     const CollisionTables &of = t.collision;
     ValueAndRate first{c.motion[AT_X], c.motion[X_RATE]}, last{c.after[AT_X], c.after[X_RATE]};
@@ -242,7 +242,7 @@ struct Observer {
     Vector<TERMS> course = course_of_x();
     double turn = of.fastest * c.duration, factor = turn;
     Vector<POINTS> turns = turn * Vector<POINTS>::load(of.shapes->heights);
-    // A force reaches x by way of m2 and a damper: two integrals later.
+    // A force reaches x through m2 and a damper: two integrals later.
     Vector<POINTS> x = first.value + series_at_points<double>(course, turns) +
                        pushed<double>(c.force, 2, SLOW_TERMS, AT_X, c.duration, of);
     Vector<POINTS> rate(0.0);
@@ -260,7 +260,7 @@ struct Observer {
     record.peak_x = cubic_peak(record.peak_x, first, last, c.duration * (1.0 - before));
   }
 
-  // Where a step of a contact turns it is taken again, up to r = 0; returns w there.
+  // A contact step with an extreme is repeated up to r = 0; returns w there.
   template <class T, class Force>
   double apex_of(const ContactSteps<T, Force> &steps, double h, double rate_scale) const {
     const auto &r = steps.rates;
@@ -273,14 +273,14 @@ struct Observer {
       again.take(part);
       double rate = again.trial[R];
       deepest = larger(deepest, again.trial[W]);
-      if (magnitude(rate) < 1e-5 * rate_scale) break;  // w is flat there: it errs by the square
+      if (magnitude(rate) < 1e-5 * rate_scale) break;  // w is stationary there, so its error is quadratic
       if (rate > 0.0) low = part, before = rate;
       else high = part, after = rate;
     }
     return deepest;
   }
 
-  // The step's own quadrature of f dt = side F w ds against the drive, by the stages of the method.
+  // The step's quadrature of f dt = side F w ds against the drive, by the stages of the method.
   template <class T, class Force> Phasor impulse_of(const ContactSteps<T, Force> &steps, double h) const {
     const BaseForce &base = steps.rates.base;
     Phasor sum{0.0, 0.0};

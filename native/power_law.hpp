@@ -1,7 +1,7 @@
-// Motion under a power law, whose force acts at every p: one long step after another (decision 0026). In a step the
-// force F is a polynomial through its values at eight Gauss points; all that follows is linear in the motion at the
-// start and in F (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). The force
-// determines p at the points and p the force: put in one after the other, the answers settle like a cosine's terms.
+// Motion under a power law, whose force acts at every p, in long steps (decision 0026). In a step the force F is a
+// polynomial through its values at eight Gauss points; everything else is linear in the motion at the start and in F
+// (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). The force determines p at
+// the points and p the force; repeated substitution converges like the series of a cosine.
 #pragma once
 #include "observe.hpp"
 
@@ -9,22 +9,22 @@ namespace vibench {
 
 constexpr int GAUSS = 8;             // points in a step
 constexpr int ORDER = 32;            // terms of the series: the next is 1e-20 of the largest in the longest step
-constexpr int LEVELS = 40;           // lengths of step, each shorter than the one before by the root of two
-constexpr int INSTANTS = GAUSS + 2;  // of a step that is observed: its start, its points, its end
+constexpr int LEVELS = 40;           // step lengths, each shorter than the one before by the root of two
+constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its points, its end
 constexpr double LONGEST_POWER_TURN = 3.0;  // longest step, as the fastest rate times its length [rad]
-constexpr int FIRST_LEVEL = 8;       // of the first step of all: a sixteenth of the longest
+constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest
 constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance: as motion that it
                              // would make, over the size of the motion. The end itself errs by far less
 constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // substitution ends when the motion changes by this part
                                                              // of the tolerance, or of itself
 constexpr int MOST_SUBSTITUTIONS = 30;
-constexpr double TRY_LONGER = 0.015;  // a misfit of this part of what is allowed is followed by a longer step
-constexpr double FAR_TOO_LONG = 20.0;  // one beyond this many times is answered by half the length at once
-constexpr double WALL_TURN = 5.0;  // a step turns the stiffest spring on its way by this much at most [rad]
-constexpr double FADING = 0.98;    // how much of its past size a motion keeps from step to step
+constexpr double TRY_LONGER = 0.015;  // a misfit below this part of the allowed one lengthens the next step
+constexpr double FAR_TOO_LONG = 20.0;  // a misfit beyond this multiple halves the step at once
+constexpr double WALL_TURN = 5.0;  // largest rotation of the stiffest spring in a step [rad]
+constexpr double FADING = 0.98;    // share of its past size that a motion keeps from step to step
 constexpr double SMALLEST_PART = 1e-3;  // a displacement counts as at least this part of the largest one
 constexpr double NOTHING_MOVES = 1e-150;
-constexpr double FINEST_FIT = 1e-10;  // of undamped motions: behind a steep wall a finer fit is lost in rounding
+constexpr double FINEST_FIT = 1e-10;  // of undamped motions: with a steep wall a finer fit is lost in rounding
 
 INLINE double fit_tolerance(double tolerance, const Specimen &s) {
   return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
@@ -35,7 +35,7 @@ INLINE double fit_tolerance(double tolerance, const Specimen &s) {
 struct PowerForce {
   double inverse_reference;  // [1/m]
   int terms;
-  int halves[MOST_POWERS];   // half of how much an exponent is above the one before, the first above 1
+  int halves[MOST_POWERS];   // half the difference of an exponent from the one before, the first from 1
   double forces[MOST_POWERS];  // of each term at the reference [N]
   int highest;               // exponent
 
@@ -82,20 +82,20 @@ INLINE PowerForce power_force(const PowerTerms &law) {
   return force;
 }
 
-// ---- The numbers of a step of some length
+// ---- Coefficients of a step of some length
 
-// A number of the motion at the points: what the motion at the start and F at the points add to it.
+// A number of the motion at the points: contributions of the motion at the start and of F at the points.
 struct AtPoints {
   double free[WIDE][GAUSS], gain[GAUSS][GAUSS];
 };
 struct StepNumbers {
   double length;                      // [s]
-  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // what they add to the motion from start to end
-  AtPoints p, x, p_rate, x_rate;      // the last three for who observes
-  double cosine[GAUSS], sine[GAUSS];  // how the drive has turned at the points
+  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // contributions to the motion from start to end
+  AtPoints p, x, p_rate, x_rate;      // the last three for observation
+  double cosine[GAUSS], sine[GAUSS];  // rotation of the drive at the points
 };
 
-// Taylor series of exp(A t) for the eight numbers of a motion: it needs no modes, and loses nothing in a short step.
+// Taylor series of exp(A t) for the eight numbers of a motion: it needs no modes, and stays accurate in short steps.
 struct PowerTables {
   const PowerShapes *shapes;
   PowerForce force;
@@ -172,15 +172,15 @@ template <class T> struct PowerStep {
   const Body &t;
   const PowerTables &of;
   double tolerance;
-  Wide<T, WIDE> motion, ahead;  // where it begins and ends
+  Wide<T, WIDE> motion, ahead;  // at its start and its end
   Wide<T, GAUSS> force, place;  // F and p at the points
-  Vector<GAUSS> course;         // F's course in the last step, by powers of (s - 1)
-  double sizes[3];              // how large p, x, z have lately been [m]
+  Vector<GAUSS> course;         // course of F in the last step, in powers of (s - 1)
+  double sizes[3];              // recent sizes of p, x, z [m]
   double push, push_ahead;      // F at the start and the end [N]
-  double last_length = 0.0;     // of the last step [s]; 0 where there is none
+  double last_length = 0.0;     // of the last step [s]; 0 without one
   double fading = FADING;
 
-  // What the motion would do without F: p at the points, and all of it at the end.
+  // The motion without F: p at the points, and the whole motion at the end.
   struct Unforced {
     Vector<GAUSS> places;
     Vector<WIDE> end;
@@ -190,7 +190,7 @@ template <class T> struct PowerStep {
     return {times(numbers.p.free, begin), begin + times(numbers.move, begin)};
   }
 
-  // From the motion now, without the drive's phasor; and back.
+  // Conversion from and to a motion without the drive's phasor.
   void begin_at(const Motion<T> &m) {
     const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
                              m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};
@@ -203,7 +203,7 @@ template <class T> struct PowerStep {
     m.at[VX] = at(motion, X_RATE), m.at[VZ] = at(motion, Z_RATE), m.at[VY] = m.at[VZ] + at(motion, P_RATE);
   }
 
-  // Tries a step and fills `ahead`; its misfit over what is allowed.
+  // Tries a step and fills `ahead`; returns its misfit over the allowed one.
   double attempt(const StepNumbers &numbers, const Unforced &free) {
     Vector<WIDE> begin = value_of(motion);
     double weight = numbers.length * numbers.length * t.inverse_pair;
@@ -219,8 +219,8 @@ template <class T> struct PowerStep {
     return weight * larger(magnitude(before), magnitude(after)) / (FIT * tolerance * largest_unseen(begin, now));
   }
 
-  // The derivative of the step just tried: with the law's slopes D a change of p at the points solves
-  // (1 - gain D) dp = free du, and the rest follows from D dp as the motion does from F.
+  // The derivative of the step just tried: with the law's slopes D a change of p at the points solves (1 -
+  // gain D) dp = free du, and the rest follows from D dp as the motion does from F.
   void differentiate(const StepNumbers &numbers) {
     if constexpr (is_dual<T>) {
       constexpr int M = int(sizeof motion.slope / sizeof motion.slope[0]);
@@ -254,7 +254,7 @@ template <class T> struct PowerStep {
     motion = ahead;
   }
 
-  // The first level from `level` on whose step passes no wall unseen; LEVELS if there is none.
+  // The first level from `level` on whose step resolves every wall; LEVELS if there is none.
   int level_that_sees(int level) const {
     Vector<WIDE> now = value_of(motion);
     double p = now[P], outward = larger(p >= 0.0 ? now[P_RATE] : -now[P_RATE], 0.0);
@@ -276,7 +276,7 @@ template <class T> struct PowerStep {
     return sum;
   }
 
-  // `weight` says how far a newton moves p over the step [m/N], `close` how far is nothing [m].
+  // `weight` is the change of p per newton over the step [m/N], `close` a negligible distance [m].
   bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const StepNumbers &numbers, const Vector<GAUSS> &free,
                   double weight, double close) const {
     for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
@@ -291,7 +291,7 @@ template <class T> struct PowerStep {
     return false;
   }
 
-  // Size against which errors count: of the smallest of the three displacements, up to the step's end.
+  // Reference size of errors: that of the smallest of the three displacements, up to the step's end.
   double largest_unseen(const Vector<WIDE> &begin, const Vector<WIDE> &end) const {
     double p = larger(sizes[0], larger(magnitude(begin[P]), magnitude(end[P])));
     double x = larger(sizes[1], larger(magnitude(begin[AT_X]), magnitude(end[AT_X])));
@@ -299,7 +299,7 @@ template <class T> struct PowerStep {
     return larger(smaller(p, smaller(x, z)), SMALLEST_PART * larger(p, larger(x, z))) + NOTHING_MOVES;
   }
 
-  // Gauss's elimination with pivots, of as many right sides as there are columns beyond the square.
+  // Gaussian elimination with pivoting; the columns beyond the square are right-hand sides.
   template <int N> static void eliminate(double (&rows)[GAUSS][N]) {
     for (int k = 0; k < GAUSS; k++) {
       int pivot = k;
@@ -325,10 +325,10 @@ INLINE int level_after(int level, double misfit) {
   return misfit < TRY_LONGER && level > 0 ? level - 1 : level;
 }
 
-// ---- What is observed of a step
+// ---- Observation of a step
 
-// One displacement at ten instants of a step with its rates: the polynomial of degree 19 through them is exact to
-// rounding. Barycentric sums: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
+// One displacement at ten instants of a step with its rates: the polynomial of degree 19 through them is
+// exact to rounding. Barycentric sums: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
 struct StepCourse {
   double value[INSTANTS], rate[INSTANTS];
   double length;
@@ -357,7 +357,7 @@ struct StepCourse {
     return sum / (norm * norm);
   }
   double peak(double best) const {
-    constexpr int SECANTS_IN_STEP = 6;  // what is missing then changes no peak
+    constexpr int SECANTS_IN_STEP = 6;  // the remaining error changes no peak
     for (double each : value) best = larger(best, magnitude(each));
     for (int i = 0; i + 1 < INSTANTS; i++) {
       double low = shapes.instants[i], high = shapes.instants[i + 1], rate_low = rate[i], rate_high = rate[i + 1];
@@ -456,7 +456,7 @@ template <class T> class PowerRun {
     else step.motion.set(COSINE, now.re), step.motion.set(SINE, now.im);
   }
 
-  // Derivatives are kept in range as those of a motion between stops are.
+  // The derivatives are kept in range like those of a motion between stops.
   void rescale(PowerStep<T> &step) {
     step.write_to(m);
     if (!keep_in_range(m)) return;
@@ -486,7 +486,7 @@ template <class T> class PowerRun {
     observer.impulse = observer.impulse + push * Phasor{first[COSINE], -first[SINE]};
   }
 
-  // A sample is the end of a shorter step from where the step began; the force is known but for one refinement.
+  // A sample is the end of a shorter step from the same start; the force is known except for one refinement.
   void place_within(const PowerStep<T> &step, double length, double later, double *sample) const {
     StepNumbers part;
     fill_step(part, later, of);

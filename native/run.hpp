@@ -1,14 +1,14 @@
-// A run: flight, contact, flight, ... up to an instant. One source for a motion and for its derivatives.
+// A run: flight, contact, flight, ... up to a time. One source for a motion and for its derivatives.
 #pragma once
 #include "held.hpp"
 #include "power_law.hpp"
 
 namespace vibench {
 
-// ---- Stops: how m1 meets them is chosen by type.
+// ---- Stops: their behaviour is selected by type.
 
 struct WithoutStops {};
-// Stops that push with a force while m1 presses them in; a Hertz collision is first tried as a whole.
+// Stops with a contact force while m1 indents them; a Hertz collision is first solved as a whole.
 template <class Force> struct YieldingStops {
   Force force;
   static constexpr bool whole_collisions = false;
@@ -19,15 +19,15 @@ struct HertzStops : YieldingStops<HertzForce> {
 struct SpringStops {};  // exact, with modes of their own
 struct HardStops {};    // Newton's restitution, and sticking
 
-// By how much a changed motion touches later: all corrections where the motion switches (saltation, Mueller 1995)
-// follow from this by the rules of derivatives. At a grazing touch no derivative exists; its rate is floored.
+// How much later a changed motion touches. All corrections at switching points (saltation, Mueller 1995) follow from it
+// by differentiation. At a grazing touch no derivative exists, so the rate is limited from below.
 template <class T> inline T later_touch(const T *motion) {
   T p = motion[Y] - motion[Z];
   double rate = value_of(motion[VY] - motion[VZ]);
   return slopes_only(-p) / with_sign_of(larger(magnitude(rate), SLOWEST_TOUCH), rate);
 }
 
-// Decides from the displacements whether a motion that is given starts on a stop.
+// Determines from the displacements whether a given motion starts on a stop.
 template <class T> inline void place_on_its_side(Motion<T> &m, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
   double p = value_of(m.at[Y] - m.at[Z]), x = value_of(m.at[X]), z = value_of(m.at[Z]);
@@ -53,7 +53,7 @@ template <class T, class Stops> class Run {
   Run(Motion<T> &motion, const Tables &tables, const Stops &stops, double tolerance, Record &record)
       : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record), observer{record, tables} {}
 
-  // Advances the motion to the instant `until` [s]. What is kept or observed on the way changes nothing of it.
+  // Advances the motion to the time `until` [s]. Recording and observation do not change it.
   Outcome advance(double until) { return observed(observer, m, t, [&] { return go_on(until); }); }
 
  private:
@@ -66,7 +66,7 @@ template <class T, class Stops> class Run {
       Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
       if (outcome != REACHED_END) return outcome;
       if constexpr (is_dual<T>)
-        if (keep_in_range(m)) is_drive_known = false;  // its derivatives have the factor still
+        if (keep_in_range(m)) is_drive_known = false;  // its derivatives still contain the factor
     }
   }
 
@@ -76,7 +76,7 @@ template <class T, class Stops> class Run {
   double tolerance;
   Record &record;
   Observer observer;
-  Complex<T> drive;             // the drive's phasor now, where it is known
+  Complex<T> drive;             // current phasor of the drive, if known
   bool is_drive_known = false;
 
   template <class A, class B> static constexpr bool is_same = __is_same(A, B);
@@ -151,7 +151,7 @@ template <class T, class Stops> class Run {
       m.contact.side = rebound(m.at, side, closed_gap(values, t), tolerance, t) ? side : 0.0;
       observer.see_impact(value_of(m.at[VY] - m.at[VZ]) - rate, values[t.flight.modes]);
     } else {
-      // The touch was found a hair before or after the gap closed: w begins at zero.
+      // Removes the rounding error of the touch: w begins at zero.
       begin_contact(m.contact, m.at, side, tolerance, t);
       m.contact.w = constant<T>(0.0);
     }
@@ -162,7 +162,7 @@ template <class T, class Stops> class Run {
 
   Outcome stay(double until, const T &longest) {
     if constexpr (is_same<Stops, SpringStops> || is_same<Stops, HardStops>) return stay_held(until, longest);
-    else if constexpr (is_same<Stops, WithoutStops>) return NOT_FINITE;  // there is no stop to be on
+    else if constexpr (is_same<Stops, WithoutStops>) return NOT_FINITE;  // there is no stop
     else return stay_pressed(until, longest);
   }
 
@@ -221,7 +221,7 @@ template <class T, class Stops> class Run {
       }
     BaseForce base(clock_value(), smaller(0.5 * value_of(longest), 0.5 * STRETCH_TURN / t.omega), t);
     bool is_last = value_of(longest) <= 2.0 * base.middle;
-    // Instants of the clock depend on nothing; the start of this stretch does.
+    // Clock times have no derivatives; the start of this stretch does.
     T begin = m.clock.slip, tau = begin;
     T limit = constant<T>(is_last ? value_of(longest) : 2.0 * base.middle);
     auto seen = [&](const auto &steps, const T &h) {
@@ -244,7 +244,7 @@ template <class T, class Stops> class Run {
 
   // ---- Samples
 
-  // Samples of a contact come from a second run from where it began, which lands on each of them.
+  // Samples of a contact come from a second run from its beginning, which ends at each of them.
   void sample_contact(Motion<double> &shadow, double length, const BaseForce &base) {
     double reached = 0.0;
     keep_samples(record, clock_value(), length, [&](double later, double *sample) {

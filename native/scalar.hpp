@@ -1,6 +1,6 @@
-// What a motion may be made of: `double`, or `Dual<double, M>`, a number with M of its derivatives. One source then
-// gives the motion and its tangent: exponents, Floquet multipliers and Newton's matrices need no code of their own.
-// `Wide<T, N>` holds N numbers of T so that both kinds fill the processor's registers. `Complex<T>` is a phasor.
+// Number types of a motion: `double`, or `Dual<double, M>`, a number with M of its derivatives. One source gives the
+// motion and its tangent, so exponents, Floquet multipliers and Newton's matrices need no separate code. `Wide<T, N>`
+// holds N numbers of T, so that both types fill the processor's registers. `Complex<T>` is a phasor.
 #pragma once
 #include "elementary.hpp"
 #include "vector.hpp"
@@ -95,11 +95,11 @@ template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
   return root;
 }
 
-// The value alone: all that decides (a touch, a step, the end of an iteration) is decided by it.
+// The value alone, on which all decisions (a touch, a step, the end of an iteration) depend.
 template <Plain A> INLINE A value_of(const A &x) { return x; }
 template <class A, int M> INLINE A value_of(const Dual<A, M> &x) { return x.value; }
 
-// A number that depends on nothing.
+// A number without derivatives.
 template <class T> INLINE T constant(double value) {
   T number{};
   if constexpr (is_dual<T>) number.value = value;
@@ -107,7 +107,7 @@ template <class T> INLINE T constant(double value) {
   return number;
 }
 
-// The derivatives without the value, of which nothing is left for a plain number.
+// The derivatives without the value; zero for a plain number.
 template <class T> INLINE T slopes_only(T x) {
   if constexpr (is_dual<T>) x.value = 0.0;
   else x = 0.0;
@@ -148,8 +148,8 @@ template <int M, int N> INLINE Dual<Vector<N>, M> gathered(const Dual<double, M>
   return all;
 }
 
-// Sum over k of x_k table[k]: K rows of N numbers, from the left. Even and odd rows are summed apart: two short chains
-// of sums that wait for each other take half the time of one.
+// Sum over k of x_k table[k]: K rows of N numbers, from the left. Even and odd rows are summed separately:
+// two short chains of dependent sums take half the time of one.
 template <int N, int K> INLINE Vector<N> times(const double (*table)[N], const Vector<K> &x) {
   Vector<N> even = x[0] * Vector<N>::load(table[0]), odd = x[1] * Vector<N>::load(table[1]);
   for (int k = 2; k < K; k += 2) {
@@ -189,10 +189,10 @@ INLINE Phasor quotient(const Phasor &x, const Phasor &y) {
   return (1.0 / (y.re * y.re + y.im * y.im)) * (x * conjugate(y));
 }
 INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im * x.im); }
-// Re(x y): what the phasor y does to a motion of unit shape x.
+// Re(x y): the contribution of phasor y to a motion of unit shape x.
 template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }
 
-// exp(i angle), and exp(rate time); slopes by the chain rule.
+// exp(i angle), and exp(rate time); derivatives by the chain rule.
 INLINE Phasor turned_by(double angle) {
   auto [cosine, sine] = cosine_sine(angle);
   return {cosine, sine};

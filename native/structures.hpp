@@ -1,5 +1,6 @@
-// What crosses the C interface, declared once: STRUCTURE declares it for C++ and keeps the same text, from which
-// `vibench.sim.engine` builds its side. Allowed are double, int64_t, Phasor, structures above, arrays, and pointers.
+// Structures of the C interface, declared once: STRUCTURE declares one for C++ and keeps the same text, from
+// which `vibench.sim.engine` builds its side. Allowed are double, int64_t, Phasor, structures declared above,
+// arrays, and pointers.
 #pragma once
 #include "scalar.hpp"
 
@@ -18,7 +19,7 @@ constexpr int MOST_POWERS = 6;  // terms of a power law
 // Places of a motion: absolute displacements [m] and velocities [m/s] of m0, m1, m2.
 enum { X, Y, Z, VX, VY, VZ };
 
-// How m1 meets its stops; `Specimen::law`.
+// Kind of the stops; `Specimen::law`.
 enum Law : int64_t {
   NO_STOPS,
   HERTZ,     // eq. 2, no loss
@@ -29,7 +30,7 @@ enum Law : int64_t {
   LAWS,
 };
 
-// How a run ended: the numbers of `vibench.sim.specimen.Outcome`; below zero what was given is refused.
+// How a run ended: the numbers of `vibench.sim.specimen.Outcome`; negative for refused arguments.
 enum Outcome : int64_t {
   REFUSED = -1,
   REACHED_END,
@@ -39,12 +40,12 @@ enum Outcome : int64_t {
   TOO_LONG,
 };
 
-// Gong et al. 2025, eqs. 1 and 2: masses, springs, dampers, clearances, and the stops' numbers.
+// Gong et al. 2025, eqs. 1 and 2: masses, springs, dampers, clearances, and the stops' parameters.
 STRUCTURE(Specimen,
   double m0, m1, m2;           // [kg]
   double k0, k1, k2;           // [N/m]
   double c0, c1, c2;           // [N s/m]
-  double lower_gap;            // clearance at negative p [m]; infinite for no stop there
+  double lower_gap;            // clearance at negative p [m]; infinite without a stop
   double upper_gap;            // clearance at positive p [m]
   int64_t law;                 // one of `Law`
   double linear_stiffness;     // of stops that are springs [N/m]
@@ -53,8 +54,8 @@ STRUCTURE(Specimen,
   double restitution;          // of rigid stops, 0 to 1
 )
 
-// A linear motion, solved: s(t) = Re sum_j a_j shapes_j exp(rates_j t), with a_j = rows_j . s(0). One of each
-// conjugate pair and every real rate counts as a mode. `steady` is the motion under the drive, per unit phasor.
+// A linear motion: s(t) = Re sum_j a_j shapes_j exp(rates_j t), with a_j = rows_j . s(0). One of each conjugate pair
+// and every real rate counts as a mode. `steady` is the motion under the drive, per unit phasor.
 STRUCTURE(LinearMotion,
   int64_t modes;               // 2 to 6
   Phasor rates[6];             // [1/s]
@@ -63,11 +64,11 @@ STRUCTURE(LinearMotion,
   Phasor steady[6];
 )
 
-// m1 on a stop that holds it, or that is a spring: a linear motion about another place of rest.
+// m1 on a stop that is rigid or a spring: a linear motion about another rest position.
 STRUCTURE(HeldMotion,
   LinearMotion motion;
-  Phasor pulls[7];             // what unit phasors, the drive's last, add to what the stop must pull for m1 to stay
-  double let_go;               // what the stop pushes at rest, over the gap, in the same measure
+  Phasor pulls[7];             // pull on the stop that keeps m1 on it, per unit phasor, the drive's last
+  double let_go;               // force of the stop at rest, over the gap, in the same measure
   double rests;                // the constant part of |p|, over the gap
 )
 
@@ -78,18 +79,18 @@ STRUCTURE(Drive,
   Phasor force;                // k0 U + c0 dU/dt = Re(force phasor) [N]
 )
 
-// Hertz collisions solved beforehand (decision 0008), the same for every specimen: `vibench.sim.engine` makes them.
+// Precomputed Hertz collisions (decision 0008), the same for every specimen; `vibench.sim.engine` computes them.
 STRUCTURE(CollisionShapes,
-  double shares[8][16][16];    // [m][k][i]: integral up to point i of (t_i - t)^m of what is 1 at point k alone
+  double shares[8][16][16];    // [m][k][i]: integral up to point i of (t_i - t)^m of a unit value at point k
   double ends[16][8];          // [k][m]: the same up to the end
-  double weights[16];          // of the points in an integral over the duration
+  double weights[16];          // weights of the points in an integral over the duration
   double heights[16];          // times of the points, over the duration
-  double about_middle[16][8];  // what a depth at a point adds to the Taylor terms about the middle
+  double about_middle[16][8];  // contribution of a depth at a point to the Taylor terms about the middle
   double shapes[41][23][16];   // by press; rows as `ShapeRow` names them
   double durations[41][7];     // by press; columns as `DurationColumn` names them
 )
 
-// F = sum forces_i (p / reference)^exponents_i at every p: the continuous substitute of stops (eq. 3).
+// F = sum forces_i (p / reference)^exponents_i at every p: the continuous model of the stops (eq. 3).
 STRUCTURE(PowerTerms,
   double reference;            // [m]
   int64_t terms;               // 1 to 6
@@ -97,18 +98,18 @@ STRUCTURE(PowerTerms,
   double forces[6];            // [N]
 )
 
-// Sums over Gauss's points of a step from 0 to 1, the same for every law: `vibench.sim.engine` makes them.
+// Sums over Gauss's points of a step from 0 to 1, the same for every law; `vibench.sim.engine` computes them.
 STRUCTURE(PowerShapes,
   double points[8], weights[8];
-  double shares[32][8][8];     // [m][k][i]: integral up to point i of (c_i - s)^m of what is 1 at point k alone
+  double shares[32][8][8];     // [m][k][i]: integral up to point i of (c_i - s)^m of a unit value at point k
   double ends[32][8];          // [m][k]: the same up to the end
   double at_start[8], at_end[8];  // the polynomial through the points, there
-  double course[9][8];         // what a value at a point, the last at the end, adds to powers of (s - 1)
+  double course[9][8];         // contribution of a value at a point, the last at the end, to powers of (s - 1)
   double point_weights[8];     // barycentric, of the points alone
   double instants[10], instant_weights[10], instant_slopes[10];  // start, points and end, as one polynomial
 )
 
-// A specimen under a base whose displacement is a cubic on each of equal intervals.
+// A specimen on a base whose displacement is a cubic on each of equal intervals.
 STRUCTURE(CubicScene,
   Specimen specimen;
   double interval;             // [s]
@@ -117,7 +118,7 @@ STRUCTURE(CubicScene,
   const PowerShapes *power_shapes;
 )
 
-// What is observed of a stretch of a run; `Record::watch`.
+// Observed quantities of a run; `Record::watch`.
 enum Watch : int64_t {
   WATCH_NOTHING,
   WATCH_PEAKS,
@@ -129,28 +130,28 @@ STRUCTURE(Scene,
   Specimen specimen;
   Drive drive;
   LinearMotion flight;
-  HeldMotion held;             // no modes where the law does not hold m1
+  HeldMotion held;             // without modes if the law does not hold m1
   PowerTerms power;            // of the law POWERS
   const CollisionShapes *collisions;
   const PowerShapes *power_shapes;
 )
 
-// Where a motion is. Valid in flight and in contact.
+// State of a motion, in flight or in contact.
 STRUCTURE(State,
   double motion[6];            // x, y, z, vx, vy, vz [m, m/s]
   double clock_high, clock_low;  // time is their exact sum [s]
   double side;                 // +1 or -1 while m1 is on the stop at positive or negative p; 0 in flight
   double root;                 // w: the square root of the penetration [m^0.5]
   double rate;                 // r = d|p|/dt [m/s]
-  double step;                 // the next step, in s with dt = w ds [s/m^0.5]
-  double root_scale;           // how large w will become [m^0.5]
-  double rate_scale;           // how large r will become [m/s]
-  double pace;                 // w over r, as large as they will become [s/m^0.5]
+  double step;                 // the next step in s, where dt = w ds [s/m^0.5]
+  double root_scale;           // expected largest w [m^0.5]
+  double rate_scale;           // expected largest r [m/s]
+  double pace;                 // ratio of expected largest w and r [s/m^0.5]
   double level;                // under a power law: one more than that of the next step; 0 before the first
-  double sizes[3];             // how large p, x, z have lately been there [m]
+  double sizes[3];             // recent sizes of p, x, z there [m]
 )
 
-// What a run fills on its way. None of it changes a step.
+// Results of a run. None of them changes a step.
 STRUCTURE(Record,
   double start;                // time of sample 0 [s]
   double sample_rate;          // [Hz]
@@ -158,13 +159,13 @@ STRUCTURE(Record,
   int64_t sample_room, samples_kept;
   double *impact_times;        // [impact_room]; a run ends when it is full
   int64_t impact_room, impacts;
-  int64_t steps_left;          // that a run may still make
+  int64_t steps_left;          // remaining steps of the run
   int64_t watch;               // one of `Watch`
   double peak_x, peak_p;       // largest |x| and |p| [m]
   Phasor line_x, line_p;       // integrals of x and p against exp(-i (omega t + phase)) [m s]
 )
 
-// An array lent for one call. Its size is checked against the others before anything is read or written.
+// An array passed for one call. Its size is checked against the others before any access.
 STRUCTURE(Numbers,
   double *at;
   int64_t size;
@@ -173,23 +174,23 @@ STRUCTURE(Numbers,
 // A row of intervals, U = c0 + c1 tau + c2 tau^2 + c3 tau^3 on each, and the motion at their ends.
 STRUCTURE(CubicDrive,
   Numbers base;                // [intervals][4]: c0 ... c3 [m, m/s, m/s^2, m/s^3]
-  double first_from, last_to;  // where the run begins in the first and ends in the last, since their starts [s]
-  int64_t done;                // intervals that have been passed
+  double first_from, last_to;  // times since the starts of first and last interval at which the run begins and ends [s]
+  int64_t done;                // number of finished intervals
   Numbers motions;             // [intervals][6]: x, y, z, vx, vy, vz at the end of each; or of no size
-  Numbers impacts;             // [intervals]: in each; likewise
+  Numbers impacts;             // [intervals]: impacts in each; likewise
 )
 
-// Small changes of a motion, carried along with it: the exact derivative of the flow in some directions.
+// Small changes of a motion, integrated with it: the exact derivative of the flow in some directions.
 STRUCTURE(Tangent,
   int64_t changes;             // 1 to 6
   double rows[6][6];           // x, y, z, vx, vy, vz of each
-  double growth[6];            // of each: the logarithm of a factor that was taken out of its row
+  double growth[6];            // logarithm of the factor removed from each row
 )
 
-// How changes grow from instant to instant: made orthonormal in a metric at even intervals, and read.
+// Growth of changes: at even intervals they are made orthonormal in a metric, and read.
 STRUCTURE(Readings,
   double interval;             // [s]; reading k is due at (k + 1) interval
-  int64_t parts;               // of an interval, after each of which changes are made orthonormal
+  int64_t parts;               // parts of an interval, after each of which changes are made orthonormal
   double metric[6][6];
   double *growth;              // [room][changes]: the logarithm of the factor by which each grew
   int64_t *impacts;            // [room]: in each interval
@@ -199,16 +200,16 @@ STRUCTURE(Readings,
 
 // ---- Batches: motions of one specimen, eight at a time
 
-// Monomials of the polynomials of `CollisionFit`, for who fits them.
+// Monomials of the polynomials of `CollisionFit`, for their fit.
 STRUCTURE(CollisionMonomials,
-  Numbers powers;              // [289][6]: of the variables; those that add most first
-  Numbers counts;              // [6]: how many, from the first on, each polynomial has
+  Numbers powers;              // [289][6]: powers of the variables, sorted by contribution
+  Numbers counts;              // [6]: number of leading monomials of each polynomial
 )
 
 // Hertz collisions of one specimen as polynomials (decision 0061).
 STRUCTURE(CollisionFit,
   double coefficients[652];    // of the duration over u, then of the moments
-  double middle[6], half[6];   // of the variables that were fitted: they are counted from the middle, in these
+  double middle[6], half[6];   // centre and half range of the fitted variables
   double unit;                 // u times the fifth root of the speed [s (m/s)^(1/5)]
   double guess[4];             // of that root, a cubic of the speed's fourth root, from the highest power on
 )
@@ -216,18 +217,18 @@ STRUCTURE(CollisionFit,
 // One motion of a batch.
 STRUCTURE(BatchMotion,
   const Tables *tables;
-  State *now;                  // in flight, at a whole drive period; moved on, but where the motion is lost
-  double *sections;            // [periods][6]: x, y, z, vx, vy, vz once a drive period
-  int64_t periods;             // that it is followed for
-  int64_t impacts;             // contacts that began
-  int64_t outcome;             // REACHED_END; TOO_LONG or STALLED where it is lost: to be followed alone
+  State *now;                  // in flight, at a whole drive period; advanced unless the motion fails
+  double *sections;            // [periods][6]: x, y, z, vx, vy, vz once per drive period
+  int64_t periods;             // number of periods to simulate
+  int64_t impacts;             // number of contacts
+  int64_t outcome;             // REACHED_END; TOO_LONG or STALLED after a failure, to be simulated alone
 )
 
 STRUCTURE(Batch,
-  BatchMotion *motions;        // [count], of one specimen with Hertz's stops and three modes that turn
+  BatchMotion *motions;        // [count], of one specimen with Hertz's stops and three oscillating modes
   int64_t count;
   const CollisionFit *fit;     // of that specimen
-  double tolerance;            // relative error of a step in a contact that the polynomials do not hold
+  double tolerance;            // relative error of a contact step outside the polynomials' range
 )
 
 // ---- Signals
@@ -236,7 +237,7 @@ STRUCTURE(Batch,
 STRUCTURE(Interpolation,
   Numbers samples;             // [channels][samples of one]; zero outside
   int64_t channels;
-  Numbers table;               // [phases + 3][64]: taps, from one phase before a sample to one behind the next
+  Numbers table;               // [phases + 3][64]: taps, from one phase before a sample to one after the next
   Numbers positions;           // in samples from the first
   Numbers values;              // [channels][positions]: the result
 )
@@ -248,12 +249,12 @@ STRUCTURE(Decimation,
   Numbers table;               // [rows][reach]: weights by the fraction of a step; one row serves whole fractions
   double ratio;                // steps from sample to sample
   double begin;                // place of the last sample before number 0 [steps]
-  int64_t origin;              // number of the oldest mean of a sample, less the whole steps of its place
+  int64_t origin;              // number of the oldest mean of a sample, minus the whole steps of its place
   int64_t first;               // number of the first sample
   Numbers samples;             // the result
 )
 
-// A ratio of polynomials in the delay by one step (direct form II, transposed); its state goes on from call to call.
+// A rational filter in steps (direct form II, transposed); its state continues from call to call.
 STRUCTURE(RecursiveFilter,
   Numbers numerator;           // of the present value first
   Numbers denominator;         // begins with 1
@@ -268,36 +269,36 @@ STRUCTURE(FilteredSignal,
 
 // ---- The analogue world of the virtual rig
 
-// From a motion to volts: what a sensor shows over some steps.
+// From a motion to volts: output of a sensor over some steps.
 STRUCTURE(Sensor,
   RecursiveFilter filter;
   Numbers noise;               // [steps], in units of the motion
-  Numbers instead;             // [steps], likewise: shown where it is a number; or of no size
+  Numbers instead;             // [steps], likewise: values in place of the motion where finite; or of no size
   double full_scale;           // in units of the motion
   double full_scale_voltage;   // [V]
   Numbers motion;              // [steps]: means
   Numbers volts;               // [steps]: the result
 )
 
-// A real-time controller: a Fourier series in its own phase, and the answer of a linear law to what it samples.
-// `vibench.acquisition.instruments` bounds the sizes.
+// A real-time controller: a Fourier series in its own phase, plus the output of a linear law.
+// `vibench.acquisition.instruments` limits the sizes.
 STRUCTURE(Controller,
   double theta;                // phase of the sample [rad], within a turn
   double omega;                // phase per sample [rad]
   double omega_from, omega_to;  // before and after the glide
   double glide, glide_step;    // from 0 to 1; and by sample
-  double fade, fade_step;      // factor on all that is played: 1 until it ends; and by sample
+  double fade, fade_step;      // factor of the output: 1 until it ends; and by sample
   double limit;                // of the output [V]
   double at_limit, most_at_limit;  // samples in a row with the output at its limit
-  double unheard, most_unheard;  // samples since its host said anything
-  double block;                // periods over which coefficients are taken
+  double unheard, most_unheard;  // samples since the host's last request
+  double block;                // periods of a block of coefficients
   double turns;                // periods since the block began
   double weight;               // sum of the weights in it
-  int64_t is_steady;           // whether nothing was changed in it
-  int64_t done;                // 1 when a block has been completed, 2 when nothing was changed in it
+  int64_t is_steady;           // whether nothing changed in it
+  int64_t done;                // 1 after a completed block, 2 if nothing changed in it
   int64_t is_on;
-  int64_t harmonics;           // that are played, and that come back
-  int64_t remembered;          // numbers in the memory of the law
+  int64_t harmonics;           // harmonics that are played, and that are measured
+  int64_t remembered;          // size of the law's memory
   double step[64][64];         // of the law: memory onto memory
   double inlet[64][2];         // inputs onto memory [1/V]
   double output[64];           // memory onto volts [V]
@@ -308,7 +309,7 @@ STRUCTURE(Controller,
   Phasor coefficients[3][21];  // of the last block [V]
 )
 
-// Amplifier, shaker and the specimen on its table: where they are, what moves them, and means over the steps.
+// Amplifier, shaker and the specimen on its table: state, excitation, and means over the steps.
 STRUCTURE(LoadedShaker,
   double base_displacement, base_velocity;  // [m] [m/s]
   double current;              // of the coil [A]
@@ -316,41 +317,42 @@ STRUCTURE(LoadedShaker,
   double reactions_before[2];  // the specimen's force on the base one and two steps earlier [N]
   State specimen;
   Numbers tables;              // of the specimen on bases that are cubics over a step
-  double tolerance;            // of its contacts
+  double tolerance;            // tolerance of its contacts
   double step;                 // [s]
   double gain;
-  double low_decay, low_mean, high_decay, high_mean;  // of first-order lags over a step: what is left, and its mean
+  double low_decay, low_mean, high_decay, high_mean;  // of first-order lags over a step: remainder, and its mean
   double clip;                 // [V]
   double current_limit;        // [A]
   double transition[3][5];     // displacement, velocity, current, voltage, force -> the first three a step later
-  double stroke;               // where the table meets its rubber stops [m]
+  double stroke;               // travel of the table up to its rubber stops [m]
   double stop_stiffness, stop_damping;  // [N/m] [N s/m]
   Numbers drive, noise;        // [steps]: at the amplifier's input and output [V]
   Numbers amplifier_voltage, base_acceleration, m0_velocity;  // [steps]: results [V] [m/s^2] [m/s]
   Numbers ends;                // [first steps][9]: base, its velocity, current, x, y, z, vx, vy, vz at their ends
-  Numbers begun;               // [blocks]: contacts begun up to the end of each block of steps; or none
-  int64_t block;               // steps of a block
+  Numbers begun;               // [blocks]: number of contacts up to the end of each block of steps; or none
+  int64_t block;               // steps per block
   int64_t impacts, bumps, limited_steps;  // contacts begun; steps in the rubber stops, and with clipping
 )
 
-// Between the world and a controller: it samples means over its step, and its volts come late.
+// Between the world and a controller, which samples means over its step, and whose voltages are delayed.
 STRUCTURE(LoopCables,
   Controller *controller;
-  LoadedShaker *shaker;        // of a loop that is closed through it; its drive is that of the loop
+  LoadedShaker *shaker;        // closed through this loop, whose drive it uses
   Sensor base, m0;
-  Numbers drive;               // [steps]: volts of everything else at the amplifier, then of all
-  Numbers late;                // volts of the next steps, from the one that is played next [latency + one sample]
+  Numbers drive;               // [steps]: volts of all other drives at the amplifier, then of all
+  Numbers late;                // delayed volts, from the next step on [latency + one sample]
   int64_t first;               // number of the first step since the world began
-  int64_t begin, stop;         // steps of this stretch that are played now
+  int64_t begin, stop;         // steps of this stretch to be played now
   int64_t steps_per_sample;
-  double base_sum, m0_sum;     // of volts since the last sample
-  double steps_heard;          // in these sums
+  double base_sum, m0_sum;     // sums of volts since the last sample
+  double steps_heard;          // number of steps in these sums
 )
 
-// ---- Hidden motion (docs/hidden-motion.md): X, Y, Z and their rates relative to the base, the base's velocity W and
-// the error B of the recorded acceleration; behind these eight, deviations of parameters that are looked for.
+// ---- Hidden motion (docs/hidden-motion.md): X, Y, Z and their rates relative to the base, the base's
+// velocity W and the error B of the recorded acceleration; after these eight, deviations of estimated
+// parameters.
 
-// A stop that is pressed in by d pushes with (K d^n + k d)(1 + loss dd/dt).
+// A stop with indentation d has the force (K d^n + k d)(1 + loss dd/dt).
 STRUCTURE(TrackedStop,
   double lower_gap, upper_gap;  // at negative and positive p [m]
   double steepness;            // K [N/m^n]
@@ -360,13 +362,13 @@ STRUCTURE(TrackedStop,
   double inverse_m1, inverse_m2;  // [1/kg]
 )
 
-// What a filter keeps of every sample, before it is used.
+// Data of a filter for every sample, before it is used.
 STRUCTURE(TrackRecord,
   Numbers states;              // [samples][8]
   Numbers covariances;         // [samples][8][8]
   Numbers innovations;         // [samples][2]: the innovation [m/s] and its variance, 0 where it was not used
   Numbers kinds;               // [samples]: `StepKind`
-  Numbers jacobians;           // [samples][8][8], of steps that met a stop
+  Numbers jacobians;           // [samples][8][8], of steps with contact
   Numbers impulses;            // [samples]: on m1 [N s]
 )
 
@@ -374,52 +376,52 @@ STRUCTURE(TrackRecord,
 STRUCTURE(MotionFilter,
   Numbers acceleration;        // of the base [samples + 1] [m/s^2]
   Numbers velocity;            // of m0 [samples] [m/s]; NaN where it was not measured
-  Numbers flows, small_flows;  // [1 + parameters][8][10]: state, acceleration and its rise -> state a step later
+  Numbers flows, small_flows;  // [1 + parameters][8][10]: state, acceleration and its increase -> state a step later
   Numbers stops;               // [1 + parameters] of `TrackedStop`
-  Numbers deviations;          // [parameters]: by which the later flows and stops differ from the first
+  Numbers deviations;          // [parameters]: difference of the later flows and stops from the first
   double step;                 // [s]
-  int64_t small_steps;         // in a step that meets a stop
+  int64_t small_steps;         // substeps of a step with contact
   Numbers noise;               // Q of a step [states][states]
   double velocity_variance;    // [m^2/s^2]
-  double impulse_share;        // error of a collision's impulse, as a part of it
+  double impulse_share;        // relative error of a collision's impulse
   Numbers force_variance;      // of an unknown contact force held over each sample [samples] [N^2]
   Numbers force_input;         // 1 N on m1 against m2, held over a step, onto the state [8]
   double level;                // running mean of the squared normalised innovation
-  double level_share;          // that one sample makes up
-  double limit;                // of the level: beyond it the motion is lost
+  double level_share;          // weight of one sample in it
+  double limit;                // largest level; beyond it the motion is lost
   Numbers state;               // [states]
   Numbers covariance;          // [states][states]
   TrackRecord record;          // of no size, or without parameters
 )
 
-// The smoother, back over what a filter kept.
+// The backward smoother of a filter's data.
 STRUCTURE(MotionSmoother,
   TrackRecord record;
   Numbers flow;                // [8][10], of the filter
   Numbers force_variance;      // [samples] [N^2], or of no size
   Numbers force_input;         // [8]
-  Numbers states;              // [samples][8]: this and the rest are results
+  Numbers states;              // [samples][8]: this and the following are results
   Numbers variances;           // [samples][2]: of p and of its rate
   Numbers forces;              // [samples][2]: the unknown force on m1 and its variance; or of no size
   Numbers matrix;              // [8][8]: M of the first sample, whose smoothed covariance is P - P M P
 )
 
-// Contacts of a smoothed motion, followed between its samples.
+// Contacts of a smoothed motion, simulated between its samples.
 STRUCTURE(ContactSearch,
   Numbers states;              // [samples][8]
   Numbers touched;             // [samples]: 0 where a step was a flight
-  Numbers acceleration;        // of the base, as far beyond the states as a contact may last [m/s^2]
+  Numbers acceleration;        // of the base, beyond the states by the longest contact [m/s^2]
   Numbers small_flow;          // [8][10]
   Numbers stop;                // one `TrackedStop`
   double step;                 // [s]
   int64_t small_steps;
-  int64_t longest;             // samples: what lasts longer is no collision, m1 has come to rest on the stop
-  Numbers contacts;            // [contacts][7]: the results, as `TrackedContact` orders them
+  int64_t longest;             // samples: after a longer contact, m1 counts as resting on the stop
+  Numbers contacts;            // [contacts][7]: the results, in the order of `TrackedContact`
 )
 
-// ---- Chains: specimens whose m0 hang on one another, the first on the base (decision 0011)
+// ---- Chains: specimens whose m0 are coupled in series, the first to the base (decision 0011)
 
-// A cell with the link that hangs on its m0; equal ones share it.
+// A cell with the link at its m0; equal cells share it.
 STRUCTURE(CellKind,
   Specimen specimen;
   PowerTerms power;            // of the law POWERS
@@ -427,12 +429,12 @@ STRUCTURE(CellKind,
   double next_damping;         // [N s/m]
 )
 
-// Where a cell is.
+// State of a cell.
 STRUCTURE(CellState,
   double p, x, z, vp, vx, vz;  // p = y - z [m, m/s]
-  double side, root, rate, step, root_scale, rate_scale, pace;  // of a contact under way, as in `State`
+  double side, root, rate, step, root_scale, rate_scale, pace;  // of a present contact, as in `State`
   double power_step;           // the next step under a power law [s]; 0 before the first
-  double size;                 // how large p has lately been there [m]
+  double size;                 // recent size of p there [m]
 )
 
 STRUCTURE(ChainMotion,
@@ -444,19 +446,19 @@ STRUCTURE(ChainMotion,
   double tolerance;
   double fastest;              // largest rate of chain and drive [1/s]
   Numbers windows;             // [levels]: lengths of windows, long to short [s]
-  Numbers clashes;             // [levels]: cells at most so far apart are not both followed in such a window
+  Numbers clashes;             // [levels]: cells at most this far apart are not both integrated in such a window
   Drive drive;
   Numbers pieces;              // [pieces][8]: instead of the drive, the force of the base on the first m0 [N], in
                                // powers of the time since each piece began; or of no size
   double piece_start, piece_length;  // [s]
   const CollisionShapes *collisions;
   const PowerShapes *power_shapes;
-  int64_t windows_left;        // that may still be made
+  int64_t windows_left;        // number of windows that may still be made
   double start;                // time of sample 0 [s]
   double sample_rate;          // [Hz]
   Numbers samples;             // [samples][cells][6]: x, y, z, vx, vy, vz
   int64_t samples_kept;
-  Numbers impact_times;        // [impacts], ascending but within a window; a run ends in the window that fills it
+  Numbers impact_times;        // [impacts], ascending except within a window; a run ends in the window that fills it
   Numbers impact_cells;        // [impacts]
   int64_t impacts;
   int64_t watch;               // one of `Watch`

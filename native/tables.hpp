@@ -1,24 +1,24 @@
-// What a run of one scene needs ready: computed once from the specimen, its linear motion and the drive.
+// Data of one scene for a run: computed once from the specimen, its linear motion and the drive.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
 constexpr int MODES = 6;          // most modes of a motion: three pairs, or real ones beyond critical damping
-constexpr int PHASORS = MODES + 1;  // and the drive
-constexpr int AHEAD = 16;         // grid steps seen at once, and terms of a Taylor series
+constexpr int PHASORS = MODES + 1;  // plus the drive
+constexpr int AHEAD = 16;         // grid steps per evaluation, and terms of a Taylor series
 constexpr double LONGEST_TURN = 0.25;  // a grid step, as the fastest rate times its length [rad]
 
 enum { REAL, IMAG };
 
-// A sum of turning and decaying phasors. The drive is the last term, at place `modes`.
+// A sum of rotating and decaying phasors. The drive is the last term, at place `modes`.
 struct LinearTables {
   int modes;
   double grid;               // grid step [s]
   Phasor rates[PHASORS];     // l_j [1/s]
   double squares[PHASORS];   // |l_j|^2
   Phasor shapes[PHASORS][6];
-  Phasor path[PHASORS];      // what a unit phasor adds to p
+  Phasor path[PHASORS];      // contribution of a unit phasor to p
   Phasor across[PHASORS];    // and to x
   Phasor rows[MODES][6];
   double ahead[PHASORS][2][AHEAD];   // exp(l_j grid n), n = 1 ... 16
@@ -32,15 +32,15 @@ constexpr int TERMS = 8;  // of a Taylor series over a collision
 // The motion without the contact force as a Taylor series of its matrix exponential, in units of 1 / fastest.
 struct CollisionTables {
   double fastest;                   // largest rate of modes and drive [1/s]
-  double powers[TERMS][WIDE][WIDE];  // [m][j][i]: what number j adds to number i, (A / fastest)^m / m!
-  double struck[TERMS][WIDE];        // the same of a unit of contact force
-  double onto_p[WIDE][TERMS];        // what number j adds to the m-th term of p
+  double powers[TERMS][WIDE][WIDE];  // [m][j][i]: contribution of number j to number i, (A / fastest)^m / m!
+  double struck[TERMS][WIDE];        // the same for a unit of contact force
+  double onto_p[WIDE][TERMS];        // contribution of number j to the m-th term of p
   double onto_x[WIDE][TERMS];        // and of x
   const CollisionShapes *shapes;
 };
 
-// (i omega - A)^-1 of eq. 1 as s' = A s + b f, where f pushes p back: what the integrals of s' and f against the drive
-// add to those of x and p.
+// (i omega - A)^-1 of eq. 1 as s' = A s + b f, where f is the restoring force on p: contributions of the
+// integrals of s' and f against the drive to those of x and p.
 struct LineTables {
   Phasor across[6], path[6];
   Phasor struck_x, struck_p;  // [m s / (N s)]
@@ -48,10 +48,10 @@ struct LineTables {
 
 struct PowerTables;
 
-// What every run needs to know of a specimen, whatever drives it.
+// Data of a specimen, independent of the drive.
 struct Body {
   Specimen specimen;
-  double pair;          // m1 m2 / (m1 + m2), the mass that a collision feels [kg]
+  double pair;          // m1 m2 / (m1 + m2), the effective mass of a collision [kg]
   double inverse0, inverse1, inverse2, inverse_pair;  // [1/kg]
 };
 
@@ -64,7 +64,7 @@ struct Tables : Body {
   Phasor pulls[PHASORS];
   double let_go, rests;
   CollisionTables collision;
-  const PowerTables *power;  // right behind these tables; of a power law
+  const PowerTables *power;  // after these tables; of a power law
 };
 
 INLINE double gap_at(const Specimen &specimen, double side) {
@@ -117,7 +117,7 @@ inline void fill_equations(double (&A)[WIDE][WIDE], double (&b)[WIDE], const Spe
   b[P_RATE] = -inverse_pair, b[Z_RATE] = 1.0 / s.m2;
 }
 
-// The Taylor series of exp(A t), in units of 1 / fastest, and of what a unit of force does.
+// The Taylor series of exp(A t), in units of 1 / fastest, and of the effect of a unit of force.
 template <int N>
 inline void fill_series(double (&powers)[N][WIDE][WIDE], double (&struck)[N][WIDE], double fastest,
                         const Specimen &specimen, const Drive &drive) {

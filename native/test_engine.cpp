@@ -64,7 +64,7 @@ void test_products_keep_what_they_round_off() {
   }
 }
 
-// Parabolas whose peak is known to the last digit, on either side, with bounds that are too large.
+// Parabolas with an exactly known peak, on either side, with bounds that are too large.
 void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   for (int n = 0; n < 20000; n++) {
@@ -96,12 +96,12 @@ void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
   expect(std::fabs(far - 0.15 * GAP) < 1e-15, "the far stop is watched", far);
 }
 
-// Newton's method is used where p provably does not turn. It must agree with the full search.
+// Newton's method is used where p provably has no extreme. It must agree with the full search.
 void test_a_touch_is_the_one_that_the_careful_search_finds() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   const double lowest_gaps[] = {GAP, 0.3 * GAP, INFINITE};
   for (int n = 0; n < 20000; n++) {
-    // Turning terms like those of a flight: a derivative is at most the fastest rate times the one before.
+    // Rotating terms like those of a flight: a derivative is at most the fastest rate times the one before.
     double series[AHEAD] = {}, bound = 0.0, reach = GAP, lowest = lowest_gaps[n % 3], length = draw(0.05, 1) * LENGTH;
     for (int term = 0; term < 3; term++) {
       double rate = LONGEST_TURN / LENGTH * draw(0.05, 1), size = 2 * GAP * draw(0, 1), phase = draw(0, 2 * PI);
@@ -229,7 +229,7 @@ void test_an_impact_keeps_momentum_and_places_and_turns_the_approach(const Body 
 
 Motion<double> at_rest() { return {}; }
 
-// A run of `until` seconds, either way, from a motion that is given.
+// A run of `until` seconds, forwards or backwards, from a given motion.
 struct HarmonicRun {
   const Tables &tables;
   double until;
@@ -265,7 +265,7 @@ struct RunOnCubics {
   }
 };
 
-// The derivatives of the flow, from duals, against central differences of two runs beside it.
+// The derivatives of the flow, from duals, against central differences of two neighbouring runs.
 template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, double tolerance) {
   const double scale[6] = {1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1};
   constexpr double STEP = 1e-6;
@@ -291,10 +291,11 @@ template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, doub
   }
 }
 
-// With a fit that holds no collision every contact goes by steps, as those of a run at a strict tolerance do.
+// With a fit that covers no collision every contact is integrated by steps, like those of a run at a strict
+// tolerance.
 void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
   constexpr int64_t COUNT = 11, PERIODS = 9;
-  constexpr double TOLERANCE = 9e-8;  // at which no collision is resolved as a whole
+  constexpr double TOLERANCE = 9e-8;  // at this tolerance no collision is solved as a whole
   static CollisionFit fit;
   for (int k = 0; k < VARIABLES; k++) fit.middle[k] = 1e9, fit.half[k] = 1.0;
   fit.unit = 1.0;

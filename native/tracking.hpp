@@ -1,4 +1,5 @@
-// One step of a tracked motion: exact without stops; with them, kick and flow alternate (docs/hidden-motion.md).
+// One step of a tracked motion: exact without stops; with them, impulses and free motion alternate
+// (docs/hidden-motion.md).
 #pragma once
 #include "structures.hpp"
 
@@ -7,17 +8,17 @@ namespace vibench {
 constexpr int TRACKED = 8;  // states
 constexpr int BASE_VELOCITY = 6;  // W; X, Y, Z, VX, VY, VZ come before it, relative to the base; B behind it
 constexpr double HERTZ_EXPONENT = 1.5;
-constexpr double WATCHED_REACH = 2e-7;  // a flight that passes a stop this closely goes in small steps [m]
+constexpr double WATCHED_REACH = 2e-7;  // a flight that passes a stop within this distance uses small steps [m]
 
 enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // no stop; one, but free at the end; in contact at the end
 
-// State, recorded acceleration and its rise over the step -> state at the end.
+// State, recorded acceleration and its increase over the step -> state at the end.
 typedef double StepFlow[TRACKED][TRACKED + 2];
 
-// State with its derivatives by the state at the beginning.
+// State with its derivatives with respect to the state at the beginning.
 using StateAndJacobian = Dual<double, TRACKED>;
 
-// d to an exponent, for d > 0: of Hertz's and of springs a power would cost ten times as much.
+// d to a power, for d > 0; special cases of Hertz's stops and springs save nine tenths of the time.
 INLINE double power(double d, double exponent) {
   if (exponent == HERTZ_EXPONENT) return d * square_root(d);
   return exponent == 1.0 ? d : exponential(exponent * logarithm(d));
@@ -30,7 +31,7 @@ template <int M> INLINE Dual<double, M> power(const Dual<double, M> &d, double e
   return raised;
 }
 
-// Lets the stops push for a while at standstill; returns the impulse on m1 [N s].
+// Applies the stops' force for a time without motion; returns the impulse on m1 [N s].
 template <class T> INLINE double kick(T *state, const TrackedStop &stop, double time) {
   T p = state[Y] - state[Z], rate = state[VY] - state[VZ];
   double side = value_of(p) > stop.upper_gap ? 1.0 : value_of(p) < -stop.lower_gap ? -1.0 : 0.0;
@@ -43,7 +44,7 @@ template <class T> INLINE double kick(T *state, const TrackedStop &stop, double 
   return value_of(impulse);
 }
 
-// Moves without stops, exactly, under an acceleration that rises linearly [m/s^2].
+// Advances without stops, exactly, with a linearly increasing acceleration [m/s^2].
 template <class T> INLINE void flow_on(T *state, const StepFlow &flow, double base, double rise) {
   T moved[TRACKED];
   for (int i = 0; i < TRACKED; i++) {
@@ -60,7 +61,7 @@ struct StepModel {
   int64_t small_steps;
 };
 
-// Part `n` of a step in small ones; returns the impulse on m1 [N s].
+// Part `n` of a step in substeps; returns the impulse on m1 [N s].
 template <class T> INLINE double small_step(T *state, const StepModel &m, double base, double rise, int64_t n) {
   double parts = double(m.small_steps), half = 0.5 * (m.step / parts);
   double impulse = kick(state, m.stop, half);
@@ -77,7 +78,7 @@ inline bool reaches_stop(const double *before, const double *after, const StepMo
   return high + WATCHED_REACH > m.stop.upper_gap || -low + WATCHED_REACH > m.stop.lower_gap;
 }
 
-// Moves a state over one sample; adds up the impulse on m1. Derivatives come where T has them.
+// Advances a state by one sample; adds up the impulse on m1. T may include derivatives.
 template <class T>
 inline StepKind step_on(double *state, const StepModel &m, double base, double rise, double &impulse,
                         double (&jacobian)[TRACKED][TRACKED]) {
@@ -118,7 +119,7 @@ struct TrackedContact {
 };
 constexpr int CONTACT_COLUMNS = sizeof(TrackedContact) / sizeof(double);
 
-// Follows every contact from the smoothed flight before it to its end; returns how many it has filled in.
+// Simulates every contact from the smoothed flight before it to its end; returns the number of contacts.
 inline int64_t follow_contacts(const ContactSearch &of) {
   const auto &flow = *reinterpret_cast<const StepFlow *>(of.small_flow.at);
   const auto &stop = *reinterpret_cast<const TrackedStop *>(of.stop.at);
@@ -158,7 +159,7 @@ inline int64_t follow_contacts(const ContactSearch &of) {
         now = {};
         is_over = n + 1 == of.small_steps || at + 1 >= samples;
       }
-      // A step that ends in flight ends the search: what follows begins with a smoothed state again.
+      // A substep that ends in flight ends the search; the next contact starts from a smoothed state.
       is_over = is_over || now.side == 0.0;
     }
     ready = at + 1;

@@ -1,4 +1,4 @@
-// N doubles side by side, which the compiler keeps in as many registers as the processor needs. Every operation is
+// N doubles in parallel, which the compiler keeps in as many registers as necessary. Every operation is
 // IEEE's, uncontracted and in a fixed order, so that results do not depend on the width of the registers.
 #pragma once
 #include "numbers.hpp"
@@ -37,10 +37,10 @@ template <int N> struct Vector {
   friend INLINE Vector operator-(Vector a) { return Vector(-a.lanes); }
 };
 
-// One answer for each of eight lanes.
+// One boolean for each of eight lanes.
 struct Mask {
 #if defined(__clang__)
-  typedef bool Flags __attribute__((ext_vector_type(8)));  // kept in a mask register where there are such
+  typedef bool Flags __attribute__((ext_vector_type(8)));  // in a mask register if available
   static INLINE Mask of(unsigned bits) { return {__builtin_bit_cast(Flags, uint8_t(bits))}; }
   INLINE unsigned bits() const { return __builtin_bit_cast(uint8_t, flags); }
 #else
@@ -83,7 +83,7 @@ INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
 
 INLINE Vector<8> magnitude(Vector<8> x) { return select(x < 0.0, -x, x); }
 
-// a b + c, rounded once where the processor can: everywhere but on the x86-64 baseline, whose digits differ.
+// a b + c, rounded once if the processor can: on all except the x86-64 baseline, whose digits differ.
 INLINE Vector<8> fused(Vector<8> a, Vector<8> b, Vector<8> c) {
 #if !defined(__FMA__) && !defined(__aarch64__)
   return a * b + c;
@@ -113,7 +113,7 @@ template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
 #endif
 }
 
-// The eight lanes from one before `to`, which follows `from`; and those from one behind `from`.
+// The eight lanes from one before `to`, which follows `from`; and those from one after `from`.
 INLINE Vector<8> lanes_before(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 7, 8, 9, 10, 11, 12, 13, 14));
 }
@@ -121,7 +121,7 @@ INLINE Vector<8> lanes_behind(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 1, 2, 3, 4, 5, 6, 7, 8));
 }
 
-// Sum of all lanes, in halves of halves.
+// Sum of all lanes, by repeated halving.
 template <int N> INLINE double total(Vector<N> x) {
   double of[N];
   x.store(of);
@@ -136,7 +136,7 @@ template <int N> INLINE double largest(Vector<N> x) {
   return best;
 }
 
-// Number of lanes, from the first on, that lie between low and high.
+// Number of leading lanes that lie between low and high.
 INLINE int leading_between(Vector<16> x, double low, double high) {
   auto inside = (x.lanes > Vector<16>(low).lanes) & (x.lanes < Vector<16>(high).lanes);
 #if defined(__clang__)

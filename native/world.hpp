@@ -1,4 +1,4 @@
-// The analogue world of the virtual rig: what sensors show of a motion, and the cables of a fast control loop.
+// The analogue world of the virtual rig: sensor outputs of a motion, and the connections of a fast control loop.
 #pragma once
 #include "controller.hpp"
 #include "shaker.hpp"
@@ -6,7 +6,7 @@
 
 namespace vibench {
 
-// Volts of the steps from `begin` to before `stop`.
+// Output volts of the steps from `begin` to before `stop`.
 inline void show(const Sensor &sensor, int64_t begin, int64_t stop) {
   double *volts = sensor.volts.at, most = sensor.full_scale_voltage, scale = most / sensor.full_scale;
   run_filter(sensor.filter, sensor.motion.at + begin, volts + begin, stop - begin);
@@ -22,7 +22,7 @@ inline int64_t show(const Sensor &sensor) {
   return 0;
 }
 
-// Plays from `begin` up to the controller's next sample: adds its late volts to the drive. Returns `stop`.
+// Plays from `begin` up to the controller's next sample: adds its delayed volts to the drive. Returns `stop`.
 inline int64_t play_loop(LoopCables &loop) {
   int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
   double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
@@ -40,8 +40,8 @@ inline int64_t play_loop(LoopCables &loop) {
   return loop.stop;
 }
 
-// Shows the controller what the plant did in the steps that were played; the next ones begin behind them. Returns 1
-// when the controller wants attention before its next sample.
+// Passes the sensor volts of the played steps to the controller; the next steps follow. Returns 1 when the
+// controller needs attention before its next sample.
 inline int64_t hear_loop(LoopCables &loop) {
   if (loop.stop < loop.begin || loop.stop > loop.drive.size) return REFUSED;
   show(loop.base, loop.begin, loop.stop);
@@ -57,7 +57,7 @@ inline int64_t hear_loop(LoopCables &loop) {
 
 enum class LoopEnd : int64_t { COMPLETE, NEEDS_ATTENTION, MOTION_LOST };
 
-// From sample to sample until the stretch ends, the motion is lost, or the controller wants attention.
+// From sample to sample until the stretch ends, the motion fails, or the controller needs attention.
 inline int64_t close_loop(LoopCables &loop) {
   return with_shaker(*loop.shaker, [&](const auto &move) {
     while (loop.begin < loop.drive.size) {
