@@ -15,7 +15,7 @@ from vibench.stop_files import SWITCH_OFF, Fate, fate_of, put_down, stop_path
 LEVELS = ("ramp", "abort", "off")
 
 
-class Announced:
+class RunningProgram:
     """A program's announcement: process id and start time in the file name, further facts in the file."""
 
     def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
@@ -44,8 +44,8 @@ class Announced:
 def main() -> None:
     """Stop, if the arguments are a simple stop command; otherwise run the complete command."""
     if sys.argv[1:2] == ["stop"] and sys.platform == "linux":
-        asked = asked_of(sys.argv[2:])
-        code = None if asked is None else stopped(*asked)
+        request = parse_stop(sys.argv[2:])
+        code = None if request is None else stop_programs(*request)
         if code is not None:
             sys.exit(code)
     # pydantic searches the metadata of every installed package for plug-ins; none is used here.
@@ -56,7 +56,7 @@ def main() -> None:
     run_command()
 
 
-def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
+def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
     """Return level, reason and process id of a stop command; None for the complete command."""
     split = [part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])]
     given = dict(zip(split[::2], split[1::2], strict=False))
@@ -68,10 +68,10 @@ def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
     return (level, reason, pid or "") if is_plain else None
 
 
-def stopped(level: str, reason: str, pid: str) -> int | None:
+def stop_programs(level: str, reason: str, pid: str) -> int | None:
     """Stop the selected programs and return the exit code; None for the complete command."""
     try:
-        programs = [each for each in announced() if pid in ("", each.pid)]
+        programs = [each for each in running_programs() if pid in ("", each.pid)]
         living = [each for each in programs if each.is_alive]
         stops = [stop_path(os.path.dirname(each.path), each.pid, each.start, level) for each in living]  # noqa: PTH120
         for stop in stops:
@@ -89,7 +89,7 @@ def stopped(level: str, reason: str, pid: str) -> int | None:
     return 1 if killed else 0
 
 
-def announced() -> Iterator[Announced]:
+def running_programs() -> Iterator[RunningProgram]:
     """Yield the announced programs of this computer; raise OSError if another computer's is among them."""
     folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
     boot, space = _own_place()
@@ -104,9 +104,9 @@ def announced() -> Iterator[Announced]:
             if _is_locked(path):
                 raise OSError("on another computer")
         elif place[1] == space:
-            yield Announced(path, pid, start, is_alive=place[2] == _start_of(pid))
+            yield RunningProgram(path, pid, start, is_alive=place[2] == _start_of(pid))
         elif _is_locked(path):  # in a container on this computer
-            yield Announced(path, pid, start, is_alive=True)
+            yield RunningProgram(path, pid, start, is_alive=True)
 
 
 def _state_folder() -> str:

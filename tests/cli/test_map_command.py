@@ -111,8 +111,9 @@ def test_an_estimate_for_fewer_threads_than_one_is_refused(vibench_here, tmp_pat
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path):
     found = vibench_here("map", plan(tmp_path, MAP), "--out", "/proc/map", cwd=tmp_path)
     assert found.returncode == 1
-    assert "/proc/map cannot be created as a folder: /proc may not be written to. Nothing was computed" in " ".join(
-        found.stderr.split()
+    assert (
+        "/proc/map cannot be created as a folder: /proc may not be written to. Nothing was computed"
+        in " ".join(found.stderr.split())
     )
 
 

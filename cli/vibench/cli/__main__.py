@@ -220,9 +220,9 @@ app = typer.Typer(
 )
 
 
-def tell_version(*, asked: bool) -> None:
+def print_version(*, is_requested: bool) -> None:
     """Print the version if ``--version`` was given."""
-    if asked:
+    if is_requested:
         from importlib.metadata import version
 
         typer.echo(f"vibench {version('vibench')}")
@@ -278,7 +278,7 @@ def vibench(
         typer.Option(
             "--version",
             is_eager=True,
-            callback=lambda asked: tell_version(asked=asked),
+            callback=lambda is_requested: print_version(is_requested=is_requested),
             help="Print the version.",
         ),
     ] = False,

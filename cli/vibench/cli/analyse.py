@@ -64,9 +64,9 @@ OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "o
 class _Hidden(StrEnum):
     """What to do with the hidden motion."""
 
-    LEFT_OUT = "left out"
-    TOLD = "told"
-    KEPT = "kept"
+    OMITTED = "left out"
+    REPORTED = "told"
+    STORED = "kept"
 
 
 def analyse(
@@ -155,9 +155,9 @@ def analyse(
         )
     if keep and not hidden:
         raise InvalidRequest("--keep was given without --hidden, which it needs; give both, or neither")
-    laid = None if specimen is None else read_specimen(specimen).specimen()
-    if hidden and laid is not None:
-        tracked_specimen(laid)
+    overlay = None if specimen is None else read_specimen(specimen).specimen()
+    if hidden and overlay is not None:
+        tracked_specimen(overlay)
     overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
     simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     with external_data(allow_external):
@@ -168,8 +168,8 @@ def analyse(
             overlays,
             (simulation, draws),
             fit=tuple(free or ()) if fit else None,
-            hidden=_Hidden.KEPT if keep else _Hidden.TOLD if hidden else _Hidden.LEFT_OUT,
-            laid=laid,
+            hidden=_Hidden.STORED if keep else _Hidden.REPORTED if hidden else _Hidden.OMITTED,
+            overlay=overlay,
             as_json=as_json,
         )
 
@@ -183,7 +183,7 @@ def _analyse(
     *,
     fit: Sequence[Parameter] | None,
     hidden: _Hidden,
-    laid: Specimen | None,
+    overlay: Specimen | None,
     as_json: bool,
 ) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
@@ -197,9 +197,9 @@ def _analyse(
     with reading_bar() as observer:
         simulation, draws = simulated
         updated = None if fit is None else fit_specimen(paths, name, observer, fit)
-        laid = laid if updated is None else updated.specimen
-        results = analyse_files(paths, name, simulation, request, observer, laid, draws)
-        motions = list(hidden_motions(results, laid, observer, hidden))
+        overlay = overlay if updated is None else updated.specimen
+        results = analyse_files(paths, name, simulation, request, observer, overlay, draws)
+        motions = list(hidden_motions(results, overlay, observer, hidden))
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     from vibench.analysis.report import check_warnings, findings, write_report
@@ -208,7 +208,7 @@ def _analyse(
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
         told = (
             {"hidden_motion": {each.name: each.to_dict() for each in motions}}
-            if hidden is not _Hidden.LEFT_OUT
+            if hidden is not _Hidden.OMITTED
             else {}
         )
         print_json({**campaign_summary(results), **fitted, **told})
@@ -241,11 +241,11 @@ def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
     """Yield the hidden motion of each recording with a result; print an error where none can be estimated."""
-    for facts in results.facts if hidden is not _Hidden.LEFT_OUT else ():
+    for facts in results.facts if hidden is not _Hidden.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:
                 motion = hidden_motion(recording, specimen, observer=observer)
-                if hidden is _Hidden.KEPT:
+                if hidden is _Hidden.STORED:
                     keep_hidden_motion(recording, motion)
                 yield motion
             except AnalysisError as error:

@@ -71,26 +71,26 @@ def branches(
         if resonance is None
         else _resonance(amplitude, frequency, like, resonance)
     )
-    asked = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
     if holdable is not None:
-        lowest_hz = asked.start if asked.along is Parameter.FREQUENCY else asked.frequency_hz
-        if asked.resonance_band_hz is not None:
-            lowest_hz = asked.resonance_band_hz[0]
+        lowest_hz = request.start if request.along is Parameter.FREQUENCY else request.frequency_hz
+        if request.resonance_band_hz is not None:
+            lowest_hz = request.resonance_band_hz[0]
         rig = load_rig(holdable)
         loop_s = loop_time_s(rig, lowest_hz) if rig.controller is None else rig.controller.loop_time_s
-        asked = asked.model_copy(update={"loop_time_s": loop_s})
+        request = request.model_copy(update={"loop_time_s": loop_s})
     from vibench.analysis.report import branches_figure
 
     room_for(FILE, out)
     if not as_json:
         console.print("Searching for motions; each branch is printed when it is found.")
 
-    def tell(number: int, line: BranchLine) -> None:
+    def print_branch(number: int, line: BranchLine) -> None:
         if not as_json:
-            console.print(_branch_in_words(number, line, asked.along))
+            console.print(_branch_in_words(number, line, request.along))
 
-    lines, elapsed_s, is_complete = compute_parts(branch_lines(asked), tell)
-    diagram = BranchDiagram(asked, lines, elapsed_s)
+    lines, elapsed_s, is_complete = compute_parts(branch_lines(request), print_branch)
+    diagram = BranchDiagram(request, lines, elapsed_s)
     if as_json:
         print_answer(diagram.to_dict(), is_complete=is_complete)
     else:

@@ -53,7 +53,7 @@ def chain(
 ) -> None:
     """Simulate a row of cells: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
     first, *others = specimen or (USUAL_SPECIMEN,)
-    asked = specimen_request(
+    request = specimen_request(
         options,
         first,
         amplitude,
@@ -65,12 +65,12 @@ def chain(
 
     room_for(FILE, out)
 
-    def tell(_number: int, run: ChainRun) -> None:
+    def print_run(_number: int, run: ChainRun) -> None:
         if not as_json:
             console.print(_run_in_words(run))
 
-    runs, elapsed_s, is_complete = compute_parts(chain_runs(asked), tell)
-    found = ChainAnswer(asked, runs, elapsed_s)
+    runs, elapsed_s, is_complete = compute_parts(chain_runs(request), print_run)
+    found = ChainAnswer(request, runs, elapsed_s)
     if as_json:
         print_answer(found.to_dict(), is_complete=is_complete)
     else:

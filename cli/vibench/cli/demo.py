@@ -45,12 +45,12 @@ class Analyst:
         self._name = name
         self._folder = Path()
         self._parts: list[CampaignResults | BaseException] = []
-        self.asked = 0
+        self.submitted = 0
         """Number of recordings submitted."""
 
     def take(self, recording: Path) -> None:
         """Submit a recording."""
-        self.asked += 1
+        self.submitted += 1
         self._folder = recording.parent
         take = self._parts.append
         self._pool.ask(analyse_files, take, take, [recording], self._name, draws=self._draws)
@@ -61,7 +61,7 @@ class Analyst:
 
         Raises AnalysisError when the process ended early.
         """
-        for number in range(self.asked):
+        for number in range(self.submitted):
             while number == len(self._parts):
                 self._pool.poll(LOOK_S)
             match self._parts[number]:
@@ -123,9 +123,9 @@ def demo(
             if point_result.outcome is PointOutcome.RECORDED
         } != set(campaign.recording_names()):
             raise typer.Exit(ExitCode.STOPPED)
-        with analysis_bar(analyst.asked) as observer:
+        with analysis_bar(analyst.submitted) as observer:
             for done, _ in enumerate(analyst.results(), start=1):
-                observer(Progress(done, analyst.asked))
+                observer(Progress(done, analyst.submitted))
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     summary = campaign_summary(results)

@@ -38,7 +38,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
     if mapping is None:
         if out is not None:
             raise InvalidRequest(f"{out} cannot be written without a mapping; give --mapping MAP.toml")
-        _tell(file, as_json)
+        _print_contents(file, as_json)
         return
     meaning = load_toml(mapping, ImportMapping)
     with opened_source(file) as source:
@@ -52,7 +52,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
         console.print(f"wrote {made}; next: vibench analyse {shlex.quote(str(made))}")
 
 
-def _tell(file: Path, as_json: bool) -> None:
+def _print_contents(file: Path, as_json: bool) -> None:
     with opened_source(file) as source:
         channels = source.channels
     if as_json:

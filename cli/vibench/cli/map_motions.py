@@ -64,28 +64,28 @@ def map_motions(
     as_json: AsJson = False,
 ) -> None:
     """Map the motions over two parameters or two start coordinates, or along one parameter."""
-    asked = load_toml(named(plan, "studies/maps"), Map)
-    gaps_m = asked.specimen.specimen().gaps_m if asked.gap_m is None else _ends(asked.gap_m)
-    print_warnings(plausibility_warnings(_ends(asked.amplitude_m), gaps_m))
+    request = load_toml(named(plan, "studies/maps"), Map)
+    gaps_m = request.specimen.specimen().gaps_m if request.gap_m is None else _ends(request.gap_m)
+    print_warnings(plausibility_warnings(_ends(request.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
-    if kicks and not asked.is_basin:
+    if kicks and not request.is_basin:
         raise InvalidRequest(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
         )
-    if show == Observable.LYAPUNOV and Observable.LYAPUNOV not in asked.observe:
+    if show == Observable.LYAPUNOV and Observable.LYAPUNOV not in request.observe:
         raise InvalidRequest(
             "--show lyapunov needs a map that finds exponents, and this one observes "
-            f'{", ".join(asked.observe)}; give observe = ["response", "lyapunov"]'
+            f'{", ".join(request.observe)}; give observe = ["response", "lyapunov"]'
         )
-    if like and not asked.is_over_drive:
+    if like and not request.is_over_drive:
         raise InvalidRequest(
             "--like needs a map over frequency_hz and amplitude_m; give ranges for these two"
         )
     diagram = None if branches is None else read_diagram(branches)
     levels = [recorded_response(path) for path in like or ()]
     if only_estimate:
-        told = estimate_map(asked, workers)
+        told = estimate_map(request, workers)
         print_json(told.to_dict()) if as_json else console.print(told.sentence)
         return
     room_for_folder(out)
@@ -94,9 +94,9 @@ def map_motions(
     with (
         external_data(allow_external),
         watch_interrupt() as is_stopped,
-        study_bar(asked.grid.size) as observer,
+        study_bar(request.grid.size) as observer,
     ):
-        results = solve_map(asked, out / FILE, existing, workers, cluster, observer, is_stopped)
+        results = solve_map(request, out / FILE, existing, workers, cluster, observer, is_stopped)
     stability = kick_stability(results, kicks=kicks, workers=workers) if kicks and results.is_complete else ()
     from vibench.analysis.report import map_figure
 
@@ -104,16 +104,16 @@ def map_motions(
     if as_json:
         print_json(document(results, stability, out / FILE))
     else:
-        tell(results, stability)
+        print_result(results, stability)
         console.print("The figure:", bold(drawn[0].resolve()))
-    complain_about_points(asked, list(results.failures()), results.kept)
+    complain_about_points(request, list(results.failures()), results.kept)
 
 
 def _ends(given: float | Range) -> tuple[float, ...]:
     return (given.start, given.stop) if isinstance(given, Range) else (given,)
 
 
-def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
+def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
     """Print the result."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):

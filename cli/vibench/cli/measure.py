@@ -61,7 +61,7 @@ class Form(StrEnum):
     JSON = "json"
 
 
-def tell_estimate(
+def print_estimate(
     expected: CampaignEstimate,
     form: Form,
     known: Mapping[str, Sequence["Expected"]] = MappingProxyType({}),
@@ -199,7 +199,7 @@ def measure(
     if time_limit is not None:
         plan, shares = vibench.analysis.within(plan, rig, duration_s(time_limit))
     known = expected_of(plan, rig) if only_estimate else {}
-    tell_estimate(
+    print_estimate(
         estimate_campaign(plan, rig, out, existing),
         Form.JSON if as_json and only_estimate else Form.TEXT,
         known,

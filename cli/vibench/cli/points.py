@@ -22,14 +22,14 @@ Failures = Sequence[tuple[Mapping[str, float | str], str]]
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
     """Raise an error that names failed points, or the number of finished points after a stop."""
-    if say_failures(plan, failures) > 0:
+    if print_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:
         errors.print(f"stopped after {kept} of {plan.grid.size} points; --resume continues a file")
         raise typer.Exit(ExitCode.STOPPED)
 
 
-def say_failures(plan: "GridPlan", failures: Failures) -> int:
+def print_failures(plan: "GridPlan", failures: Failures) -> int:
     """Print the failed points and the reasons on standard error; return their number."""
     for where, why in failures[:SHOWN_FAILURES]:
         # Omit axes with a single value.

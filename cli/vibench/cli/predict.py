@@ -78,7 +78,7 @@ def predict(
     given |= {"error": error, "time_s": time_limit}
     typed = {name: value for name, value in given.items() if value is not None}
     _refuse_beside_target(typed.keys() | options.typed.keys())
-    asked = options.request(
+    request = options.request(
         specimen=read_specimen(choice.typed.get("specimen")),
         **{axis: (choice.typed[name],) for axis, name in AXES.items() if name in choice.typed},
         amplitudes_m=(amplitude,),
@@ -88,17 +88,22 @@ def predict(
         **typed,
     )
     print_warnings(
-        plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
+        plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
     )
     began = time.monotonic()
     points: Sequence[ScenePrediction] = []
-    with watch_interrupt() as is_stopped, study_bar(asked.grid.size) as observer:
-        if asked.grid.size == 1 and out is None and cluster is None and study_solver(asked) is solve_scene:
+    with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
+        if (
+            request.grid.size == 1
+            and out is None
+            and cluster is None
+            and study_solver(request) is solve_scene
+        ):
             # A single point needs neither workers nor a file.
-            taken_s, kept, where = [math.nan], 1, asked.coordinates(0)
+            taken_s, kept, where = [math.nan], 1, request.coordinates(0)
             try:
-                scene = asked.scene((0,) * len(asked.axes), Rest())
-                points = [solve_scene(scene) if asked.target is None else _refined(scene)]
+                scene = request.scene((0,) * len(request.axes), Rest())
+                points = [solve_scene(scene) if request.target is None else _refine(scene)]
                 failures = [(where, each.ended) for each in points if each.outcome != Outcome.REACHED_END]
             except (ValueError, RuntimeError) as fault:
                 said = "" if isinstance(fault, ValueError) else f"{type(fault).__name__}: "
@@ -108,7 +113,7 @@ def predict(
             from vibench.sim.study import ExistingStudy, solve_study
 
             existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-            found = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
+            found = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
             points, failures, kept = list(found.predictions()), list(found.failures()), found.kept
             taken_s = found.values("taken").ravel().tolist()
     if as_json:
@@ -117,18 +122,18 @@ def predict(
         document = {
             "points": [each.to_dict() for each in points],
             "failures": [{**where, "message": why} for where, why in failures],
-            "is_complete": kept == asked.grid.size,
-            "options": asked.model_dump(mode="json"),
+            "is_complete": kept == request.grid.size,
+            "options": request.model_dump(mode="json"),
             "software": software(),
             "elapsed_s": time.monotonic() - began,
         }
         print_json(document)
     else:
-        _tell(points, Observable.LYAPUNOV in asked.observe)
-        _tell_target(points, asked.error)
+        _print_result(points, Observable.LYAPUNOV in request.observe)
+        _print_target(points, request.error)
     if explain:
-        (errors if as_json else console).print(paragraph(_explanation(asked, points, taken_s)))
-    complain_about_points(asked, failures, kept)
+        (errors if as_json else console).print(paragraph(_explanation(request, points, taken_s)))
+    complain_about_points(request, failures, kept)
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
@@ -142,7 +147,7 @@ def _refuse_beside_target(typed: Collection[str]) -> None:
         )
 
 
-def _refined(scene: Scene) -> ScenePrediction:
+def _refine(scene: Scene) -> ScenePrediction:
     """Solve one scene with a target; print each improved result."""
     from vibench.sim import refine_scene
 
@@ -209,7 +214,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]]) -> str:
     return f"{span}: {method}. At {worst_hz:g} Hz: {said}"
 
 
-def _tell(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
+def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
     rows = Table(
         title="Responses I and II of m0 and of p = y - z, over the base amplitude [-]",
         box=SIMPLE_HEAD,
@@ -235,7 +240,7 @@ def _tell(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
         print_table(motions)
 
 
-def _tell_target(points: Sequence[ScenePrediction], error: float | None) -> None:
+def _print_target(points: Sequence[ScenePrediction], error: float | None) -> None:
     if len(points) == 1 and points[0].target is not None:
         console.print(points[0].target.text)
     elif error is not None:

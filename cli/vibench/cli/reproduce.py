@@ -68,7 +68,7 @@ def reproduce(
     with replace_file(page) as coming:
         coming.write_text(reproduction_document(found, pictures), encoding="utf-8")
     report = write_page(reproduction_page(found, levels, score), out / "report.html")
-    _tell(found)
+    _print_result(found)
     console.print("The page:", bold(page.resolve()))
     console.print("The report:", bold(report.resolve()))
     if as_json:
@@ -77,7 +77,7 @@ def reproduce(
     studies.complain()
 
 
-def _tell(found: "Reproduction") -> None:
+def _print_result(found: "Reproduction") -> None:
     from .paper.page import verdict_text
 
     rows = Table(title="What of the paper holds", title_justify="left")

@@ -32,17 +32,17 @@ def spectrum(
 ) -> None:
     """Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension."""
     a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 3)), range_of(frequency, Parameter.FREQUENCY, (1, 3))
-    asked = specimen_request(options, options.typed.get("specimen"), amplitude, **_drive(a, f))
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, **_drive(a, f))
     from vibench.analysis.report import exponent_spectrum_figure
 
     room_for(FILE, out)
-    points, elapsed_s, _ = compute_parts(spectrum_points(asked), lambda _number, _point: None)
-    is_complete = len(points) == len(asked.values)
-    found = ExponentSpectrum(asked, points, elapsed_s)
+    points, elapsed_s, _ = compute_parts(spectrum_points(request), lambda _number, _point: None)
+    is_complete = len(points) == len(request.values)
+    found = ExponentSpectrum(request, points, elapsed_s)
     if as_json:
         print_answer(found.to_dict(), is_complete=is_complete)
     else:
-        _tell(found)
+        _print_result(found)
     if points:
         keep(
             out,
@@ -67,7 +67,7 @@ def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
     return {**along, "start": frequency.start, "stop": stop, "step": step}
 
 
-def _tell(found: ExponentSpectrum) -> None:
+def _print_result(found: ExponentSpectrum) -> None:
     along = found.request.along
     console.print(f"All exponents [1/s] with {found.request.confidence:.0%} intervals: {found.request.title}")
     step = max(1, -(-len(found.points) // SHOWN))

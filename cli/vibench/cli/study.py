@@ -21,7 +21,7 @@ from .interruption import watch_interrupt
 from .options import option
 from .output import console, errors, print_json, print_warnings
 from .paths import AllowExternal, AsJson, external_data
-from .points import Cluster, Workers, complain_about_points, say_failures
+from .points import Cluster, Workers, complain_about_points, print_failures
 from .progress_bars import study_bar
 
 
@@ -40,28 +40,28 @@ def study(
     as_json: AsJson = False,
 ) -> None:
     """Predict every combination of the values in a file, longest runs first."""
-    asked = load_toml(named(plan, "studies"), Study)
+    request = load_toml(named(plan, "studies"), Study)
     print_warnings(
-        plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
+        plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
     )
     if only_estimate:
-        tell_work(asked, as_json)
+        print_work(request, as_json)
         return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with (
         external_data(allow_external),
         watch_interrupt() as is_stopped,
-        study_bar(asked.grid.size) as observer,
+        study_bar(request.grid.size) as observer,
     ):
-        results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
+        results = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
     if as_json:
         print_json(document(results, out))
     else:
-        tell(results, out)
-    complain_about_points(asked, list(results.failures()), results.kept)
+        print_progress(results, out)
+    complain_about_points(request, list(results.failures()), results.kept)
 
 
-def tell_work(study: Study, as_json: bool) -> None:
+def print_work(study: Study, as_json: bool) -> None:
     """Print the number of points and the estimated work."""
     points, work_s = study.grid.size, planned_work_s(study)
     if as_json:
@@ -83,7 +83,7 @@ def document(results: StudyResults, out: Path) -> dict[str, object]:
     }
 
 
-def tell(results: StudyResults, out: Path) -> None:
+def print_progress(results: StudyResults, out: Path) -> None:
     """Print the progress of a study."""
     failed = sum(1 for _ in results.failures())
     state = "complete" if results.is_complete else "stopped: continue with --resume"
@@ -114,7 +114,7 @@ class KeptStudies:
                 observer=observer,
                 cancelled=is_stopped,
             )
-        self._failed += say_failures(study, list(results.failures()))
+        self._failed += print_failures(study, list(results.failures()))
         if not results.is_complete:
             errors.print(
                 f"stopped after {results.kept} of {study.grid.size} points; the same command continues"

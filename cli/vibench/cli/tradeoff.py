@@ -49,7 +49,7 @@ def tradeoff(
     said = {"amplitude": amplitude, "frequency": frequency, "error": error, "time": time_limit}
     said = {name: value for name, value in said.items() if value is not None} | dict(choice.typed)
     if said:
-        _tell_scene(_study(said), out, as_json)
+        _print_scene(_study(said), out, as_json)
     else:
         _measure_known(out, span, as_json)
 
@@ -73,8 +73,8 @@ def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
         print_json(_document(benchmark))
     else:
         for each in benchmark.motions:
-            _tell(each)
-        _tell_lotteries(benchmark.lotteries)
+            _print_levels(each)
+        _print_shares(benchmark.lotteries)
     if out is not None:
         from vibench.analysis.report import tradeoff_figure
 
@@ -98,7 +98,7 @@ def _study(said: Mapping[str, Any]) -> Study:
     )
 
 
-def _tell_scene(study: Study, out: Path | None, as_json: bool) -> None:
+def _print_scene(study: Study, out: Path | None, as_json: bool) -> None:
     """Measure and print the curve of one scene."""
     from vibench.analysis.report import curve_figure
 
@@ -128,7 +128,7 @@ def _tell_scene(study: Study, out: Path | None, as_json: bool) -> None:
             console.print("The figure:", path.resolve())
 
 
-def _tell(found: MotionBenchmark) -> None:
+def _print_levels(found: MotionBenchmark) -> None:
     rows = Table(title=f"{found.motion.regime.value}: {found.motion.name}", title_justify="left")
     for heading in ("", "simulated s per s", "error of the state", "of Response I"):
         rows.add_column(heading)
@@ -146,7 +146,7 @@ def _tell(found: MotionBenchmark) -> None:
     console.print()
 
 
-def _tell_lotteries(lotteries: tuple[LotteryFigures, ...]) -> None:
+def _print_shares(lotteries: tuple[LotteryFigures, ...]) -> None:
     rows = Table(title="sensitive to the start: shares of motions", title_justify="left")
     for heading in ("", "Response I", "share stated", "of many starts", "cost over one run"):
         rows.add_column(heading)

@@ -112,7 +112,7 @@ class _Following:
             ):
                 self.client.tell_change(sentence)
         self._keep_baseline()
-        self.client.tell_twin(self._told(piece.sample_rate_hz))
+        self.client.tell_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
         """Store parameters and usual level once known; later values are checked against them."""
@@ -128,7 +128,7 @@ class _Following:
             levels = {**before.levels, self.plan: watch.usual}
             keep_baseline(before.model_copy(update={"levels": levels}), path)
 
-    def _told(self, rate_hz: float) -> TwinStatus:
+    def _status(self, rate_hz: float) -> TwinStatus:
         newest = self.live.newest
         step = max(1, round(SHOWN_S * rate_hz / SHOWN_POINTS))
         shown = newest.p[-round(SHOWN_S * rate_hz) :][::-1][::step][::-1]

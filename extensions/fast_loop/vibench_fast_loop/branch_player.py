@@ -84,7 +84,7 @@ class BranchPlayer:
         level = 2 * abs(setting.reference_v[0]) / self._most_vpp
         return ProgramTone(setting.frequency_hz, min(float(level), 1.0), program)
 
-    def looked(
+    def measure(
         self, setting: LoopSetting, level_m: float
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
         """Play a setting and average until the noise is low enough."""
@@ -92,29 +92,29 @@ class BranchPlayer:
         look_s = self.plan.look_periods / frequency_hz
         samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
         self._blocks = list(samples.coefficients)[-max(2, self.plan.look_periods // _BLOCK_PERIODS) :]
-        look, squares, degrees = self._averaged(frequency_hz)
+        look, squares, degrees = self._average(frequency_hz)
         for _ in range(_MOST_LOOKS - 1):
             if _is_known(look, level_m, self.plan):
                 break
             samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
             self._blocks += samples.coefficients
-            look, squares, degrees = self._averaged(frequency_hz)
+            look, squares, degrees = self._average(frequency_hz)
         self._squares = _REMEMBERED * (self._squares + squares)
         self._degrees = _REMEMBERED * (self._degrees + degrees)
         acceleration = abs(look.base_m[0]) * (2 * pi * frequency_hz) ** 2
         require_answer(self.fast.rig, frequency_hz, 2 * abs(setting.reference_v[0]) * 0.1, acceleration)
         return look
 
-    def recorded(
+    def record(
         self, setting: LoopSetting, segment: Segment
     ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
         """Record the current setting, and average over the recording and the preceding measurement."""
         tone = self.tone(setting)
         samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
         self._blocks += samples.coefficients
-        return self._averaged(setting.frequency_hz)[0]
+        return self._average(setting.frequency_hz)[0]
 
-    def _averaged(self, frequency_hz: float) -> tuple[LoopLook, Vector, int]:
+    def _average(self, frequency_hz: float) -> tuple[LoopLook, Vector, int]:
         base, m0 = self.fast.motions(self._blocks, frequency_hz)
         seen = _settled_part(np.hstack([base, m0]))
         mean, degrees = seen.mean(axis=0), len(seen) - 1

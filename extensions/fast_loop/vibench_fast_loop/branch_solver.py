@@ -37,7 +37,7 @@ class LoopSetting:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class MeasuredPoint:
     """A setting and its measured response, as numbers of the equations."""
 
     unknowns: Vector
@@ -55,7 +55,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Foreseen:
+class PredictedPoint:
     """Prediction of the next point."""
 
     unknowns: Vector
@@ -100,15 +100,15 @@ class BranchSolver:
             turn = gains[k] / abs(gains[k])
             rows, columns = slice(2 * k - 1, 2 * k + 1), slice(2 * k, 2 * k + 2)
             self._slope[rows, columns] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
-        self._last: Seen | None = None
-        self._begin = self._packed(start)
+        self._last: MeasuredPoint | None = None
+        self._begin = self._unknowns(start)
 
-    def first(self) -> Foreseen:
+    def first(self) -> PredictedPoint:
         """Return the first prediction, whose frequency is fixed."""
         along = np.array([1.0, 0.0, 0.0])
-        return Foreseen(self._begin, along * self._begin[0], along, 0.0)
+        return PredictedPoint(self._begin, along * self._begin[0], along, 0.0)
 
-    def next(self, points: Sequence[Seen], length: float, way: float) -> Foreseen:
+    def next(self, points: Sequence[MeasuredPoint], length: float, way: float) -> PredictedPoint:
         """Return a prediction at a distance ``length``; ``way`` is the initial direction in frequency."""
         here = points[-1]
         if len(points) == 1:
@@ -120,7 +120,7 @@ class BranchSolver:
             chord = here.place - behind.place
             along = chord / np.linalg.norm(chord)
             moved = (here.unknowns - behind.unknowns) / np.linalg.norm(chord)
-        return Foreseen(here.unknowns + length * moved, here.place + length * along, along, length)
+        return PredictedPoint(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
         """Return the setting of these unknowns."""
@@ -130,18 +130,18 @@ class BranchSolver:
             float(unknowns[0]) * self._step_hz, np.concatenate([[volts], rest]).astype(np.complex128)
         )
 
-    def learn(self, seen: Seen) -> None:
+    def learn(self, point: MeasuredPoint) -> None:
         """Update the derivative with a measurement."""
         if self._last is not None:
-            moved = seen.unknowns - self._last.unknowns
-            changed = _outputs(seen) - _outputs(self._last)
+            moved = point.unknowns - self._last.unknowns
+            changed = _outputs(point) - _outputs(self._last)
             length = float(moved @ moved)
             if length > _LEARNT**2:
-                told = length + (np.hypot(seen.noise, self._last.noise) / _DOUBTED) ** 2
+                told = length + (np.hypot(point.noise, self._last.noise) / _DOUBTED) ** 2
                 self._slope += np.outer((changed - self._slope @ moved) / told, moved)
-        self._last = seen
+        self._last = point
 
-    def probe(self, column: int, here: Seen, beside: Seen) -> None:
+    def probe(self, column: int, here: MeasuredPoint, beside: MeasuredPoint) -> None:
         """Update the column of one unknown from two measurements."""
         moved = beside.unknowns[column] - here.unknowns[column]
         found = (_outputs(beside) - _outputs(here)) / moved
@@ -151,28 +151,28 @@ class BranchSolver:
         self._slope[:, column] += (found - believed) * doubt**2 / (doubt**2 + noise**2)
         self._last = beside
 
-    def corrected(self, seen: Seen, foreseen: Foreseen) -> Vector:
+    def correct(self, point: MeasuredPoint, predicted: PredictedPoint) -> Vector:
         """Return the next iterate, in the plane through the prediction perpendicular to the arc."""
-        along = foreseen.along
+        along = predicted.along
         row = along[1:] @ self._slope[-_RATIO:]
         row[0] += along[0]
         table = np.vstack([self._slope[:-_RATIO], row])
-        wanted = -np.append(seen.residual, along @ (seen.place - foreseen.place))
+        wanted = -np.append(point.residual, along @ (point.place - predicted.place))
         step = np.linalg.lstsq(table, wanted, rcond=1e-3)[0]
         length = float(np.hypot(*step[:2]))
-        return np.asarray(seen.unknowns + step * min(1.0, 1.0 / max(length, 1e-12)))
+        return np.asarray(point.unknowns + step * min(1.0, 1.0 / max(length, 1e-12)))
 
-    def _packed(self, setting: LoopSetting) -> Vector:
+    def _unknowns(self, setting: LoopSetting) -> Vector:
         rest = setting.reference_v[1:] / self._volts[1:]
         parts = np.column_stack([rest.real, rest.imag]).ravel()
         first = np.log(setting.reference_v[0].real / self._volts[0]) / _REFERENCE_STEP
         return np.concatenate([[setting.frequency_hz / self._step_hz, first], parts])
 
 
-def is_new(seen: Seen, foreseen: Foreseen) -> bool:
+def is_new(point: MeasuredPoint, predicted: PredictedPoint) -> bool:
     """Return whether a point is far enough from the last one, in forward direction."""
-    short = float(foreseen.along @ (foreseen.place - seen.place))
-    return foreseen.length == 0.0 or short <= (1 - _NEW) * foreseen.length
+    short = float(predicted.along @ (predicted.place - point.place))
+    return predicted.length == 0.0 or short <= (1 - _NEW) * predicted.length
 
 
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:
@@ -194,7 +194,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 
-def _behind(points: Sequence[Seen]) -> Seen:
+def _behind(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
     """Return the latest point far enough from the last one to define a direction, else the first."""
     here = points[-1]
     for there in reversed(points[1:-1]):
@@ -204,5 +204,5 @@ def _behind(points: Sequence[Seen]) -> Seen:
     return points[0]
 
 
-def _outputs(seen: Seen) -> Vector:
-    return np.append(seen.residual, seen.place[1:])
+def _outputs(point: MeasuredPoint) -> Vector:
+    return np.append(point.residual, point.place[1:])

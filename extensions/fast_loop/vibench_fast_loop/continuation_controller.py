@@ -28,9 +28,9 @@ from .branch_player import BranchPlayer, LoopLook
 from .branch_solver import (
     BranchSolver,
     Coefficients,
-    Foreseen,
     LoopSetting,
-    Seen,
+    MeasuredPoint,
+    PredictedPoint,
     Vector,
     is_new,
     noise_of,
@@ -103,7 +103,7 @@ def _branch(loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> Control
 def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[int, BranchEnd]]:
     plan = player.plan
     way = 1.0 if plan.begin == "up" else -1.0
-    points: list[Seen] = []
+    points: list[MeasuredPoint] = []
     length, failed = 1.0, 0
     found = yield from _first_motion(player, solver)
     while True:
@@ -128,22 +128,22 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
         found = yield from _correct(player, solver, solver.next(points, length, way))
 
 
-def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
+def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[MeasuredPoint, int] | None]:
     """Increase the drive until the base has its level; return the first motion reached from rest."""
-    foreseen = solver.first()
-    unknowns = foreseen.unknowns.copy()
+    predicted = solver.first()
+    unknowns = predicted.unknowns.copy()
     above = player.plan.begin_from == "above"
     unknowns[1] += _ABOVE if above else -_BELOW
     slope, before, most = _SLOPES[0], None, _LOWERED if above else 1.0
     for tries in range(1, _FIRST_TRIES + 1):
-        seen: Seen = yield from _look_at(player, solver, unknowns)
+        seen: MeasuredPoint = yield from _look_at(player, solver, unknowns)
         wrong = float(seen.residual[0])
         if _is_sine(seen.residual, player.plan.tolerance):
             return seen, tries
         if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _TOLD:
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
-        before, unknowns = seen, solver.corrected(harmonics, foreseen)
+        before, unknowns = seen, solver.correct(harmonics, predicted)
         # Use a secant here: nonzero harmonics change the level too, so that no bracket stays valid.
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
@@ -152,10 +152,10 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
         return None
     # Level and harmonics interact, and converge slowly if the derivative stems from joint changes only.
     yield from _probe(player, solver, seen, len(seen.unknowns))
-    return (yield from _correct(player, solver, replace(foreseen, unknowns=seen.unknowns)))
+    return (yield from _correct(player, solver, replace(predicted, unknowns=seen.unknowns)))
 
 
-def _probe(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
+def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
     """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
     The derivatives of frequency and first coefficient change most. Those of the harmonics come from joint
@@ -170,24 +170,24 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int)
 
 
 def _correct(
-    player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen
-) -> Controller[tuple[Seen, int] | None]:
+    player: BranchPlayer, solver: BranchSolver, predicted: PredictedPoint
+) -> Controller[tuple[MeasuredPoint, int] | None]:
     """Find the point of the branch near a prediction; return it and the number of tries."""
-    unknowns = foreseen.unknowns
+    unknowns = predicted.unknowns
     for tries in range(1, _MOST_TRIES + 1):
         seen = yield from _look_at(player, solver, unknowns)
-        if _is_sine(seen.residual, player.plan.tolerance) and is_new(seen, foreseen):
+        if _is_sine(seen.residual, player.plan.tolerance) and is_new(seen, predicted):
             return seen, tries
-        unknowns = solver.corrected(seen, foreseen)
+        unknowns = solver.correct(seen, predicted)
     return None
 
 
-def _look_at(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
+def _look_at(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[MeasuredPoint]:
     plan, setting = player.plan, solver.setting(unknowns)
     level_m = level_at(plan, setting.frequency_hz)
-    look = yield from player.looked(setting, level_m)
+    look = yield from player.measure(setting, level_m)
     residual = residual_of(look.base_m[: plan.harmonics], level_m)
-    seen = Seen(
+    seen = MeasuredPoint(
         unknowns, residual, look.ratio, noise_of(look.base_u[: plan.harmonics] / level_m, look.ratio_u)
     )
     solver.learn(seen)
@@ -197,7 +197,7 @@ def _look_at(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Co
 def _record(
     loop: SineLoop, player: BranchPlayer, setting: LoopSetting, number: int, tries: int
 ) -> Controller[None]:
-    look = yield from player.recorded(setting, player.plan.segment(number, setting.frequency_hz))
+    look = yield from player.record(setting, player.plan.segment(number, setting.frequency_hz))
     orders = np.arange(2, len(look.base_m) + 1)
     share = np.abs(look.base_m[1:] / look.base_m[0])
     loop.note(
@@ -250,14 +250,14 @@ def perturbed_stability(
     count = plan.perturbed_periods // (2 * _EACH)
     changes = _changes(count, number)
     first_v = _FIRST_SIZE * abs(setting.reference_v[0])
-    told = yield from _play_changes(player, setting, first_v * changes[:_TRIAL], None)
-    seen = max(envelope_deviation(each, period) for each in _join(told, channels))
+    phases = yield from _play_changes(player, setting, first_v * changes[:_TRIAL], None)
+    seen = max(envelope_deviation(each, period) for each in _join(phases, channels))
     size_v = first_v * min(plan.perturbation / max(seen, _NEVER), _MOST_SIZE / _FIRST_SIZE)
     segment = plan.perturbed(number, frequency_hz, size_v)
     course = np.concatenate([-changes[-_LEAD:], changes, -changes, np.zeros((1, len(_CHANGED)))])
-    told = yield from _play_changes(player, setting, size_v * course, segment)
-    after = yield from player.looked(setting, abs(before.base_m[0]))
-    return stability_note(_fit(told, channels, period, count), number, plan.perturbation, before, after)
+    phases = yield from _play_changes(player, setting, size_v * course, segment)
+    after = yield from player.measure(setting, abs(before.base_m[0]))
+    return stability_note(_fit(phases, channels, period, count), number, plan.perturbation, before, after)
 
 
 def _changes(count: int, seed: int) -> Coefficients:
@@ -270,30 +270,30 @@ def _play_changes(
     player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
 ) -> Controller[list[PhaseSamples]]:
     """Play the changes one after another, connected by half cosines."""
-    told = []
+    phases = []
     state = RunState.SETTLING if segment is None else RunState.RECORDING
     length_s = _EACH / setting.frequency_hz
     for change in course:
         volts = setting.reference_v.copy()
         volts[list(_CHANGED)] += change
         tone = player.tone(LoopSetting(setting.frequency_hz, volts), length_s)
-        told.append((yield from player.run(Phase(state, tone, length_s, segment))))
-    return told
+        phases.append((yield from player.run(Phase(state, tone, length_s, segment))))
+    return phases
 
 
-def _join(told: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
+def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
     """Join base and m0 of all phases."""
-    rows = [channels.rows(each) for each in told]
+    rows = [channels.rows(each) for each in phases]
     return np.concatenate([base for _, base, _ in rows]), np.concatenate([m0 for _, _, m0 in rows])
 
 
 def _fit(
-    told: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
+    phases: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
     """Fit the recorded motion; undetermined if samples between phases are missing (a held run)."""
-    if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(told)):
+    if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(phases)):
         return OpenLoopMultiplier(nan, nan)
-    base, m0 = _join(told, channels)
+    base, m0 = _join(phases, channels)
     return open_loop_multiplier(
         PerturbedMotion(base, m0, period, round(_LEAD * _EACH * period), count * _EACH)
     )

@@ -106,7 +106,7 @@ def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights())
     return law(np.asarray(fmin(cost, start[0], xtol=1e-3, ftol=1e-12, initial_simplex=start, disp=False)))
 
 
-class _Weighed(NamedTuple):
+class _WeightedPlant(NamedTuple):
     """A plant scaled to the sizes of its motions, with the cost matrices."""
 
     step: Table
@@ -117,7 +117,7 @@ class _Weighed(NamedTuple):
     noise: Table
 
 
-def _weigh(plant: SampledPlant, weights: LawWeights) -> _Weighed:
+def _weigh(plant: SampledPlant, weights: LawWeights) -> _WeightedPlant:
     scale = plant.scales
     step, volt = plant.step
     step = step * scale / scale[:, None]
@@ -130,10 +130,10 @@ def _weigh(plant: SampledPlant, weights: LawWeights) -> _Weighed:
     pushed = step @ into * plant.timing.step_s
     unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
     noise = np.diag([weights.acceleration**2, weights.velocity**2])
-    return _Weighed(step, volt, plant.shown * scale, cost, unknown, noise)
+    return _WeightedPlant(step, volt, plant.shown * scale, cost, unknown, noise)
 
 
-def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
+def _expected_cost(problem: _WeightedPlant, law: LinearLaw) -> float:
     """Return the mean cost per sample under noise; infinite for an unstable loop."""
     answer = np.hstack([law.direct @ problem.shown, law.output])[0]
     own = len(problem.step)

@@ -26,7 +26,7 @@ class LineController:
         self._link = link
         self._config = config
         self._is_open = True
-        self.facts = self._asked(LoopRequest(ask="hello"), LoopFacts)
+        self.facts = self._request(LoopRequest(ask="hello"), LoopFacts)
         """Rate, latency, limit and watchdog."""
 
     @classmethod
@@ -62,15 +62,15 @@ class LineController:
 
     def play(self, program: LoopProgram) -> LoopReport:
         """Change to a program."""
-        return self._asked(LoopRequest(ask="play", program=program), LoopReport)
+        return self._request(LoopRequest(ask="play", program=program), LoopReport)
 
     def report(self) -> LoopReport:
         """Return the blocks measured since the last report."""
-        return self._asked(LoopRequest(ask="report"), LoopReport)
+        return self._request(LoopRequest(ask="report"), LoopReport)
 
     def silence(self, ramp_s: float) -> LoopReport:
         """Ramp down to silence."""
-        return self._asked(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
+        return self._request(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
 
     def close(self) -> None:
         """Silence the output and close the connection; if it is lost, the watchdog silences the output."""
@@ -81,7 +81,7 @@ class LineController:
                 self._is_open = False
                 self._link.close()
 
-    def _asked(self, request: LoopRequest, kind: type[Answer]) -> Answer:
+    def _request(self, request: LoopRequest, kind: type[Answer]) -> Answer:
         where = self._config.resource
         if not self._is_open:
             raise InstrumentError(

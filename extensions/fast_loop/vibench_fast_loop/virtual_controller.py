@@ -109,10 +109,10 @@ class VirtualController:
         else:
             with self._turn:
                 self._now["unheard"] = 0.0
-                answer = self._answered(request)
+                answer = self._execute_request(request)
         return Reply(answer.encode() + b"\n")
 
-    def _answered(self, request: LoopRequest) -> str:
+    def _execute_request(self, request: LoopRequest) -> str:
         match request:
             case LoopRequest(ask="hello"):
                 return self.facts.model_dump_json()

@@ -29,7 +29,7 @@ from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.branch_player import LoopLook
-from vibench_fast_loop.branch_solver import BranchSolver, LoopSetting, Seen, is_new
+from vibench_fast_loop.branch_solver import BranchSolver, LoopSetting, MeasuredPoint, is_new
 from vibench_fast_loop.continuation_controller import stability_note
 from vibench_fast_loop.fast_loop import fast_loop, impact_branch, require_held
 from vibench_fast_loop.open_loop_multiplier import (
@@ -103,7 +103,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
 
     def seen(unknowns):
         found, ratio = hardening_resonator(solver.setting(unknowns))
-        one = Seen(unknowns, np.array([found / level - 1]), ratio, np.zeros(3))
+        one = MeasuredPoint(unknowns, np.array([found / level - 1]), ratio, np.zeros(3))
         solver.learn(one)
         return one
 
@@ -112,7 +112,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
         for _ in range(12):
             if abs(one.residual[0]) < 2e-3 and is_new(one, foreseen):
                 return one
-            one = seen(solver.corrected(one, foreseen))
+            one = seen(solver.correct(one, foreseen))
         return None
 
     points, length = [corrected(solver.first())], 1.0
@@ -146,7 +146,7 @@ def test_points_that_lie_within_their_noise_of_each_other_give_no_direction():
         radius, close, noise = rng.uniform(3, 10), rng.uniform(0.005, 0.05), rng.uniform(2e-3, 0.02)
         turns = rng.uniform(0, 2 * np.pi) + np.array([-2.0, -1.5, -1.0, -0.5, 0.0, close]) / radius
         points = [
-            Seen(
+            MeasuredPoint(
                 np.array([radius * np.cos(turn), 0.1 * turn]),
                 np.zeros(1),
                 complex(radius * np.sin(turn), 0.5 * turn) + noise * complex(*rng.standard_normal(2)),

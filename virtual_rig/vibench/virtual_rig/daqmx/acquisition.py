@@ -137,7 +137,7 @@ class Acquisition:
         self.total = total if reference is None else math.inf
         self.acquired = 0
         self.position = 0
-        self.asked_at = -1
+        self.queried_at = -1
         """Read position at the last query of available samples."""
         self.failure: DaqmxRefusal | None = None
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
@@ -168,7 +168,7 @@ class Acquisition:
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     @property
-    def passed(self) -> int:
+    def transferred(self) -> int:
         """Number of samples per channel stored so far."""
         return self.acquired
 
@@ -177,7 +177,7 @@ class Acquisition:
         """Number of samples per channel read by the program."""
         return self.position
 
-    def listened_until_s(self, count: int) -> float:
+    def listener_due_s(self, count: int) -> float:
         """Return the rig time at which a listener expects ``count`` samples [s]."""
         return self.time_of(count)
 

@@ -134,7 +134,7 @@ def _running_acquisition(task: Task) -> Acquisition:
     return task.acquisition
 
 
-def _overloads_exist(task: Task) -> bool:
+def _has_overloads(task: Task) -> bool:
     acquisition = _running_acquisition(task)
     acquisition.look_for_overloads()
     return bool(acquisition.overloaded.any())
@@ -217,7 +217,7 @@ READ: Attributes = {
     "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
     "0x31E8": Attribute(default_samples),  # unnamed in the protocol: number of samples for "all"
-    "OVERLOADED_CHANS_EXIST": Attribute(_overloads_exist),
+    "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }
 WRITE: Attributes = {

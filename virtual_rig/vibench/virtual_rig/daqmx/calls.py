@@ -363,9 +363,9 @@ class _Subscription:
             if self._rig.pace.overflow is Overflow.GROW:
                 self._wait(_BY_OTHERS, lambda: stream.used >= announced or self._is_over(stream))
             self._wait(
-                stream.listened_until_s(count), lambda: stream.passed >= count or self._is_over(stream)
+                stream.listener_due_s(count), lambda: stream.transferred >= count or self._is_over(stream)
             )
-            return stream.passed >= count and not self._has_gone
+            return stream.transferred >= count and not self._has_gone
 
     def _is_over(self, stream: Stream) -> bool:
         return stream.is_done or self._task.stream is not stream

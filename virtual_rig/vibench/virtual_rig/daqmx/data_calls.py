@@ -102,9 +102,9 @@ def newest(task: Task) -> int:
 def count_available(task: Task) -> int:
     """Return the number of unread samples; on demand, only repeated queries without a read advance time."""
     acquisition = task.acquisition
-    if acquisition is None or acquisition.asked_at == acquisition.position:
+    if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
-    acquisition.asked_at = acquisition.position
+    acquisition.queried_at = acquisition.position
     return min(acquisition.available, acquisition.buffer_size)
 
 

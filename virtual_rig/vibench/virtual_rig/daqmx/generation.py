@@ -70,7 +70,7 @@ class Generation:
         self.began_s = began_s
         self.total = total
         self.buffer = buffer
-        self.handed_over = 0
+        self.delivered = 0
         self.generated = 0
         self.failure: DaqmxRefusal | None = None
         self._world = world
@@ -94,7 +94,7 @@ class Generation:
         """Samples per channel that can be written now; a repeated buffer can always be rewritten."""
         if self._repeats:
             return self.buffer.size
-        self._fetch(self.handed_over + self._most_in_memory)
+        self._fetch(self.delivered + self._most_in_memory)
         return self.buffer.size - (self.buffer.written - self._fetched)
 
     def time_of_room(self, samples: int) -> float:
@@ -112,7 +112,7 @@ class Generation:
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     @property
-    def passed(self) -> int:
+    def transferred(self) -> int:
         """Number of samples per channel that have left the buffer."""
         return self.generated
 
@@ -121,7 +121,7 @@ class Generation:
         """Infinite, because a listener waits for no reader."""
         return math.inf
 
-    def listened_until_s(self, count: int) -> float:  # noqa: ARG002 - see below
+    def listener_due_s(self, count: int) -> float:  # noqa: ARG002 - see below
         """Return infinity, because a listener to a repeated buffer must not advance time."""
         return math.inf
 
@@ -130,14 +130,14 @@ class Generation:
         if not self._is_open:
             return
         wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)
-        count = int(min(wanted, self.total, self._end)) - self.handed_over
+        count = int(min(wanted, self.total, self._end)) - self.delivered
         if count <= 0:
             return
-        self._fetch(self.handed_over + count)
+        self._fetch(self.delivered + count)
         block, self._memory = self._memory[:, :count], self._memory[:, count:]
         for output, volts in zip(self._outputs, block, strict=True):
             self._world.play(output, volts, self.rate_hz)
-        self.handed_over += count
+        self.delivered += count
         kept = math.ceil(LEAD_S * self.rate_hz) + 1
         self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
 
@@ -157,8 +157,8 @@ class Generation:
         if not self._is_open:
             return
         due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
-        self.generated = int(min(due, self.total, self.handed_over))
-        if due > self.handed_over and self.handed_over < self.total:
+        self.generated = int(min(due, self.total, self.delivered))
+        if due > self.delivered and self.delivered < self.total:
             self.failure = DaqmxRefusal(
                 DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, samples_written=0
             )
@@ -175,6 +175,6 @@ class Generation:
         for output in self._outputs:
             self._world.silence(output)
         if self._idle is Idle.HOLD and self.generated:
-            last = max(0, self._recent.shape[1] - 1 - (self.handed_over - self.generated))
+            last = max(0, self._recent.shape[1] - 1 - (self.delivered - self.generated))
             for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
                 self._world.play(output, volts, self.rate_hz)

@@ -168,7 +168,7 @@ class Pace(Protocol):
     def answer_progress(self, rig: "Rig") -> None:
         """Ensure that a query of progress returns something newer than the one before."""
 
-    def stumble(self, rig: "Rig") -> None:
+    def delay_retry(self, rig: "Rig") -> None:
         """Advance time before a failed call on demand is repeated."""
 
 
@@ -200,7 +200,7 @@ class OnDemandPace:
         """Advance by ``QUESTION_S``."""
         rig.advance_to(rig.now_s + QUESTION_S)
 
-    def stumble(self, rig: "Rig") -> None:
+    def delay_retry(self, rig: "Rig") -> None:
         """Advance by ``FAILED_CALL_S``."""
         rig.advance_to(rig.now_s + FAILED_CALL_S)
 
@@ -246,7 +246,7 @@ class WallPace:
         """Advance the rig to the clock."""
         self._step(rig)
 
-    def stumble(self, rig: "Rig") -> None:
+    def delay_retry(self, rig: "Rig") -> None:
         """Advance the rig to the clock."""
         self._step(rig)
 

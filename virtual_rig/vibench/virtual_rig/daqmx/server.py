@@ -204,7 +204,7 @@ class DaqServer:
             self.faults.check(name, self._rig.now_s)
         except DaqmxRefusal:  # a missing server does not advance time
             if name in self._refused:
-                self._pace.stumble(self._rig)
+                self._pace.delay_retry(self._rig)
             self._refused.add(name)
             raise
         self._refused.discard(name)

@@ -292,11 +292,11 @@ class Timeline:
         """Return unit noise that depends only on the seed and the sample number."""
         begin, self._noise_index = self._noise_index, self._noise_index + count
         blocks = range(begin // NOISE_BLOCK, (self._noise_index - 1) // NOISE_BLOCK + 1)
-        drawn = np.concatenate([self._drawn(block) for block in blocks])
+        drawn = np.concatenate([self._draw(block) for block in blocks])
         skip = begin - blocks[0] * NOISE_BLOCK
         return drawn[skip : skip + count]
 
-    def _drawn(self, block: int) -> Samples:
+    def _draw(self, block: int) -> Samples:
         """Return a block of unit noise; the last one is cached."""
         if self._noise_block[0] != block:
             generator = np.random.default_rng((self.terminal.seed, block))

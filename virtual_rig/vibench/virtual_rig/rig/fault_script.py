@@ -426,9 +426,9 @@ class FaultPlay:
     def begin(self, script: FaultScript) -> None:
         """Schedule every fault of the script."""
         for fault in script.faults:
-            self.world.at(fault.at_s, lambda fault=fault: self._befall(fault))  # type: ignore[misc]
+            self.world.at(fault.at_s, lambda fault=fault: self._start(fault))  # type: ignore[misc]
 
-    def _befall(self, fault: FaultKind) -> None:
+    def _start(self, fault: FaultKind) -> None:
         heal = fault.begin(self.rig)
         self.played.append(PlayedFault(fault.fault, self.world.time_s))
         if fault.for_s is not None:

@@ -113,34 +113,34 @@ class VirtualRig:
     @property
     def daq_address(self) -> str:
         """``"host:port"`` of the DAQ server, which also serves the generator's USB cable."""
-        return self._switched_on.daq.address
+        return self._running_state.daq.address
 
     @property
     def socket_resource(self) -> str:
         """VISA name of the generator for programs without access to the simulated USB bus."""
-        return self._switched_on.socket.resource_name
+        return self._running_state.socket.resource_name
 
     @property
     def controller_resource(self) -> str:
         """VISA name of the real-time controller's socket; empty without one."""
-        socket = self._switched_on.controller
+        socket = self._running_state.controller
         return "" if socket is None else socket.resource_name
 
     @property
     def faults(self) -> RigFaults:
         """Faults on demand."""
-        return self._switched_on.play.rig
+        return self._running_state.play.rig
 
     @property
     def played_faults(self) -> tuple[PlayedFault, ...]:
         """Faults of the configuration's script that have started."""
-        return tuple(self._switched_on.play.played)
+        return tuple(self._running_state.play.played)
 
     def let_pass(self, duration_s: float) -> None:
         """Advance rig time without sampling; a rig in real time advances by itself."""
         match self._pace:
             case OnDemandPace():
-                self._switched_on.daq.let_pass(duration_s)
+                self._running_state.daq.let_pass(duration_s)
 
     def __enter__(self) -> Self:
         """Switch everything on; after an error, everything is off."""
@@ -185,7 +185,7 @@ class VirtualRig:
         )
 
     @property
-    def _switched_on(self) -> "_Running":
+    def _running_state(self) -> "_Running":
         if self._running is None:
             raise AcquisitionError(
                 "The virtual rig is switched off: enter it with 'with VirtualRig(rig) as ...'"
