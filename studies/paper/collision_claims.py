@@ -64,7 +64,9 @@ def ii_below_i(r: Reading) -> Values:
 
 
 @claim(
-    "section 3.1, Fig. 5(a)", "Share of the frequencies at which it is, at 5 µm.", at_least("share", "%", 1.0)
+    "section 3.1, Fig. 5(a)",
+    "Share of the frequencies with a larger Response I, at 5 µm.",
+    at_least("share", "%", 1.0),
 )
 def damping_lowers_i(r: Reading) -> Values:
     """Without damping Response I is larger at all frequencies."""

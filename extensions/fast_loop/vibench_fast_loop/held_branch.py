@@ -111,8 +111,10 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
         told.append(f"The branch turned at {turns} Hz.")
     if any(found.stability):
         counts = ", ".join(f"{found.stability.count(each.value)} {each.value}" for each in Stability)
-        told.append(f"Without feedback they would be: {counts}, by small changes of what was played.")
-    told.extend(f"It was left because {each.end.value}." for each in ends)
+        told.append(
+            f"Without feedback they would be: {counts}, measured with small perturbations of the drive."
+        )
+    told.extend(f"It ended because {each.end.value}." for each in ends)
     return tuple(told)
 
 
@@ -165,7 +167,7 @@ def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, 
     back = np.zeros(found.frequency_hz.size, dtype=bool)
     for first, last in zip(found.folds[::2], found.folds[1::2], strict=False):
         back[first + 1 : last] = True
-    return ("held", ~back, filled), ("held, on the way back", back, empty)
+    return ("held", ~back, filled), ("held, after a fold", back, empty)
 
 
 def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:

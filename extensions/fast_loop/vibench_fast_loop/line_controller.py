@@ -85,7 +85,7 @@ class LineController:
         where = self._config.resource
         if not self._is_open:
             raise InstrumentError(
-                f"the connection to the real-time controller at {where} was closed, and it was told to "
+                f"the connection to the real-time controller at {where} was closed during the request "
                 f"{request.ask}. It is silent; open the bench again"
             )
         try:
@@ -94,7 +94,7 @@ class LineController:
         except (VisaIOError, OSError) as error:
             raise InstrumentLost(
                 f"the real-time controller at {where} does not answer ({error}). It falls silent by itself "
-                f"after {self._config.watchdog_s:g} s; look at its power and its network"
+                f"after {self._config.watchdog_s:g} s; check its power and its network"
             ) from error
         try:
             told = json.loads(line)

@@ -58,7 +58,7 @@ def bench_on(connected):
 
 def passes(virtual, duration_s):
     """Let rig time pass, with everything that still runs."""
-    rig = virtual._switched_on.daq._rig
+    rig = virtual._running_state.daq._rig
     with rig.changed:
         rig.advance_to(rig.now_s + duration_s)
 

@@ -74,7 +74,7 @@ def test_peaks_stand_in_the_table_with_their_damping(laid):
 def test_the_second_curve_is_compared_with_the_first(laid):
     curve, reference = laid.pair_box.pair()
     assert (curve.source, reference.source) == ("half", "one")
-    assert laid.pair_box.said.startswith("Median 6 dB")
+    assert laid.pair_box.summary.startswith("Median 6 dB")
     (line,) = laid.plots.differences.getPlotItem().listDataItems()
     frequency_hz, decibel = line.getOriginalDataset()
     assert np.median(decibel) == pytest.approx(-6.02, abs=0.02)
@@ -134,7 +134,7 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
     for name, factor in (("twice", 2.0), ("thrice", 3.0)):
         curve = by_name[f"{name}, transmission, measured"]
         assert np.median(curve.magnitude) == pytest.approx(factor, rel=0.01)
-    assert working.pair_box.said.startswith("Median 3.5 dB")
+    assert working.pair_box.summary.startswith("Median 3.5 dB")
     working.add_prediction((mode("model"),))
     for ending in ("svg", "csv", "html"):
         working.export_to(tmp_path / f"out.{ending}")
@@ -185,7 +185,7 @@ def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_told(page):
     page.pair_box._curve.setCurrentText(progress.curves()[0].name)
     measured = curves["sweep", CurveOrigin.MEASURED, CurveKind.RESPONSE_I]
     page.pair_box._reference.setCurrentText(measured.name)
-    assert "5 µm and as driven" in page.pair_box.said
+    assert "5 µm and as driven" in page.pair_box.summary
 
 
 def test_what_begins_or_ends_moves_nothing_on_the_left(page, qapp):

@@ -46,7 +46,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
     assert page.picture.classes.shape == (5, 7)
     assert 0 <= page.picture.classes.min() <= page.picture.classes.max() < len(MOTION_CLASSES)
     assert page.map.image.image.shape == (5, 7, 4)
-    assert "points computed" in page.said
+    assert "points computed" in page.summary
     page.quantity.setCurrentText("Response I")
     before = page.map.image.image.copy()
     page.refresh()
@@ -77,9 +77,9 @@ def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
     QTest.mouseClick(
         page.map.plot.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(round(place.x()), round(place.y()))
     )
-    assert page.motion.said.text() == "Following the motion…"
-    waited(lambda: "from rest" in page.motion.said.text(), 100.0)
-    assert page.motion.said.text().startswith("120")
+    assert page.motion.caption.text() == "Following the motion…"
+    waited(lambda: "from rest" in page.motion.caption.text(), 100.0)
+    assert page.motion.caption.text().startswith("120")
     assert all(len(curve.getOriginalDataset()[0]) > 10 for curve in page.motion.curves)
     page._open.click()
     assert wanted[0] == pytest.approx((120.0, 1e-5), rel=0.05)

@@ -53,7 +53,7 @@ def is_empty(curve):
 
 def test_p_ends_at_the_newest_sample_between_the_stops(picture):
     picture.show_status(status())
-    time_s, p = picture.told.getData()
+    time_s, p = picture.tracked.getData()
     assert time_s[-1] == 0.0
     assert np.diff(time_s) == pytest.approx(np.full(299, STEP_S))
     assert p == pytest.approx(np.array(P_M))
@@ -77,7 +77,7 @@ def test_what_was_not_followed_is_a_hole_and_a_lost_track_is_said(picture):
     picture.show_status(
         status(state="lost", sentence="the motion does not fit", p_m=lost, forecast_m=(), forecast_error_m=())
     )
-    assert np.isnan(picture.told.getData()[1]).sum() == 200
+    assert np.isnan(picture.tracked.getData()[1]).sum() == 200
     assert picture.caption.text().startswith("lost · the motion does not fit")
     assert all(is_empty(curve) for curve in picture.forecast)
 
@@ -85,7 +85,7 @@ def test_what_was_not_followed_is_a_hole_and_a_lost_track_is_said(picture):
 def test_without_a_twin_nothing_is_shown(picture):
     picture.show_status(status())
     picture.show_status(EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED))
-    assert is_empty(picture.told)
+    assert is_empty(picture.tracked)
     assert picture.caption.text() == "The live twin is off."
 
 

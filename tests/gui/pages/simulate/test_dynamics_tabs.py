@@ -61,8 +61,8 @@ def test_branches_are_found_drawn_and_told_with_error_and_cost(page, waited):
     assert view.simulator.is_busy
     waited(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
-    assert view.said.startswith("Complete. 1 branches")
-    assert "of the fundamental of p" in view.said
+    assert view.summary.startswith("Complete. 1 branches")
+    assert "of the fundamental of p" in view.summary
     first, _ = view.picture.plots(Parameter.FREQUENCY)
     (drawn,) = lines(first)
     assert drawn.getOriginalDataset()[0][0] == pytest.approx(60.0)
@@ -116,7 +116,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
     assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
-    assert "2 chaotic; sums differ from the dampers'" in view.said
+    assert "2 chaotic; sums differ from the dampers'" in view.summary
     assert not view._compare.isEnabled()
 
 
@@ -127,8 +127,8 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
     asked(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
     waited(lambda: not view.simulator.is_busy, 280.0)
     page.refresh()
-    assert view.said.startswith("Complete. Gaps of the endless chain: 96.07 to 110.4 Hz")
-    assert "1 runs in" in view.said
+    assert view.summary.startswith("Complete. Gaps of the endless chain: 96.07 to 110.4 Hz")
+    assert "1 runs in" in view.summary
     (run,) = view.answer.runs
     across, motion, energies = view.picture.plots
     assert len(lines(across)) == 9  # three cells: without contact, driven, and a dot at the frequency
@@ -176,8 +176,8 @@ def test_while_a_tab_still_looks_it_says_so_and_gives_no_answer(page, name):
     """Branches said: no periodic motion was found; 0.0 s."""
     view = getattr(page, name)
     view.begin()
-    assert view.said.strip().startswith("Computing")
-    assert not re.search(r"[Nn]o |0\.0 s|not found", view.said)
+    assert view.summary.strip().startswith("Computing")
+    assert not re.search(r"[Nn]o |0\.0 s|not found", view.summary)
     view.cancel()
 
 

@@ -379,7 +379,7 @@ class PairBox(QGroupBox):
         form.addRow(self._summary)
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """The difference in words, or why there is none."""
         return self._summary.text()
 

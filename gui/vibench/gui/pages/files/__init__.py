@@ -1,4 +1,4 @@
-"""The Files page: recordings of a folder, listed and looked at.
+"""The Files page: recordings of a folder, as a list and as plots.
 
 A table with state and thumbnail of each recording, its channels over time at any zoom, and a
 spectrogram. Folders and overviews are read in another process.

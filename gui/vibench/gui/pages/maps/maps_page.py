@@ -154,25 +154,25 @@ class MotionView(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.said = SentenceLabel("A click on the map shows the motion there.")
-        self.said.setAccessibleName("The motion at the point that was clicked")
+        self.caption = SentenceLabel("A click on the map shows the motion there.")
+        self.caption.setAccessibleName("The motion at the point that was clicked")
         self.plots = (
             Plot("Motion of m1 between its stops", TIME, RELATIVE, theme),
             Plot("Portrait", DISPLACEMENT, RELATIVE, theme),
             Plot("Spectrum of m0", FREQUENCY, LINE, theme),
         )
         self.curves = tuple(plot.with_hint("No motion yet.").curve(curve_style(0)) for plot in self.plots)
-        fill_box(QVBoxLayout(self), self.said, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
+        fill_box(QVBoxLayout(self), self.caption, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
         """Clear the plots and show the reason."""
-        self.said.setText(why)
+        self.caption.setText(why)
         for curve in self.curves:
             curve.clear()
 
     def show_motion(self, motion: SettledMotion) -> None:
         """Draw a motion."""
-        self.said.setText(motion.said)
+        self.caption.setText(motion.said)
         shown = motion.time_s <= SHOWN_PERIODS / motion.frequency_hz
         is_low = (motion.line_hz > 0.0) & (motion.line_hz < HIGHEST_MULTIPLE * motion.frequency_hz)
         data = (
@@ -220,7 +220,7 @@ class MapsPage(Page):
         return self.picture is not None and not self.simulator.is_busy
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Text below the map."""
         return self._state.text()
 
@@ -290,7 +290,7 @@ class MapsPage(Page):
         asked = self._motion_wanted
         assert asked is not None
         self.map.mark(frequency_hz, amplitude_m)
-        self.motion.said.setText("Following the motion…")
+        self.motion.caption.setText("Following the motion…")
         self._open.setEnabled(True)
         self._validate()
         if self._job is not None:
@@ -316,7 +316,7 @@ class MapsPage(Page):
                     pass
 
     def _end(self) -> None:
-        self._show_text(self.said)
+        self._show_text(self.summary)
 
     def _die(self, what: str) -> None:
         self.context.say(

@@ -1,4 +1,4 @@
-"""The Rig page: which bench, is it there, is it well.
+"""The Rig page: select, open and check a bench.
 
 Select the hardware configuration, confirm knobs that no instrument reports, open the bench and check it.
 Findings are shown with units and prefixes.

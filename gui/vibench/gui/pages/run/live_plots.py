@@ -373,7 +373,7 @@ class HiddenMotionPlot(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.plot = Plot(self.title, _FROM_NEWEST, _BETWEEN_STOPS, theme).with_hint(_HINT)
-        self.told = self.plot.curve(curve_style(0))
+        self.tracked = self.plot.curve(curve_style(0))
         self.forecast = [
             self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
         ]
@@ -396,7 +396,7 @@ class HiddenMotionPlot(QWidget):
             return
         self._end = (twin.run_id, twin.end_sample)
         p = np.array([np.nan if each is None else each for each in twin.p_m])
-        self.told.setData((np.arange(p.size) - p.size + 1) * twin.step_s, p, connect="finite")
+        self.tracked.setData((np.arange(p.size) - p.size + 1) * twin.step_s, p, connect="finite")
         self._draw_forecast(twin)
         for line, place in zip(self._stops, twin.stops_m, strict=True):
             self.plot.move_level(line, place)
@@ -405,7 +405,7 @@ class HiddenMotionPlot(QWidget):
 
     def clear(self) -> None:
         """Clear the plot: there is no twin, or a new run begins."""
-        for curve in (self.told, *self.forecast):
+        for curve in (self.tracked, *self.forecast):
             curve.setData([], [])
         for line in self._stops:
             self.plot.move_level(line, nan)

@@ -90,7 +90,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._validate()
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """Text below the plots."""
         return self._state.text()
 
