@@ -49,7 +49,6 @@ class Case(FigureOptions):
     """k of a base amplitude proportional to f^-k: 0 constant displacement, 1 velocity, 2 acceleration."""
     sweep_goes: Direction = Direction.UP
     fit_m: float = FIT_M
-    """Indentation at which continuous models are fitted."""
     sum_model: str = "power:3+5+7"
     """The model n = 3+5+7 with the shares of its terms, which the paper does not give."""
     exponents_by: ExponentsBy = ExponentsBy.EXACT
@@ -143,7 +142,6 @@ class Option:
     about: str
     example: str
     field: str
-    """Field of the case."""
     read: Callable[[str], Any]
     label: Callable[[Any], str]
 
@@ -218,10 +216,7 @@ def case_with(options: FigureOptions, given: Sequence[str]) -> Case:
 
 
 def parse_option(text: str) -> Alternative:
-    """Parse NAME=VALUE.
-
-    Raises InvalidRequest for an unknown name or a value that is not allowed.
-    """
+    """Parse NAME=VALUE; raises InvalidRequest for an unknown name or a value that is not allowed."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name not in OPTIONS:
         forms = ", ".join(f"{key}={option.example}" for key, option in OPTIONS.items())

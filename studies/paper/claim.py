@@ -76,7 +76,6 @@ class Claim:
 
     key: str
     place: str
-    """Section or figure of the paper."""
     says: str
     measured_by: str
     """Method of measurement, in one sentence."""
@@ -126,13 +125,10 @@ class Verdict(StrEnum):
     """Verdict on a claim."""
 
     HOLDS = "holds"
-    """Holds under the defaults."""
     HOLDS_FOR_SHARE = "holds for a share of starts"
     """Holds under the defaults for some of the starts, which is a matter of chance."""
     HOLDS_UNDER = "holds under"
-    """Holds only under a named option."""
     FAILS = "does not hold"
-    """Holds under none of the options tested."""
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,7 @@ _WHAT = ("response_i", "response_ii")
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return the study with and without damping, at 5 and 7 um.
-
-    Raises InvalidRequest without damping.
-    """
+    """Return the study with and without damping, at 5 and 7 um; raises InvalidRequest without damping."""
     damped_s = options.only_damping_time_s
     if damped_s == 0.0:
         raise InvalidRequest("figure 5 compares damping with none; give a damping time above 0 s")

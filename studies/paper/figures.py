@@ -7,7 +7,6 @@ from types import ModuleType
 FILES = {
     int(path.stem.split("_")[1]): path.stem for path in sorted(Path(__file__).parent.glob("figure_*.py"))
 }
-"""Module names by number of the figure."""
 
 
 def paper_figure(number: int) -> ModuleType:

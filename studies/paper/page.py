@@ -33,10 +33,8 @@ class Reproduction:
     """Content of the page."""
 
     sections: Mapping[str, tuple[Judgement, ...]]
-    """Judgements by heading, in order."""
     scores: tuple[DampingScore, ...]
     tables: tuple[ReportTable, ...]
-    """Tables at the end of the report."""
     options: str
     """The defaults, in words."""
     made_with: str

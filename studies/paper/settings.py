@@ -24,9 +24,7 @@ class DampingScore:
     """The claims that hold at one damping."""
 
     damping_time_s: float
-    """c_i / k_i."""
     held: tuple[str, ...]
-    """Keys of the claims that hold."""
     failed: tuple[str, ...]
     weak_exponent_per_s: float
     """Largest exponent over frequency at 1 um; near zero in the paper."""

@@ -89,7 +89,6 @@ def chaos_escalates(r: Reading) -> Values:
 
 
 def _signal(r: Reading, amplitude_m: float) -> TimeSignal:
-    """Return the motion of m0 at 260 Hz."""
     key = ("signal", amplitude_m, r.specimen(), r.case.accuracy)
     return r.evidence.remembered(
         key, lambda: time_signal(r.specimen(), Harmonic(SHOWN_HZ, amplitude_m), r.case)
@@ -103,6 +102,5 @@ def _band(signal: TimeSignal, middle_hz: float) -> float:
 
 
 def _by_level(r: Reading, what: str) -> Reals:
-    """Return one quantity at 260 Hz for each amplitude."""
     curves = [r.level(each) for each in AMPLITUDES_M]
     return np.array([getattr(each, what)[np.argmin(np.abs(each.frequency_hz - SHOWN_HZ))] for each in curves])

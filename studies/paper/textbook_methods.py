@@ -47,7 +47,6 @@ class TextbookMethod:
     name: str
     tableau: Tableau
     longest_s: float
-    """Longest step; every step without an error estimate."""
     relative: float = math.inf
     absolute: float = 1.0
     """Absolute tolerance, both in metres and in metres per second."""

@@ -20,7 +20,7 @@ def robot(qtbot):
     qtbot.addWidget(label)
     made = object.__new__(Robot)
     made.findings, made.recent = [], deque(["type_value"])
-    made.page = SimpleNamespace(shown=(DisplayedResult(label, "amplitude 2", "amplitude 1"),))
+    made.page = SimpleNamespace(displayed_results=(DisplayedResult(label, "amplitude 2", "amplitude 1"),))
     made.window = SimpleNamespace(pages={"Test": made.page})
     made.label = label
     return made

@@ -58,7 +58,6 @@ class Place:
 
     panel: Panel
     function: str
-    """``module:name``."""
     extras: tuple[str, ...] = ()
     """Extras required before the command starts; an extra that includes the others comes first."""
     space_mb: int = 300

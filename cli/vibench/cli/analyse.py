@@ -57,13 +57,10 @@ class DrivenBy(StrEnum):
 
 
 NOISE = "Transmission of noise"
-"""Heading of the options that apply only to noise."""
 OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "overlap", "confidence")
 
 
 class _Hidden(StrEnum):
-    """What to do with the hidden motion."""
-
     OMITTED = "left out"
     REPORTED = "told"
     STORED = "kept"

@@ -46,7 +46,6 @@ class Analyst:
         self._folder = Path()
         self._parts: list[CampaignResults | BaseException] = []
         self.submitted = 0
-        """Number of recordings submitted."""
 
     def take(self, recording: Path) -> None:
         """Submit a recording."""

@@ -45,10 +45,7 @@ def docs(
 def build(target: Path, extent: str) -> None:
     """Build the site with Sphinx, warnings as errors.
 
-    Raises
-    ------
-    MissingLibrary
-        When Sphinx and its extensions are not installed.
+    Raises MissingLibrary when Sphinx and its extensions are not installed.
     """
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:

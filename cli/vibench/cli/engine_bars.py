@@ -22,7 +22,6 @@ from .output import console, errors, words
 from .progress_bars import show_bars
 
 INTERVAL_S = 0.1
-"""Interval between updates of the terminal [s]."""
 COLUMNS = (
     words("{task.description:<24}"),
     BarColumn(bar_width=30),

@@ -51,7 +51,6 @@ class Fields:
 
     names: tuple[str, ...]
     panel: str | None = None
-    """Heading of these options in the help."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,6 @@ class RequestOptions(Generic[Request]):
 
     model: type[Request]
     typed: Mapping[str, Any]
-    """Given values by field."""
 
     def request(self, **others: object) -> Request:
         """Return the request, with other fields set by the command.

@@ -62,7 +62,6 @@ def serve_rig(
 
 
 def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Return instructions for other programs, ready to paste."""
     opened = 'pyvisa.ResourceManager("@py").open_resource'
     usb = f"from vibench.virtual_rig import plug_in_remote; plug_in_remote({rig.daq_address!r})"
     ends = r'read_termination="\n", write_termination="\n"'

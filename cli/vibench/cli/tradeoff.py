@@ -82,7 +82,6 @@ def _measure_known(out: Path | None, span: float, as_json: bool) -> None:
 
 
 def _study(said: Mapping[str, Any]) -> Study:
-    """Return the requested scene with its target."""
     if not {"amplitude", "frequency"} <= said.keys():
         raise InvalidRequest("a scene needs both --amplitude and --frequency; one or both are missing")
     target = {field: said[name] for name, field in (("error", "error"), ("time", "time_s")) if name in said}
@@ -99,7 +98,6 @@ def _study(said: Mapping[str, Any]) -> Study:
 
 
 def _print_scene(study: Study, out: Path | None, as_json: bool) -> None:
-    """Measure and print the curve of one scene."""
     from vibench.analysis.report import curve_figure
 
     if out is not None:

@@ -55,8 +55,6 @@ _WORTH_OF_GAP = 0.25
 
 @dataclass
 class _Following:
-    """A twin and its progress in a run."""
-
     client: EngineClient
     rig: Rig
     specimen: Specimen

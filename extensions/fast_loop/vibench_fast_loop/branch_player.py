@@ -22,7 +22,6 @@ Vector = NDArray[np.float64]
 _BLOCK_PERIODS = 10
 _GLIDE_S = 0.1
 _HIGHEST = 9
-"""Highest harmonic measured."""
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
 """Largest standard errors at the end of a measurement: of the base's fundamental and harmonics, as parts of

@@ -61,9 +61,7 @@ class PredictedPoint:
     unknowns: Vector
     place: Vector
     along: Vector
-    """Unit vector along the arc."""
     length: float
-    """Arc length; 0 at the first point."""
 
 
 class BranchSolver:

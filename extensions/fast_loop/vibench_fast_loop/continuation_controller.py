@@ -282,7 +282,6 @@ def _play_changes(
 
 
 def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
-    """Join base and m0 of all phases."""
     rows = [channels.rows(each) for each in phases]
     return np.concatenate([base for _, base, _ in rows]), np.concatenate([m0 for _, _, m0 in rows])
 

@@ -177,13 +177,10 @@ class BranchHold:
     multiplier: float
     """Largest multiplier over a period with the law."""
     at_hz: float
-    """Frequency of that multiplier [Hz]."""
     held_hz: float | None
     """End of the range in which every motion is held [Hz]; None if the first is not."""
     folds: int
-    """Number of folds in that range."""
     end: ArcEnd | None
-    """Why the model's branch ended."""
 
 
 def branch_hold(

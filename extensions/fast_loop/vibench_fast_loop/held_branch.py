@@ -50,9 +50,7 @@ class HeldBranch(Labelled):
 
     frequency_hz: Reals
     base_m: Reals
-    """Amplitude of the base's fundamental."""
     m0_m: Reals
-    """Amplitude of m0's fundamental."""
     phase_deg: Reals
     """Phase of m0 relative to the base, for displacements."""
     residue: Reals
@@ -63,7 +61,6 @@ class HeldBranch(Labelled):
     multiplier: Reals
     """Largest multiplier over a period, from small perturbations; NaN if undetermined."""
     multiplier_u: Reals
-    """Standard uncertainty of the multiplier."""
 
     @property
     def folds(self) -> tuple[int, ...]:
@@ -202,4 +199,3 @@ HELD_BRANCH = replace(
     figures=lambda branch: iter((held_branch_figure(branch.analysis),)),
     findings=lambda branch: iter(branch_sentences(branch.analysis.facts.feedback)),
 )
-"""Content of the report on a branch."""

@@ -27,7 +27,6 @@ class LineController:
         self._config = config
         self._is_open = True
         self.facts = self._request(LoopRequest(ask="hello"), LoopFacts)
-        """Rate, latency, limit and watchdog."""
 
     @classmethod
     def open(cls, config: ControllerConfig) -> Self:

@@ -37,7 +37,6 @@ Complexes = NDArray[np.complex128]
 _HALF = 4
 """Half length of an envelope's window [periods]."""
 _EACH = 4
-"""Envelope values per period."""
 _INPUTS = {1: 2, 3: 1}
 """Harmonics of the base, and the highest derivative used of each."""
 _BLOCK = 8
@@ -70,7 +69,6 @@ class OpenLoopMultiplier:
 
     size: float
     error: float
-    """Standard uncertainty."""
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -170,6 +168,5 @@ def _parts(columns: list[Complexes]) -> Table:
 
 
 def _detrend(table: Table) -> Table:
-    """Remove mean and drift."""
     line = np.column_stack([np.ones(len(table)), np.linspace(-1, 1, len(table))])
     return np.asarray(table - line @ np.linalg.lstsq(line, table, rcond=None)[0])

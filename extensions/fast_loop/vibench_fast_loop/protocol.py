@@ -149,10 +149,7 @@ class LoopController(RealTimeController, Protocol):
     def report(self) -> LoopReport:
         """Return the blocks measured since the last report, and restart the watchdog.
 
-        Raises
-        ------
-        InstrumentLost
-            When the controller does not answer.
+        Raises InstrumentLost when the controller does not answer.
         """
 
     def silence(self, ramp_s: float) -> LoopReport:

@@ -45,7 +45,7 @@ def _usual_again():
 
 
 @pytest.fixture
-def fill_box(window, record, tmp_path, qtbot):
+def filled(window, record, tmp_path, qtbot):
     """Something that has displacements, velocities and accelerations on every page."""
     pages, context = window.pages, window.context
     rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
@@ -133,17 +133,17 @@ def numbers_of(page):
     return [edit.value() for edit in page.findChildren(QuantityEdit)]
 
 
-def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(fill_box):
-    before = {name: list(texts_of(page)) for name, page in fill_box.pages.items()}
-    values = {name: numbers_of(page) for name, page in fill_box.pages.items()}
+def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
+    before = {name: list(texts_of(page)) for name, page in filled.pages.items()}
+    values = {name: numbers_of(page) for name, page in filled.pages.items()}
     told = {name for name, texts in before.items() if any(map(OLD.search, texts))}
     assert told >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
-    chosen_in(fill_box, OTHERS)
-    for name, page in fill_box.pages.items():
+    chosen_in(filled, OTHERS)
+    for name, page in filled.pages.items():
         left = [text for text in texts_of(page) if OLD.search(text)]
         assert left == [], name
         assert numbers_of(page) == values[name], name
-    now = " | ".join(text for page in fill_box.pages.values() for text in texts_of(page))
+    now = " | ".join(text for page in filled.pages.values() for text in texts_of(page))
     for text in (
         "stroke 0.05 mm of 5 mm",
         "acceleration 1.27 g of 6.12 g",
@@ -151,8 +151,8 @@ def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(fill_box)
         "(g)",
     ):
         assert text in now, text
-    chosen_in(fill_box, USUAL)
-    assert {name: list(texts_of(page)) for name, page in fill_box.pages.items()} == before
+    chosen_in(filled, USUAL)
+    assert {name: list(texts_of(page)) for name, page in filled.pages.items()} == before
 
 
 @pytest.mark.parametrize("kind", EXCITATION_KINDS)
@@ -181,18 +181,18 @@ def test_numbers_of_a_list_are_read_in_the_unit_that_is_shown(qtbot):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_a_chosen_unit_is_there_again_after_a_start(fill_box, tmp_path):
-    chosen_in(fill_box, OTHERS)
+def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
+    chosen_in(filled, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
     assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
     again.background.close()
 
 
-def test_an_axis_says_the_number_of_its_unit(fill_box):
-    plot = next(each for each in fill_box.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
+def test_an_axis_says_the_number_of_its_unit(filled):
+    plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
-    chosen_in(fill_box, OTHERS)
+    chosen_in(filled, OTHERS)
     assert plot.up.labelText == "g"
     assert plot.up.tickStrings([0.0, STANDARD], 1.0, STANDARD) == ["0", "1"] != usual
 

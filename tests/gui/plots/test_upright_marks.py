@@ -7,7 +7,7 @@ from vibench.gui.plots.line_style import Dash, LineStyle
 from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.theme import LIGHT
 
-RED = LineStyle(lambda _theme: "#ff0000", fill_box=1.0)
+RED = LineStyle(lambda _theme: "#ff0000", fill_opacity=1.0)
 LINE = LineStyle(lambda _theme: "#ff0000", Dash.SOLID)
 
 

@@ -199,9 +199,7 @@ class Bridge(QObject):
     """
 
     noticed = Signal(object)
-    """A `Notice` from or about the engine."""
     armed = Signal(object)
-    """The `ArmedPlan` after a successful `arm`."""
     adopted = Signal(object)
     """The `CampaignRequest` of a running engine that another window left."""
     advanced = Signal()
@@ -219,9 +217,7 @@ class Bridge(QObject):
         """The newest samples of the run; None before the first run and after another plan was armed."""
         self._view_run = 0
         self.rig: Rig | None = None
-        """The rig of the newest open bench."""
         self.campaign: Campaign | None = None
-        """The newest armed campaign."""
         self._last_message = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
@@ -409,7 +405,6 @@ class Bridge(QObject):
         self._refused(error)
 
     def _drop_engine(self, error: EngineGone) -> None:
-        """Discard all values of an engine that has ended."""
         if self._line is None:
             return
         line, self._line = self._line, None

@@ -167,7 +167,6 @@ class GroupEditor:
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
     ) -> None:
         self.widget = QGroupBox(facts.label)
-        """The box around the fields."""
         self._changed = changed
         self._layout = QVBoxLayout(self.widget)
         self._kinds = kinds
@@ -183,7 +182,6 @@ class GroupEditor:
             self._kind.widget.setToolTip(f"What kind of {facts.label.lower()} it is")
             self._layout.addWidget(self._kind.widget)
         self.form = self._new_form(kinds[0])
-        """The fields."""
 
     @property
     def kind_choice(self) -> Choice | None:

@@ -96,7 +96,6 @@ class Selection(QObject):
         self.measurement: Measurement | None = None
         """The test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
-        """The campaign on the Queue page."""
         self.prediction: MeasurementPrediction | None = None
         """Predicted response of the specimen to the test; None until it is computed."""
 
@@ -135,7 +134,6 @@ class AppContext(QObject):
     folder_chosen = Signal(object)
     """Folder of new recordings, after a change."""
     noticed = Signal(object)
-    """A `Notice` for the message strip."""
     page_requested = Signal(str)
     """Name of a page to show."""
     recording_requested = Signal(object)
@@ -149,7 +147,6 @@ class AppContext(QObject):
     scene_requested = Signal(float, float)
     """Drive frequency [Hz] and base amplitude [m] of a scene for the Simulate page."""
     theme_changed = Signal(object)
-    """The new `Theme`."""
 
     def __init__(
         self, settings: Settings, start: Starter = start_engine, parent: QObject | None = None
@@ -169,7 +166,6 @@ class AppContext(QObject):
         """Worker for short jobs that must not wait behind long ones: previews."""
         UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
-        """Current colours."""
 
     def choose_theme(self, theme: Theme) -> None:
         """Change the colours and store the choice."""

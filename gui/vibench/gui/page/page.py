@@ -39,13 +39,7 @@ _TABLES = {
 
 
 def file_kind(path: Path) -> FileKind:
-    """Return the kind of a file or folder.
-
-    Raises
-    ------
-    ConfigurationError
-        If the window cannot open it.
-    """
+    """Return the kind of a file or folder; raises ConfigurationError if the window cannot open it."""
     if path.is_dir():
         return FileKind.FOLDER
     if path.name.endswith((".h5", ".h5.part")):

@@ -42,7 +42,6 @@ class PlotAxis:
     """Displayed value per plotted value for a fixed unit: 1e3 shows seconds as milliseconds."""
     scale: Scale = Scale.LINEAR
     short: str = ""
-    """Short label for little space, followed by the unit."""
 
     @property
     def shown(self) -> ShownUnit:

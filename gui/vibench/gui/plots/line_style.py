@@ -32,7 +32,7 @@ class LineStyle:
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
-    fill_box: float = 0.0
+    fill_opacity: float = 0.0
     """Opacity of a filled area, 0 to 1."""
 
 
@@ -83,7 +83,7 @@ def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
 def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
     """Return the colour of an area."""
     colour: QColor = pg.mkColor(line_style.colour(theme))
-    colour.setAlphaF(line_style.fill_box or 0.25)
+    colour.setAlphaF(line_style.fill_opacity or 0.25)
     return colour
 
 

@@ -87,7 +87,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self.scales = [across.scale, up.scale]
-        """Scales of the horizontal and the vertical axis."""
         self._inked: list[tuple[LineStyle, Callable[[Theme], None]]] = []
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []

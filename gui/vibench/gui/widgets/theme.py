@@ -10,7 +10,6 @@ from PySide6.QtWidgets import QApplication
 _TITLE = 1.4
 """Font size of titles, relative to other text."""
 Colour = str
-"""``"#rrggbb"``."""
 
 
 class Tone(StrEnum):
@@ -46,7 +45,6 @@ class Theme:
     """Borders of input fields: a contrast of at least 3."""
     text: Colour
     muted: Colour
-    """Secondary text."""
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]

@@ -121,7 +121,6 @@ class Banner(QFrame):
         self.setObjectName("banner")
         self.setAccessibleName("State of the rig")
         self.indicator = CLOSED
-        """Displayed state."""
         self._label = QLabel()
         self._label.setObjectName("engine_state")
         self._detail = ElidedLabel()
@@ -296,7 +295,6 @@ class MessageStrip(QFrame):
         self.setAccessibleName("Messages")
         self._notices: list[Notice] = []
         self.is_said = False
-        """Whether a message is shown."""
         self._hint = ""
         self._text = SentenceLabel()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)

@@ -31,7 +31,6 @@ class Wait:
     """Processor time of this thread during the delay, which does not depend on other load [s]."""
     at: datetime
     about: str
-    """The visible page."""
 
 
 class EventLoopMonitor(QObject):

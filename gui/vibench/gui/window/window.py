@@ -167,7 +167,6 @@ class Window(QMainWindow):
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._drawn_s: deque[float] = deque()
-        """Times of the newest frames."""
         self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
 
     @property

@@ -68,7 +68,6 @@ class Overflow(Enum):
     """What happens to samples when the buffer is full."""
 
     GROW = auto()
-    """The buffer grows, and nothing is lost."""
     LOSE = auto()
     """The oldest samples are overwritten, as on the real device."""
 

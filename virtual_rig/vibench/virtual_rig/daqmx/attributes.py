@@ -56,7 +56,6 @@ class Group:
     subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
     """Returns the objects of a request: the first one is read, all of them are set."""
     attributes: Callable[[Any], Attributes]
-    """Returns the properties of an object."""
 
 
 # Functions that read and write properties
@@ -352,6 +351,5 @@ def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
 
 
 def _fields(response: Any, value: object) -> Mapping[str, object]:
-    """Return a value as the field of a response."""
     name = "value_raw" if "value_raw" in response.fields_by_name else "value"
     return {name: value.value if isinstance(value, Enum) else value}

@@ -247,7 +247,6 @@ def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
 
 
 def _does(act: Callable[[DaqmxSystem, Any], object]) -> Call:
-    """Return a call with an empty response."""
 
     def call(system: DaqmxSystem, request: Any) -> Fields:
         act(system, request)

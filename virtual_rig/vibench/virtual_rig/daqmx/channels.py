@@ -28,7 +28,6 @@ class InputChannel:
     inputs: AnalogInputs
     minimum: float
     maximum: float
-    """Largest expected value [V]."""
     terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
     coupling: Coupling | None = None
     """None: the device's default (AC with excitation, DC without)."""
@@ -97,7 +96,6 @@ class OutputChannel:
     outputs: AnalogOutputs
     minimum: float
     maximum: float
-    """Largest expected value [V]."""
 
     def verify(self) -> None:
         """Refuse limits that the device cannot output."""

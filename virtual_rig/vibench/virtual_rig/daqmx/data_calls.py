@@ -424,4 +424,3 @@ DATA_CALLS: Mapping[str, Call] = {
     "WriteAnalogF64": _write,
     "WriteAnalogWaveforms": _write_waveforms,
 }
-"""The calls by their names in the protocol."""

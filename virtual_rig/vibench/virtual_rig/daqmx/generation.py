@@ -142,7 +142,6 @@ class Generation:
         self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
 
     def _fetch(self, until: int) -> None:
-        """Move available samples from the buffer to the device."""
         count = int(min(until, self.total, self._end)) - self._fetched
         if count > 0:
             self._memory = np.concatenate([self._memory, self.buffer.cyclic(self._fetched, count)], axis=1)

@@ -41,7 +41,6 @@ class Rig:
     """
 
     def __init__(self, world: AnalogueWorld, pace: "Pace", catalogue: Catalogue) -> None:
-        """Start at the world's time, without running tasks."""
         self.world = world
         self.catalogue = catalogue
         self.pace = pace

@@ -92,10 +92,7 @@ class DaqServer:
     token
         Token required for every call; None accepts everyone who can reach the port.
 
-    Raises
-    ------
-    ConfigurationError
-        When the address cannot be used.
+    Raises ConfigurationError when the address cannot be used.
     """
 
     def __init__(

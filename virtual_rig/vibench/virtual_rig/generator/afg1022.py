@@ -104,15 +104,12 @@ class AFG1022(ScpiInstrument):
         self.frequencies_are_locked = False
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
-        """Return the instrument's commands, except the common ones."""
         return COMMANDS if quirks.load_is_panel_only else (*COMMANDS, LOAD)
 
     def _new_memory(self) -> ArbitraryMemory:
-        """Return the memory of waveforms at power-on."""
         return ArbitraryMemory()
 
     def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
-        """Return the settings of a channel at power-on."""
         return ChannelSettings(declared_load_ohm=declared_load_ohm)
 
     def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
@@ -382,7 +379,6 @@ SHARED_COMMANDS = (
     number("[SOURce#:]FREQuency:STOP", "IVI", "sweep_stop_hz", FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
 )
-"""Commands common to the simulated generators."""
 COMMANDS = (
     *SHARED_COMMANDS,
     Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape, _ask_shape),

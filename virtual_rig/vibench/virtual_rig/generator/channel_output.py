@@ -205,7 +205,6 @@ class ChannelOutput:
         self, terminal: Terminal, panel: Panel, memory: ArbitraryMemory, power_on: ChannelSettings
     ) -> None:
         self.relay_is_stuck = False
-        """Whether the output stays on regardless of the settings."""
         self._panel = panel
         self._memory = memory
         carrier = SteadyPhase(round(power_on.frequency_hz * UHZ_PER_HZ), 0.0)
@@ -285,7 +284,6 @@ class ChannelOutput:
         return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
 
     def _swept(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
-        """Return a sweep, triggered or repeated."""
         ends = settings.sweep_start_hz, settings.sweep_stop_hz
         sweep = settings.sweep or OwnSweep(self._panel.sweep_s, spacing=self._panel.sweep_spacing)
         if sweep.trigger is SweepTrigger.IMMEDIATE:
@@ -294,7 +292,6 @@ class ChannelOutput:
 
 
 def _course_key(settings: ChannelSettings) -> tuple[object, ...]:
-    """Return all settings that affect the phase course."""
     return (
         settings.mode,
         settings.frequency_hz,

@@ -85,7 +85,6 @@ class SweptPhase:
     sweep_s: float
     spacing: Spacing
     begin_s: float
-    """Start of the first sweep."""
     offset: float
     """Phase at that time [cycles]."""
 

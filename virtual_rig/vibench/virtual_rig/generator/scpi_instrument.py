@@ -37,7 +37,6 @@ _RANGE_ROUNDING = 1e-9
 
 Parameters = tuple[bytes, ...]
 Setter = Callable[[Any, int, Parameters], None]
-"""Takes the generator, the channel, and the parameters."""
 Query = Callable[[Any, int, Parameters], bytes]
 
 
@@ -48,7 +47,6 @@ class Command:
     header: str
     """Header in the notation of manuals, see `HeaderPattern`."""
     source: str
-    """Source of its description."""
     write: Setter | None
     ask: Query | None
     channels: int = CHANNELS
@@ -214,7 +212,6 @@ class Reply:
 
     data: bytes
     delay_s: float = 0.0
-    """Delay of the reply [s]."""
 
 
 class ScpiInstrument:
@@ -315,7 +312,6 @@ class ScpiInstrument:
         return answers
 
     def _obey(self, header: str, unit: Unit) -> list[bytes]:
-        """Execute one unit; return the reply to a query."""
         command, suffix = self._find(header)
         if command is None or (command.ask if unit.asks else command.write) is None:
             # Refuse an unknown header as the firmware does.
@@ -364,7 +360,6 @@ COMMON_COMMANDS = (
     report("*ESR", "IEEE 488.2, 10.12", lambda instrument: _decimal(instrument.status.take_events())),
     report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
 )
-"""Commands of every instrument."""
 
 
 # The generator on a raw TCP socket, for programs without Python: lines in, lines out. The real AFG1022 has no

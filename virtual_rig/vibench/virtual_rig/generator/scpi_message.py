@@ -135,7 +135,6 @@ class HeaderPattern:
 
 
 def _expression(pattern: str) -> str:
-    """Return a regular expression for the manual's notation."""
     expression = pattern.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
     return _NODE.sub(_node_expression, expression)
 
@@ -189,7 +188,6 @@ class Unit:
     header: str
     """``"SOUR1:FREQ"`` without the question mark, not yet resolved."""
     asks: bool
-    """Whether the header ends in a question mark."""
     parameters: tuple[bytes, ...]
     """Raw parameters without surrounding white space; a block keeps its ``#`` header."""
     starts_line: bool

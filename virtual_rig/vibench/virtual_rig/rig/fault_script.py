@@ -41,7 +41,6 @@ class RigFaults:
     def __init__(
         self, world: World, generator: AFG1022, cable: UsbTmcInstrument, daq: DaqServer, disk: DiskTrouble
     ) -> None:
-        """Store the parts that can fail."""
         self._world = world
         self._generator = generator
         self._cable = cable
@@ -398,10 +397,7 @@ class FaultScript(FrozenModel):
 def load_fault_script(path: Path | str) -> FaultScript:
     """Return the faults of a TOML file, or of a shipped script by its name (``"night"``).
 
-    Raises
-    ------
-    ConfigurationError
-        With file, key, what was given and what is allowed.
+    Raises ConfigurationError with file, key, what was given and what is allowed.
     """
     return load_toml(named(path, "hardware_configs/faults"), FaultScript)
 
@@ -412,7 +408,6 @@ class PlayedFault:
 
     fault: str
     began_s: float
-    """Start in rig time [s]."""
 
 
 @dataclass

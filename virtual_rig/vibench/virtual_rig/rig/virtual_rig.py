@@ -97,11 +97,9 @@ class VirtualRig:
             panel=panel,
             terminal=_terminal(rig, virtual),
         )
-        """The generator behind the USB cable."""
         self.controller = _controller(rig, lambda: self.world.time_s)
         """The controller of a fast loop; None without one."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
-        """The analogue world."""
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self._running: _Running | None = None
 
@@ -195,8 +193,6 @@ class VirtualRig:
 
 @dataclass(frozen=True)
 class _Running:
-    """State of a rig that is switched on."""
-
     daq: DaqServer
     socket: ScpiSocket
     controller: ScpiSocket | None

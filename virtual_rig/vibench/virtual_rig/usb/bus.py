@@ -161,16 +161,12 @@ _REQUEST_TYPE_MASK = 0x60
 
 @dataclass(frozen=True, eq=False)
 class _Port:
-    """A port of the bus with its device."""
-
     device: UsbDevice
     address: int
 
 
 @dataclass(eq=False)
 class _Handle:
-    """A device that a program has opened."""
-
     port: _Port
 
 
@@ -328,7 +324,6 @@ def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
 
 
 def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
-    """Copy received bytes into PyUSB's buffer; return their number."""
     buffer[: len(data)] = array("B", data)
     return len(data)
 
@@ -387,10 +382,7 @@ def plug_in_remote(address: str) -> RemoteUsbDevice:
     address
         ``"host:port"`` of the rig's server.
 
-    Raises
-    ------
-    InstrumentLost
-        When no rig answers there.
+    Raises InstrumentLost when no rig answers there.
     """
     device = RemoteUsbDevice(address)
     plug_in(device)

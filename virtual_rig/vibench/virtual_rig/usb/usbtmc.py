@@ -118,8 +118,6 @@ class MessageDevice(Protocol):
 
 @dataclass(frozen=True)
 class _Request:
-    """A pending REQUEST_DEV_DEP_MSG_IN."""
-
     tag: int
     length: int
     terminator: bytes
@@ -133,7 +131,6 @@ class _Flight:
     message: bytes = b""
     """Received parts of an incomplete message."""
     reply: bytes = b""
-    """Unread reply."""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
     request: _Request | None = None
@@ -156,7 +153,6 @@ class UsbTmcInstrument:
         self.identification = Identification(
             *usb_ids, device.maker, device.model, device.serial, packet_bytes
         )
-        """Content of the descriptors."""
         self._lock = threading.RLock()
         self._is_plugged_in = True
         self._is_hung = False
@@ -241,7 +237,6 @@ class UsbTmcInstrument:
     # Internal functions
 
     def _take(self, payload: bytes, attributes: Attributes) -> None:
-        """Collect a message; execute it when it is complete."""
         self._flight.message += payload
         if len(self._flight.message) > LONGEST_MESSAGE:
             self._flight.message = b""

@@ -53,7 +53,6 @@ class Decimator:
     ratio: float
     """Steps per sample; integers are faster."""
     start_step: int
-    """First step of the conversion."""
     delay_steps: float
     """Delay of the channel's sensor not included in the means."""
     table: FloatArray
@@ -162,7 +161,6 @@ class InputStage:
     """One input from its connector to the converter, computed together with the world."""
 
     def __init__(self, configured: Input, cable: Cable, grid: TimeGrid = USUAL_GRID) -> None:
-        """``cable`` is the connection of the input."""
         self.configured = configured
         self.cable = cable
         self._offset_v, self._gain = _operating_point(configured, cable)

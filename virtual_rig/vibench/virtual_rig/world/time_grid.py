@@ -28,7 +28,6 @@ class TimeGrid:
     """
 
     rate_hz: float = USUAL_GRID_RATE_HZ
-    """Steps per second of rig time."""
 
     @property
     def step_s(self) -> float:
@@ -73,7 +72,6 @@ class RecursiveFilter:
             denominator=self.denominator,
             state=np.zeros(order),
         )
-        """Structure of the native engine."""
 
     def run(self, values: FloatArray) -> FloatArray:
         """Return the next output values, one for each input value."""

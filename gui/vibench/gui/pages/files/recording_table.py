@@ -282,7 +282,6 @@ class RecordingModel(QAbstractTableModel):
         super().__init__()
         self._theme = theme
         self.entries: tuple[ListedRecording, ...] = ()
-        """Recordings in the order of the listing."""
         self._rows: tuple[_Row, ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
@@ -362,8 +361,6 @@ class RecordingModel(QAbstractTableModel):
 
 
 class _ChosenRows(QSortFilterProxyModel):
-    """Filters rows by search text and campaign."""
-
     _only: frozenset[Path] | None = None
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
@@ -386,7 +383,6 @@ class RecordingTable(QTableView):
         super().__init__()
         self.setAccessibleName("Recordings")
         self.is_listing = False
-        """Whether the folder is being read."""
         self.recordings = RecordingModel(theme)
         self._sorted = _ChosenRows(self)
         self._sorted.setSourceModel(self.recordings)

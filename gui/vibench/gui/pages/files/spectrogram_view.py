@@ -192,7 +192,6 @@ class SpectrogramView(QWidget):
         self._recording: Recording | None = None
         self._asked: SpectrogramRequest | None = None
         self._of: SpectrogramRequest | None = None
-        """Inputs of the displayed picture; None without a picture."""
         self._latest_request = LatestRequest(
             background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
         )
@@ -322,8 +321,6 @@ class SpectrogramView(QWidget):
 
 
 class _Image:
-    """An image in a plot, with its colour scale."""
-
     def __init__(self, plot: Plot) -> None:
         self._plot = plot
         self.item = pg.ImageItem(axisOrder="row-major")

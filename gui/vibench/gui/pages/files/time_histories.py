@@ -19,7 +19,6 @@ from ...widgets.units import plain_unit
 from .recording_table import role_text
 
 LEAST_SAMPLES = 8
-"""Fewest visible samples."""
 _STEP, _ZOOM = 0.2, 0.6
 _TIME_AXIS_EM, _LEAST_EM = 3, 3
 MARKER = LineStyle(lambda theme: theme.accent)

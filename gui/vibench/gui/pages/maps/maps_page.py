@@ -146,7 +146,6 @@ DISPLACEMENT = PlotAxis("m0 displacement", "m", short="x")
 LINE = PlotAxis("|x|", "m", scale=Scale.LOGARITHMIC)
 SHOWN_PERIODS = 12
 HIGHEST_MULTIPLE = 6.0
-"""Largest multiple of the drive frequency in the spectrum."""
 
 
 class MotionView(QWidget):
@@ -205,7 +204,6 @@ class MapsPage(Page):
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
         self._motion_of: MotionRequest | None = None
-        """Request of the displayed motion."""
         self._levels: list[RecordedLevel] = []
         self._is_stale = False
         self._build()

@@ -171,7 +171,6 @@ class CampaignPreview:
     """Preview of a campaign."""
 
     rows: tuple[tuple[str, str, str, str], ...]
-    """Rows of `entry_rows`."""
     levels: Mapping[str, str]
     """Level in words, by recording."""
     complete: frozenset[str]

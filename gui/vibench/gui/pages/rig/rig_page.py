@@ -45,7 +45,6 @@ from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, prefixed_unit
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
-"""Pace of a simulated bench."""
 
 
 class RigChoice(QWidget):
@@ -148,7 +147,6 @@ class KnobSheetForm(QGroupBox):
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
         self.operator_field = LineField()
-        """Field of the operator's name."""
         self.operator_field.setAccessibleName("Who has looked")
         self.operator_field.setToolTip("Your name; it goes into every recording")
         self.operator_field.textChanged.connect(self.changed)

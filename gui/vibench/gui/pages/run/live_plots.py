@@ -40,7 +40,7 @@ class SweepPlot(QWidget):
     def __init__(self, tab: str, plot: Plot) -> None:
         super().__init__()
         self.title, self.tab, self.plot = plot.accessibleName(), tab, plot
-        self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], fill_box=0.15))
+        self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], fill_opacity=0.15))
         self.predicted: Curves = {}
         self.measured: Curves = {}
         self._shown = 0
@@ -222,7 +222,7 @@ class TransmissibilityPlot(QWidget):
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
-        shade = LineStyle(lambda theme: theme.traces[0], fill_box=0.25)
+        shade = LineStyle(lambda theme: theme.traces[0], fill_opacity=0.25)
         self._band = self.magnitude.band(shade, MEASURED)
         self._predicted = {
             "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),

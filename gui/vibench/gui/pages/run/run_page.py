@@ -131,7 +131,6 @@ class WatchCard(QGroupBox):
     reject_requested = Signal()
     """Exclude the current average of noise from all results."""
     twin_requested = Signal(object)
-    """A `TwinSwitch`."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__("Watch")

@@ -63,7 +63,6 @@ class _TwoPlots(QStackedWidget):
 class _PairPicture:
     def __init__(self, plots: _TwoPlots) -> None:
         self.widget = plots
-        """Widget of the plots."""
 
     def plots(self, along: Parameter) -> tuple[Plot, Plot]:
         """Return the pair of plots over a parameter."""
@@ -149,7 +148,7 @@ def _with_interval(
 ALONG_CHAIN = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 PLACE = PlotAxis("Cell, from the base", short="Cell")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
-_GAP = LineStyle(lambda theme: theme.muted, fill_box=0.14)
+_GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
 """Smaller transmissibilities are drawn at this value."""
 _MOST_TRACES = 32
@@ -224,7 +223,7 @@ LARGEST_EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent"
 DIFFERENCE = PlotAxis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
 RUN_TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
 DISPLACEMENT = PlotAxis("Displacement", "m")
-_COLLIDING = LineStyle(lambda theme: theme.muted, fill_box=0.14)
+_COLLIDING = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _HINTS = (
     "Responses I and II of every model, as they are found.",

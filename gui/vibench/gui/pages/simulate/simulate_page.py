@@ -41,9 +41,7 @@ class SimulatePage(Page):
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.progress: SimulationProgress | None = None
-        """Results so far."""
         self._request: SimulationRequest | None = None
-        """Request of the displayed curves."""
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))

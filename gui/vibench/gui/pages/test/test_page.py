@@ -157,7 +157,7 @@ def load_test(path: Path) -> Measurement:
     return load_toml(path, Measurement)
 
 
-COLLISION = LineStyle(lambda theme: theme.traces[3], fill_box=0.18)
+COLLISION = LineStyle(lambda theme: theme.traces[3], fill_opacity=0.18)
 
 
 class PredictionPlot(Plot):
