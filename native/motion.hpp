@@ -18,7 +18,6 @@ template <class T> struct Motion {
   double growth[6];  // logarithm of a factor that was removed from each derivative
 };
 
-// Conversion from and to the C interface.
 inline Motion<double> motion_of(const State &state) {
   Motion<double> motion;
   __builtin_memcpy(motion.at, state.motion, sizeof motion.at);

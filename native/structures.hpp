@@ -429,7 +429,6 @@ STRUCTURE(CellKind,
   double next_damping;         // [N s/m]
 )
 
-// State of a cell.
 STRUCTURE(CellState,
   double p, x, z, vp, vx, vz;  // p = y - z [m, m/s]
   double side, root, rate, step, root_scale, rate_scale, pace;  // of a present contact, as in `State`

@@ -14,13 +14,13 @@ PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_310,
     "analysis": 32_190,
-    "cli": 5_190,
-    "extensions": 2_730,
-    "gui": 12_490,
+    "cli": 5_170,
+    "extensions": 2_710,
+    "gui": 12_425,
     "native": 6_625,
     "sim": 21_430,
-    "studies": 3_220,
-    "virtual_rig": 8_430,
+    "studies": 3_200,
+    "virtual_rig": 8_355,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

@@ -97,7 +97,7 @@ def test_a_bad_value_is_answered_with_the_name_and_the_unit_of_its_field(qtbot, 
             type_into(widget, bad)
             asked += 1
             if form.value is None:
-                assert row.facts.named in form.complaint, (field, bad, form.complaint)
+                assert row.facts.label_with_unit in form.complaint, (field, bad, form.complaint)
                 assert len(form.complaint) < 1500
         row.editor.show_content(before)
         form.form.changed.emit()
