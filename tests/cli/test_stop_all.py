@@ -123,7 +123,7 @@ def on_another_computer(what):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 def test_what_drives_on_another_computer_is_said_not_to_be_reached(vibench_here, tmp_path):
-    there = "Not reached, since it is of another computer: night (process"
+    there = "Not reached, since it runs on another computer: night (process"
     with on_another_computer("night") as path:
         alone = vibench_here("stop", cwd=tmp_path)
         assert alone.returncode == 1

@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition import RecordingError
 from vibench.acquisition.campaign import JournalPointState, ReasonCode, list_recordings, read_journal
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, is_begun, journal_path
+from vibench.acquisition.campaign._journal import Journal, journal_exists, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, Point
 
 
@@ -111,7 +111,7 @@ def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp
 def test_a_journal_whose_program_died_before_its_first_commit_is_not_begun(tmp_path):
     path = tmp_path / "c.campaign.sqlite"
     path.touch()
-    assert not is_begun(path)
+    assert not journal_exists(path)
 
 
 def test_what_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
@@ -139,7 +139,9 @@ def opened(path):
         pass
 
 
-@pytest.mark.parametrize("use", [opened, is_begun, read_journal, lambda path: list_recordings(path.parent)])
+@pytest.mark.parametrize(
+    "use", [opened, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
+)
 def test_a_file_that_is_refused_is_let_go(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
     path.write_text("no database " * 100)

@@ -1,4 +1,4 @@
-"""The files of a point: one an attempt, ``NAME.h5``, ``NAME.2.h5``, ..., none of them ever overwritten."""
+"""The files of a point: one for each attempt, ``NAME.h5``, ``NAME.2.h5``, ..., never overwritten."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from ..recording import (
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """One file of a point, looked at."""
+    """One file of a point, as found in the folder."""
 
     path: Path
     state: RecordingState | None
@@ -43,8 +43,8 @@ class KeptRecording:
         return self.state is RecordingState.COMPLETE and not self.damage
 
 
-def looked_at(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRecording:
-    """Look at a recording that was made for ``measurement``."""
+def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRecording:
+    """Read the state of a recording of ``measurement``."""
     try:
         with open_recording(path) as recording:
             found = recording.check_seal(depth)
@@ -66,7 +66,7 @@ def looked_at(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRec
 
 
 def is_made_by(recording: Recording, measurement: Measurement) -> bool:
-    """Whether a recording was made by this plan, as this version understands what stands in it."""
+    """Whether a recording was made by this plan, as this version reads it."""
     try:
         return Measurement.model_validate(recording.plan) == measurement
     except ValidationError:
@@ -74,7 +74,7 @@ def is_made_by(recording: Recording, measurement: Measurement) -> bool:
 
 
 def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
-    """Paths that this point's name has been given to, recordings finished or not, in order."""
+    """Return the paths of all attempts at a point, finished or not, in order."""
     attempts: list[Path] = []
     while _is_taken(candidate := _attempt(folder, name, len(attempts) + 1)):
         attempts.append(candidate)
@@ -82,14 +82,14 @@ def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
 
 
 def next_attempt(folder: Path, name: str) -> Path:
-    """Path of the next recording of a point."""
+    """Return the path of a point's next recording."""
     return _attempt(folder, name, len(attempts_in(folder, name)) + 1)
 
 
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Find a complete recording of a point; the last damaged one where there is no sound one, or None.
+    """Return a complete recording of a point; the last damaged one if there is no sound one, or None.
 
     Raises RecordingError when one is complete but was measured with another plan.
     """
@@ -97,7 +97,7 @@ def complete_attempt(
     for path in attempts_in(folder, name):
         if not path.exists():
             continue
-        found = looked_at(path, measurement, depth)
+        found = read_attempt(path, measurement, depth)
         if found.damage:
             damaged = found
         if not found.is_complete:
@@ -112,7 +112,7 @@ def complete_attempt(
 
 
 def _attempt(folder: Path, name: str, number: int) -> Path:
-    # A measurement's name holds no dot, so that no second attempt takes another one's name.
+    # A measurement's name contains no dot, so a second attempt never gets the name of another point.
     return folder / (f"{name}{SUFFIX}" if number == 1 else f"{name}.{number}{SUFFIX}")
 
 

@@ -21,10 +21,10 @@ from ._opening import require_same_bench
 
 
 class CoolingPause:
-    """Rests before a recording when another one was made before it in this session.
+    """Pauses before a recording when another one was made before it in this session.
 
-    A stop ends it at once; a hold keeps it up until it is taken back. Nothing is written into the journal:
-    the next point stays queued, so that a campaign that is killed here goes on as from between two points.
+    A stop ends the pause at once; a hold extends it until it is released. The journal does not change: the
+    next point stays queued, so a campaign that is killed here resumes as from between two points.
     """
 
     def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
@@ -34,11 +34,11 @@ class CoolingPause:
         self._is_due = False
 
     def require(self) -> None:
-        """Have the next recording wait: something has been played."""
+        """Require a pause before the next recording."""
         self._is_due = True
 
     def wait(self, bench: Bench, name: str) -> None:
-        """Rest before the recording of a point, if it is due; the generator is off between recordings."""
+        """Pause before the recording of a point, if required; the generator is off between recordings."""
         if not self._is_due or not self._rest_s:
             return
         self._is_due = False
@@ -55,11 +55,11 @@ Reopen = Callable[[], Bench]
 """Closes a bench that has lost an instrument, and opens it again; raises AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
-"""How often a lost instrument is looked for, and how long another attempt waits [s]."""
+"""Interval of the search for a lost instrument, and pause before another attempt [s]."""
 
 
 class Attempts:
-    """Carries out points on a bench, as often as the policy says."""
+    """Carries out points on a bench, with the attempts that the policy allows."""
 
     def __init__(
         self,
@@ -80,11 +80,11 @@ class Attempts:
         self._reopen = reopen
 
     def pause_before(self, name: str) -> None:
-        """Leave the time between two recordings that the campaign asks for; a stop ends it."""
+        """Pause between two recordings as the campaign requires; a stop ends it."""
         self._pause.wait(self._bench, name)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
-        """Make one recording of a point that counts; ``tell`` is called after every block.
+        """Make one valid recording of a point; ``tell`` is called after every block.
 
         Raises
         ------
@@ -102,10 +102,10 @@ class Attempts:
                 )
             except AcquisitionError as error:
                 self._failed(point, path, error)
-                if not (left and self._may_mend(reason_code_of(error))):
+                if not (left and self._is_retryable(reason_code_of(error))):
                     raise
-                self._made_ready(point, path, error)
-                self._rested(point, error)
+                self._prepare_retry(point, path, error)
+                self._rest_before_retry(point, error)
             except BaseException as error:
                 reason = f"{type(error).__name__}: {error}".removesuffix(": ")
                 self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
@@ -115,7 +115,7 @@ class Attempts:
                 if not (
                     left
                     and point_result.reason_code is ReasonCode.OVER_RANGE
-                    and self._may_mend(point_result.reason_code)
+                    and self._is_retryable(point_result.reason_code)
                 ):
                     return point_result
                 self._tell(
@@ -155,7 +155,7 @@ class Attempts:
         reason_code = reason_code_of(error)
         try:
             self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
-        except RecordingError as second:  # lies in the same folder: the first is the cause
+        except RecordingError as second:  # in the same folder: the first error is the cause
             error.add_note(str(second))
         self._say(
             CampaignEvent(
@@ -165,39 +165,41 @@ class Attempts:
             )
         )
 
-    def _may_mend(self, reason_code: ReasonCode) -> bool:
+    def _is_retryable(self, reason_code: ReasonCode) -> bool:
         is_stopping = self._switch.request is not None
         return not is_stopping and reason_code.value in {each.value for each in self._policy.on}
 
-    def _made_ready(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        """Wait a little, or open the bench again when an instrument failed: another attempt has a chance."""
+    def _prepare_retry(self, point: Point, path: Path, error: AcquisitionError) -> None:
+        """Wait a little, or reopen the bench after an instrument failed, so that another attempt can
+        succeed.
+        """
         if isinstance(error, InstrumentError):
             if self._reopen is None:
                 raise error
-            self._bench = self._reopened(self._reopen, error)
+            self._bench = self._reopened_bench(self._reopen, error)
             self._tell(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self._bench.idle(LOOK_EVERY_S)  # what has just failed seldom works in the next instant
+            self._bench.idle(LOOK_EVERY_S)  # a repetition at once seldom works
         self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
-    def _rested(self, point: Point, failed: AcquisitionError) -> None:
-        """Rest before another attempt; where a stop comes meanwhile there is none."""
+    def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
+        """Pause before another attempt; after a stop there is none."""
         self.pause_before(point.name)
         if self._switch.request is not None:
             raise failed
 
-    def _reopened(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
+    def _reopened_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
         began, idled_s = monotonic(), 0.0
         while True:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig at its own pace idles at once: its time counts, or else the clock's.
+                # A virtual rig at free pace idles at once: its time counts, otherwise the clock's.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
                     raise lost from error
-                # An instrument comes back when somebody plugs it in: there is nothing to be told by.
+                # An instrument returns when somebody connects it, without any notification.
                 self._bench.idle(LOOK_EVERY_S)
                 idled_s += LOOK_EVERY_S
             else:
@@ -209,7 +211,7 @@ class Attempts:
 
 
 def _seal_of(path: Path) -> str:
-    """Return the seal that a recording got at its end; empty where it came to none."""
+    """Return the seal of a finished recording; empty if it was not finished."""
     try:
         with open_recording(path) as recording:
             return recording.seal
@@ -218,7 +220,7 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Return which inputs were near full scale while it counted; empty when none was, or it is gone."""
+    """Return the inputs near full scale in the recorded segments; empty if none, or if the file is gone."""
     if not path.exists():  # a complete recording belongs to the user, who may have moved it already
         return ""
     with open_recording(path) as recording:

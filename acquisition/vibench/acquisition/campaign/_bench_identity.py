@@ -1,4 +1,4 @@
-"""Which bench a campaign was started on: its configuration, its instruments, and its knobs."""
+"""The bench on which a campaign was started: its configuration, instruments, and knobs."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Self
@@ -9,7 +9,7 @@ from ..rig import Rig
 
 
 class Instrument(FrozenModel):
-    """Who an instrument said it was."""
+    """Identity that an instrument reported."""
 
     maker: str
     model: str
@@ -18,16 +18,16 @@ class Instrument(FrozenModel):
 
 
 class BenchIdentity(FrozenModel):
-    """What must not change in the middle of a campaign without somebody saying so."""
+    """The properties of a bench that must not change during a campaign without confirmation."""
 
     rig: Rig
     instruments: dict[str, Instrument]
     knobs: dict[str, str]
-    """What is set by hand, as it was confirmed; not when, nor by whom."""
+    """Confirmed settings made by hand, without time and person."""
 
     @classmethod
     def of(cls, bench: Bench) -> Self:
-        """Take it from an open bench."""
+        """Return the identity of an open bench."""
         instruments = {
             part: Instrument(maker=each.maker, model=each.model, serial=each.serial, firmware=each.firmware)
             for part, each in bench.identities.items()
@@ -36,12 +36,12 @@ class BenchIdentity(FrozenModel):
         return cls(rig=bench.rig, instruments=instruments, knobs=knobs)
 
     def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
-        """Say in a clause each what differs in ``now``."""
+        """Return a clause for each difference from ``now``."""
         return differences(self.model_dump(mode="json"), now.model_dump(mode="json"))
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
-    """Say in a clause each what differs between two descriptions."""
+    """Return a clause for each difference between two descriptions."""
     return tuple(_differences("", before, now))
 
 

@@ -1,7 +1,7 @@
-"""All recordings of a folder and the folders in it, found without opening the ones that are known already.
+"""All recordings of a folder and its subfolders, found without opening known ones again.
 
-The catalogue is a copy of what the files say, kept in ``catalogue.sqlite`` beside them: it can be deleted
-and made again at any time.
+The catalogue is a copy of facts from the files, in ``catalogue.sqlite`` beside them: it can be deleted and
+is then made again.
 """
 
 import os
@@ -29,29 +29,29 @@ from ..recording import (
     forget_checks,
     open_recording,
 )
-from ._journal import JournalPoint, JournalPointState, is_begun, read_journal
+from ._journal import JournalPoint, JournalPointState, journal_exists, read_journal
 
 UNREADABLE = "unreadable"
-"""State of a file that is no recording, or damaged; its reason says what is wrong."""
+"""State of a file that is not a recording, or is damaged; its reason says what is wrong."""
 DAMAGED = "damaged"
-"""State of a recording that opens, and is not as it was sealed."""
+"""State of a recording that opens but differs from its seal."""
 GOOD = "good"
 _FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
 
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """One recording of a folder. What it does not have is empty, or None."""
+    """One recording of a folder. Unknown values are empty, or None."""
 
     path: str
-    """Below the folder, with ``/``."""
+    """Relative to the folder, with ``/``."""
     name: str
     """Name of the measurement."""
     state: str
     """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``good``, or what to look at: ended early, near full scale, samples lost."""
+    """``good``, or what to check: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
@@ -62,14 +62,14 @@ class CatalogueEntry:
     duration_s: float | None = None
     size_bytes: int = 0
     bench_check: str = ""
-    """What the bench check before it found."""
+    """Verdict of the bench check before it."""
     results: str = ""
-    """Names of what analyses have saved, separated by commas."""
+    """Names of saved results of analyses, separated by commas."""
     operator: str = ""
     notes: str = ""
     recording_id: str = ""
     seal: str = ""
-    """As in `recording.SealState`, as far as a quick look shows; or empty."""
+    """As in `recording.SealState`, as far as a quick check shows; or empty."""
 
     @property
     def is_bad(self) -> bool:
@@ -78,12 +78,12 @@ class CatalogueEntry:
 
 
 def place_below(folder: Path, path: Path) -> str:
-    """Return where a recording lies; of a name that is no text, as much as can be said."""
+    """Return the path of a recording relative to the folder; undecodable characters are replaced."""
     return os.fsencode(path.relative_to(folder).as_posix()).decode(errors="replace")
 
 
 def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
-    """Read what a catalogue wants to know; a file that cannot be read becomes an entry that says why."""
+    """Read the entry of a recording; a file that cannot be read gets an entry with the reason."""
     try:
         with open_recording(path) as recording:
             return _entry(recording, where, size_bytes)
@@ -111,7 +111,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
-        # Room that a growing file has reserved holds nothing yet.
+        # Space that a growing file has reserved contains no samples yet.
         size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
         bench_check=recording.check_text,
         results=", ".join(recording.result_names),
@@ -123,7 +123,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
 
 
 def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
-    """Lowest and highest frequency of an excitation, as its plan names them."""
+    """Return the lowest and highest frequency of an excitation, from its plan."""
     grid, listed = excitation.get("grid"), excitation.get("frequencies_hz")
     tables = (excitation, grid) if isinstance(grid, dict) else (excitation,)
     named = [table.get(key) for table in tables for key in _FREQUENCIES]
@@ -136,7 +136,7 @@ def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
 
 
 def _number(value: object) -> float | None:
-    """Return a number that a plan says, whatever version wrote it; None for anything else."""
+    """Return a number of a plan of any version; None for anything else."""
     try:
         return float(value) if isinstance(value, int | float) else None
     except OverflowError:
@@ -164,7 +164,7 @@ CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 3
 """Raised whenever an entry changes; an older catalogue is then made again."""
 WAIT_S = 10.0
-"""For another program that is writing the same catalogue."""
+"""Waiting time for another program that writes the same catalogue."""
 
 _COLUMNS = tuple(field.name for field in fields(CatalogueEntry))
 _TYPES = {"size_bytes": "INTEGER"} | dict.fromkeys(
@@ -176,22 +176,17 @@ class Refresh(StrEnum):
     """Which recordings are read again."""
 
     CHANGED = "changed"
-    """Those that anybody has written to since, and those that are not finished."""
+    """Those that have changed since, and those that are not finished."""
     ALL = "all"
 
 
 def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
-    """List the recordings of a folder, the oldest first, and bring its catalogue up to date.
+    """List the recordings of a folder, oldest first, and update its catalogue.
 
-    In a folder that may not be written the list is made again each time.
-
-    Raises
-    ------
-    RecordingError
-        When there is no such folder, or ``catalogue.sqlite`` is something else.
+    In a read-only folder the list is made again each time.
     """
     if not folder.is_dir():
-        raise RecordingError(f"{folder} is no folder; give the folder that the recordings are in.")
+        raise RecordingError(f"{folder} is not a folder; give the folder that the recordings are in.")
     try:
         with closing(_open_catalogue(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
@@ -202,8 +197,8 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
             return _entries(connection)
     except sqlite3.DatabaseError as error:
         raise RecordingError(
-            f"{folder / CATALOGUE_NAME} is no catalogue ({error}). Nothing was changed; rebuild it, or move "
-            "it away if it is something else"
+            f"{folder / CATALOGUE_NAME} is not a catalogue ({error}). Nothing was changed; rebuild it, or "
+            "move it away if it is something else"
         ) from error
 
 
@@ -232,18 +227,19 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
 
 
 def _update(folder: Path, connection: sqlite3.Connection) -> None:
-    """Read what is new or changed, and forget what is gone; all in one transaction."""
+    """Read new or changed files, and remove entries of missing ones; all in one transaction."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
     for path in recordings_below(folder):
         try:
             found = path.stat()
             size_bytes, stamp = found.st_size, _stamp(found)
-        except FileNotFoundError:  # it got its final name while we looked
+        except FileNotFoundError:  # it got its final name in the meantime
             continue
-        except OSError:  # a link that leads to itself: its entry says that it cannot be read
+        except OSError:  # a link to itself: its entry says that it cannot be read
             size_bytes, stamp = 0, ""
         where = place_below(folder, path)
-        # A .part says "interrupted" when its program is dead, and no byte of it changes for that.
+        # The state of a .part changes to "interrupted" when its program has ended, without any change of the
+        # file.
         if known.pop(where, None) != stamp or path.suffix == PART_SUFFIX:
             entry = read_entry(where, path, size_bytes)
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
@@ -257,12 +253,12 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
 
 
 def _stamp(found: os.stat_result) -> str:
-    """Return what differs after any write: no program sets back the time that the file system noted."""
+    """Return a value that changes with any write: no program sets back the file system's time of change."""
     return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}"
 
 
 def recordings_below(folder: Path) -> Iterator[Path]:
-    """Yield every recording of a folder and the folders in it, finished or not."""
+    """Yield every recording of a folder and its subfolders, finished or not."""
     yield from sorted(folder.rglob(f"*{SUFFIX}"))
     yield from sorted(folder.rglob(f"*{SUFFIX}{PART_SUFFIX}"))
 
@@ -276,7 +272,7 @@ def _entries(connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
 
 
 MISSING = "missing"
-"""Verdict on a recording that a journal counts on, and that is not there."""
+"""Verdict on a recording that is in the journal but missing."""
 BAD = frozenset(
     {SealState.DAMAGED.value, SealState.SEAL_GONE.value, SealState.OTHER_KEY.value, UNREADABLE, MISSING}
 )
@@ -284,20 +280,20 @@ BAD = frozenset(
 
 @dataclass(frozen=True)
 class VerifiedRecording:
-    """What was found of one file."""
+    """Result of verifying one file."""
 
     path: str
-    """Below the folder, with ``/``; the name of a single file."""
+    """Relative to the folder, with ``/``; the name of a single file."""
     verdict: str
     """As in `recording.SealState`, ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]
-    """Verdict on each result that was saved in it."""
+    """Verdict on each saved result."""
 
     @property
     def is_bad(self) -> bool:
-        """Whether the file, or a result in it, is not as it was made."""
+        """Whether the file, or a result in it, has changed since it was made."""
         return self.verdict in BAD or not BAD.isdisjoint(self.results.values())
 
 
@@ -306,7 +302,7 @@ def verify_recordings(
     depth: SealDepth | str = SealDepth.WHOLE,
     key: SealKey | None = None,
 ) -> tuple[VerifiedRecording, ...]:
-    """Hold a recording, or all of a folder and of those in it, against seals and journals; changes nothing.
+    """Compare a recording, or all below a folder, with seals and journals; changes nothing.
 
     Parameters
     ----------
@@ -332,7 +328,7 @@ def verify_recordings(
     broken = []
     for journal in sorted(root.rglob(f"*{JOURNAL_SUFFIX}") if is_folder else root.glob(f"*{JOURNAL_SUFFIX}")):
         try:
-            points = read_journal(journal) if is_begun(journal) else ()
+            points = read_journal(journal) if journal_exists(journal) else ()
         except RecordingError as error:
             broken.append(VerifiedRecording(place_below(root, journal), UNREADABLE, str(error), "", {}))
             continue

@@ -1,8 +1,8 @@
-"""A campaign's journal on disk: every point's state, committed before and after each thing that is done.
+"""A campaign's journal on disk: every point's state, committed before and after each step.
 
-SQLite in WAL mode with full synchronisation: a transaction that has returned survives a kill and a power
-cut, and one that has not leaves no trace. So at any moment the journal is right, or says ``running``
-of the one point that was under way.
+SQLite in WAL mode with full synchronisation: a finished transaction survives a kill and a power cut, and an
+unfinished one leaves no trace. So the journal is always right, or says ``running`` of the one point that was
+under way.
 """
 
 import re
@@ -34,24 +34,25 @@ from ._bench_identity import BenchIdentity
 
 
 class ReasonCode(StrEnum):
-    """The named reason of a point's state; the words of `plan.retry.Retryable` are among them."""
+    """The reason of a point's state; the words of `plan.retry.Retryable` are among them."""
 
     NOT_YET = "not_yet"
     """Its turn has not come."""
     RUNNING = "running"
     CARRIED_OUT = "carried_out"
     OVER_RANGE = "over_range"
-    """Carried out, with an input near its full scale while it counted."""
+    """Carried out, with an input near its full scale in a recorded segment."""
     FOUND = "found"
-    """A complete recording of the same plan lay in the folder."""
+    """A complete recording of the same plan was in the folder."""
     GONE = "gone"
-    """It was done, and its recording has been taken away."""
+    """It was done, but its recording is missing."""
     DAMAGED = "damaged"
-    """It was done, and its recording is not as it was sealed; that one is kept, and it is made again."""
+    """It was done, but its recording differs from its seal; the file is kept, and the point is measured
+    again."""
     STOPPED = "stopped"
-    """Somebody asked for a stop; the sentence says who."""
+    """Somebody requested a stop; the sentence says who."""
     PROGRAM_ENDED = "program_ended"
-    """The program ended without a word: killed, crashed, or without power."""
+    """The program ended without notice: killed, crashed, or without power."""
     DATA_LOST = "data_lost"
     INSTRUMENT_LOST = "instrument_lost"
     INSTRUMENT_FAULT = "instrument_fault"
@@ -59,7 +60,7 @@ class ReasonCode(StrEnum):
     LIMIT = "limit"
     DISK = "disk"
     PLAN = "plan"
-    """Nothing on this bench can play it."""
+    """This bench cannot play it."""
     FAULT = "fault"
     """Anything else that went wrong."""
 
@@ -77,27 +78,27 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
 
 
 def reason_code_of(error: AcquisitionError) -> ReasonCode:
-    """Name the reason that an error stands for."""
+    """Return the reason code of an error."""
     return next(
         (reason_code for kind, reason_code in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT
     )
 
 
 class ExistingRecordings(StrEnum):
-    """What to do about recordings that are in the folder already."""
+    """What to do with recordings that are already in the folder."""
 
     REFUSE = "refuse"
-    """Begin no campaign over an older one."""
+    """Refuse to begin a campaign over an older one."""
     RESUME = "resume"
-    """Leave out what is complete; make another attempt, beside the old one, at what is not."""
+    """Keep complete recordings; measure the others again, beside the old files."""
 
 
 class AfterFailure(StrEnum):
-    """What to do when a measurement fails, and its attempts are used up."""
+    """What to do when all attempts at a measurement have failed."""
 
     STOP = "stop"
     GO_ON = "go_on"
-    """Make the next one, unless an instrument or the disk is lost: nothing can be measured then."""
+    """Continue with the next one, unless an instrument or the disk is lost: then nothing can be measured."""
 
 
 class ChangedBench(StrEnum):
@@ -105,11 +106,11 @@ class ChangedBench(StrEnum):
 
     REFUSE = "refuse"
     ACCEPT = "accept"
-    """Go on, and keep both in the journal."""
+    """Continue, and record both in the journal."""
 
 
 class PointOutcome(StrEnum):
-    """How one recording of a campaign came out."""
+    """Result of one recording of a campaign."""
 
     RECORDED = "recorded"
     KEPT = "kept"
@@ -120,7 +121,7 @@ class PointOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class PointResult:
-    """One recording of a campaign, as it came out."""
+    """One recording of a campaign, with its result."""
 
     name: str
     outcome: PointOutcome
@@ -131,15 +132,15 @@ class PointResult:
 
 @dataclass(frozen=True, eq=False)
 class CampaignProgress:
-    """Where a campaign stands after each block."""
+    """State of a campaign after each block."""
 
     name: str
     number: int
     """Number of this recording, from 1."""
     count: int
-    """Recordings in all."""
+    """Number of recordings."""
     path: Path
-    """Path of the recording that is being made."""
+    """Path of the current recording."""
     run: Progress
 
 
@@ -154,7 +155,7 @@ class DonePoint:
 
 @dataclass(frozen=True)
 class Finished:
-    """Arguments of a callback when a point is done: the point, and all points done."""
+    """Arguments of the callback after a point: the point, and all points done."""
 
     point: DonePoint
     done: tuple[DonePoint, ...]
@@ -162,27 +163,26 @@ class Finished:
 
 
 After = Callable[[Finished, Recording], Iterable[Measurement]]
-"""Asked after every point with its open recording; gives the measurements to be made next, or none."""
+"""Called after every point with its open recording; returns the measurements to be made next, or none."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
-    """Watch nothing."""
+    """Ignore progress."""
 
 
 def ignore_result(point_result: PointResult) -> None:
-    """Do nothing about a recording."""
+    """Ignore a result."""
 
 
-# The SQLite file of a journal: its tables, how it is opened, and its errors as sentences.
-#
-# docs/campaigns.md describes the tables for a stranger.
+# The SQLite file of a journal: its tables, how it is opened, and its errors as sentences. docs/campaigns.md
+# describes the tables.
 
 VERSION = 2
 
 SEAL_COLUMNS = tuple(
     f"ALTER TABLE {table} ADD COLUMN seal TEXT NOT NULL DEFAULT ''" for table in ("points", "attempts")
 )
-"""What version 1 lacks."""
+"""Columns that version 1 lacks."""
 
 SCHEMA = """
 CREATE TABLE campaign (
@@ -230,8 +230,8 @@ FROM points ORDER BY place
 """
 
 
-def is_begun(path: Path) -> bool:
-    """Whether a journal stands there; one whose program died before its first commit does not."""
+def journal_exists(path: Path) -> bool:
+    """Whether a journal exists; a program that ended before its first commit left none."""
     if not path.is_file():
         return False
     with sentences(path), closing(opened_to_look(path)) as connection:
@@ -241,7 +241,7 @@ def is_begun(path: Path) -> bool:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a database to write, so that what it has committed survives a kill and a power cut."""
+    """Open a database for writing, so that commits survive a kill and a power cut."""
     with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
@@ -250,12 +250,12 @@ def connect(path: Path) -> sqlite3.Connection:
 
 
 def require_version(path: Path, connection: sqlite3.Connection) -> None:
-    """Refuse what is no journal, or one of a newer version; raises RecordingError."""
+    """Refuse a file that is not a journal, or one of a newer version; raises RecordingError."""
     try:
         row = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
     except sqlite3.Error as error:
         raise RecordingError(
-            f"{path} is no journal of a campaign ({error}). Nothing was changed; give another folder"
+            f"{path} is not a journal of a campaign ({error}). Nothing was changed; give another folder"
         ) from error
     if row is None or int(row["value"]) > VERSION:
         raise RecordingError(
@@ -265,10 +265,10 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def sentences(path: Path) -> Iterator[None]:
-    """Let an error of the database become a sentence, and what stands in it that cannot be."""
+    """Turn errors of the database, and invalid contents, into one sentence."""
     try:
         yield
-    except (ValueError, TypeError, LookupError) as error:  # pydantic's; columns gone
+    except (ValueError, TypeError, LookupError) as error:  # pydantic's; missing columns
         raise RecordingError(
             f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
             "another version. Nothing was changed; put back a copy, or move it away: what lies there is found"
@@ -281,42 +281,42 @@ def sentences(path: Path) -> Iterator[None]:
 
 
 class JournalPointState(StrEnum):
-    """Where a point stands."""
+    """State of a point."""
 
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"
     FAILED = "failed"
     INTERRUPTED = "interrupted"
-    """Stopped by somebody, or by the end of its program."""
+    """Stopped by a person, or by the end of its program."""
 
 
 @dataclass(frozen=True)
 class JournalPoint:
-    """One point as the journal knows it."""
+    """One point in the journal."""
 
     name: str
     measurement: Measurement
     chain: str
     added_after: str
-    """The point whose result asked for this one; empty when it stood in the plan."""
+    """The point whose result requested this one; empty for points of the plan."""
     state: JournalPointState
     reason_code: ReasonCode
     reason: str
     file: str
-    """File of the last attempt; a name in the journal's folder, empty before the first."""
+    """Name of the last attempt's file in the journal's folder; empty before the first."""
     attempts: int
     is_followed_up: bool
-    """Whether what its result asks for is in the journal."""
+    """Whether the measurements that its result requested are in the journal."""
     begun_utc: str
     ended_utc: str
     """End of the last attempt."""
     seal: str
-    """Seal of its recording; empty before there is one, and of recordings that had none."""
+    """Seal of its recording; empty without a recording or a seal."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
-    """Look at a journal, also while its campaign runs; changes nothing.
+    """Read a journal, also while its campaign runs; changes nothing.
 
     Raises
     ------
@@ -331,14 +331,14 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 
 
 def _own_name(file: str) -> str:
-    """Refuse a file outside the journal's folder: what lies there is recovered, and cleared of copies."""
+    """Refuse a file outside the journal's folder: listed files are recovered and their copies deleted."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
-        raise ValueError(f"{file[:80]!r} is no name of a recording")
+        raise ValueError(f"{file[:80]!r} is not a name of a recording")
     return file
 
 
 def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
-    """Every point, in the order in which they are made."""
+    """Return every point, in the order of measurement."""
     return tuple(
         JournalPoint(
             name=row["name"],
@@ -360,12 +360,12 @@ def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
 
 
 def journal_path(folder: Path, campaign: str) -> Path:
-    """Where the journal of a campaign lies."""
+    """Return the path of a campaign's journal."""
     return folder / f"{campaign}{JOURNAL_SUFFIX}"
 
 
 class Journal(ClosedOnLeaving):
-    """The journal of one campaign, open for writing; belongs to one thread. Use it in a ``with``."""
+    """The journal of one campaign, open for writing; used by one thread. Use it in a ``with``."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
@@ -373,7 +373,7 @@ class Journal(ClosedOnLeaving):
 
     @classmethod
     def begin(cls, path: Path, campaign: Campaign, bench: BenchIdentity) -> Self:
-        """Write down the whole plan, in one transaction, before anything is done."""
+        """Write the whole plan, in one transaction, before anything else happens."""
         points = campaign.points()
         journal = cls(path, connect(path))
         with closed_on_error(journal._connection), journal._transaction() as connection:
@@ -392,14 +392,14 @@ class Journal(ClosedOnLeaving):
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Open a journal to go on with it.
+        """Open a journal to continue it.
 
-        Raises RecordingError when the file is no journal, or of a newer version.
+        Raises RecordingError when the file is not a journal, or is of a newer version.
         """
         with closed_on_error(connect(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
-                # A journal of version 1 gets what it lacks, in one transaction.
+                # A journal of version 1 gets the missing columns, in one transaction.
                 connection.execute("BEGIN IMMEDIATE")
                 (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
                 if int(version) < VERSION:
@@ -411,30 +411,30 @@ class Journal(ClosedOnLeaving):
 
     @property
     def campaign(self) -> Campaign:
-        """The plan it was started with."""
+        """The campaign's plan at its start."""
         with sentences(self.path):
             return Campaign.model_validate_json(self._fact("plan_json"))
 
     @property
     def bench(self) -> BenchIdentity:
-        """The bench it was started on, or the one accepted since."""
+        """The bench at its start, or the one accepted since."""
         command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
         with sentences(self.path):
             (identity,) = self._connection.execute(command).fetchone()
             return BenchIdentity.model_validate_json(identity)
 
     def points(self) -> tuple[JournalPoint, ...]:
-        """Every point, in the order in which they are made."""
+        """Every point, in the order of measurement."""
         with sentences(self.path):
             return points_of(self._connection)
 
     def accept_bench(self, bench: BenchIdentity) -> None:
-        """Go on with another bench; the earlier ones stay on record."""
+        """Continue with another bench; the earlier ones stay in the journal."""
         with self._transaction() as connection:
             connection.execute("INSERT INTO benches VALUES (?, ?)", (_now(), bench.model_dump_json()))
 
     def start(self, name: str, file: str) -> None:
-        """Say that an attempt begins, before anything plays."""
+        """Record that an attempt begins, before anything plays."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))
@@ -447,7 +447,7 @@ class Journal(ClosedOnLeaving):
     def end(
         self, name: str, state: JournalPointState, reason_code: ReasonCode, reason: str, seal: str = ""
     ) -> None:
-        """Say how the running attempt came out, and how its recording is sealed."""
+        """Record the result of the running attempt, and the seal of its recording."""
         with self._transaction() as connection:
             _set(connection, name, state, reason_code, reason)
             connection.execute("UPDATE points SET seal = ? WHERE name = ?", (seal, name))
@@ -458,18 +458,18 @@ class Journal(ClosedOnLeaving):
             )
 
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
-        """Put a point back, whose recording is not there after all."""
+        """Queue a point again whose recording is missing."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
     def keep(self, name: str, file: str, seal: str) -> None:
-        """Count a recording that lies in the folder already."""
+        """Record a file that is already in the folder."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """Put what a result asks for behind it, and note that it has been asked; both or neither."""
+        """Insert the measurements that a result requested after it, and mark it; both or neither."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))
@@ -477,7 +477,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET is_followed_up = 1 WHERE name = ?", (name,))
 
     def close(self) -> None:
-        """Let go of the file. Legal at any time."""
+        """Close the file. Legal at any time."""
         self._connection.close()
 
     def _fact(self, key: str) -> str:

@@ -27,7 +27,7 @@ from ._journal import CampaignProgress, JournalPoint, JournalPointState
 
 
 class CampaignEventKind(StrEnum):
-    """What happened."""
+    """Kind of an event."""
 
     BEGUN = "begun"
     RESUMED = "resumed"
@@ -35,23 +35,23 @@ class CampaignEventKind(StrEnum):
     POINT_DONE = "point_done"
     POINT_STOPPED = "point_stopped"
     FAULT = "fault"
-    """An attempt failed, or the campaign met something that ends it."""
+    """An attempt failed, or the campaign was ended by a fault."""
     DAMAGED = "damaged"
-    """A recording that was complete is not as it was sealed, or is gone; its point is made again."""
+    """A complete recording differs from its seal, or is missing; its point is measured again."""
     RETRY = "retry"
     RESTING = "resting"
-    """Silence between two recordings."""
+    """Pause between two recordings."""
     BENCH_REOPENED = "bench_reopened"
     FURTHER = "further"
-    """A result asked for more measurements."""
+    """A result requested more measurements."""
     ENDED = "ended"
     NOTICE = "notice"
-    """Somebody was told, or could not be reached."""
+    """A notice was sent, or could not be sent."""
 
 
 @dataclass(frozen=True)
 class CampaignEvent:
-    """One thing that happened, as a sentence and as facts."""
+    """One event, as a sentence and as facts."""
 
     kind: CampaignEventKind
     text: str
@@ -59,27 +59,27 @@ class CampaignEvent:
 
 
 CampaignListener = Callable[[CampaignEvent], None]
-"""Told of every event, in order; must not raise."""
+"""Called with every event, in order; must not raise."""
 
 
 def ignore_event(event: CampaignEvent) -> None:
-    """Tell nobody."""
+    """Ignore an event."""
 
 
 LOG_SUFFIX = ".log.jsonl"
 
 
 class CampaignLog(ClosedOnLeaving):
-    """Appends what happens; a line is on its way to the disk before the next thing is done.
+    """Appends events; a line is sent to the disk before the next step.
 
-    A log that cannot be written (the disk is full) is no reason to stop: the journal is what counts.
+    A log that cannot be written (full disk) does not stop the campaign, which needs only the journal.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
             self._file = path.open("a", encoding="utf-8")
-            # A program that was killed may have left half a line.
+            # A killed program may have left half a line.
             if not _ends_a_line(path):
                 self._file.write("\n")
         except OSError as error:
@@ -89,7 +89,7 @@ class CampaignLog(ClosedOnLeaving):
             ) from error
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Write one event down."""
+        """Write one event."""
         utc = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = {"utc": utc, "event": event.kind.value, "text": event.text, **event.facts}
         with suppress(OSError):
@@ -97,7 +97,7 @@ class CampaignLog(ClosedOnLeaving):
             self._file.flush()
 
     def close(self) -> None:
-        """End the log. Legal at any time."""
+        """Close the log. Legal at any time."""
         with suppress(OSError):
             self._file.close()
 
@@ -109,21 +109,21 @@ def _ends_a_line(path: Path) -> bool:
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""While nothing else happens [s]: a night makes half a megabyte."""
+"""Interval of lines without other events [s]: a night makes half a megabyte."""
 LEFT_ALONE_S = 1.0
-"""How long the last lines may take [s]."""
+"""How long writing the last lines may take [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
-    """Appends a line whenever something happens, and every few seconds while a point runs.
+    """Appends a line at every event, and every few seconds while a point runs.
 
-    The player does not wait for it: a folder that hangs would leave the drive on.
+    The player does not wait for it: a folder that hangs would keep the drive on.
     """
 
     def __init__(
         self, path: Path, campaign: str, points: Sequence[JournalPoint], rest_s: float = 0.0
     ) -> None:
-        """``rest_s`` lies between two points."""
+        """``rest_s``: pause between two points."""
         self._path = path
         self._campaign = campaign
         self._counts = Counter(done=sum(point.state is JournalPointState.DONE for point in points))
@@ -131,14 +131,14 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Rig time behind the point that runs."""
+        """Rig time after the running point."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
         self._beside = Beside("campaign status")
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Write what has happened."""
+        """Write an event."""
         match event.kind:
             case CampaignEventKind.POINT_DONE:
                 self._counts["done"] += 1
@@ -150,7 +150,7 @@ class StatusLine(ClosedOnLeaving):
         self._write(event.text)
 
     def progress(self, stand: CampaignProgress) -> None:
-        """Note a block; write a line when the last one is old."""
+        """Take the progress after a block; write a line when the last one is old."""
         run = stand.run
         self._point_s = run.elapsed_s
         self._where = f"{stand.number}/{stand.count} {stand.name}"
@@ -160,7 +160,7 @@ class StatusLine(ClosedOnLeaving):
             self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s{known}")
 
     def close(self) -> None:
-        """Let the last lines be written. Legal at any time."""
+        """Write the last lines. Legal at any time."""
         self._beside.close(LEFT_ALONE_S)
 
     def _write(self, what: str) -> None:
@@ -171,19 +171,19 @@ class StatusLine(ClosedOnLeaving):
         self._beside.do(lambda: self._append(line))
 
     def _append(self, line: str) -> None:
-        # A full disk must not end a measurement for the sake of this line.
+        # A full disk must not end a measurement because of this line.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 
     def _left(self) -> timedelta:
-        """Time left, at the pace of this session; before there is one, at the rig's own."""
+        """Return the time left at the speed of this session; before that, in rig time."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
 
 
 class Security(StrEnum):
-    """How the way to the mail server is protected."""
+    """Encryption of the connection to the mail server."""
 
     STARTTLS = "starttls"
     TLS = "tls"
@@ -192,7 +192,7 @@ class Security(StrEnum):
 
 
 class MailSettings(FrozenModel):
-    """Where mail goes, and through which server. Keep the file to yourself: it may hold a password."""
+    """Mail server and recipients. Protect the file: it may contain a password."""
 
     host: str = Field(min_length=1)
     port: PositiveInt = 587
@@ -200,19 +200,19 @@ class MailSettings(FrozenModel):
     sender: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
     recipients: tuple[str, ...] = Field(min_length=1)
     user: str = ""
-    """Empty for a server that asks for none."""
+    """Empty for a server without login."""
     password: SecretStr = SecretStr("")
     timeout_s: PositiveFloat = Field(default=20.0, le=300)
 
 
 class MailMessenger:
-    """Sends each notice as a message."""
+    """Sends each notice as a mail."""
 
     def __init__(self, settings: MailSettings) -> None:
         self._settings = settings
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Send one message; says in a clause how that went."""
+        """Send one mail; return a clause on its result."""
         settings = self._settings
         try:
             with self._connected() as server:
@@ -247,21 +247,21 @@ COMMAND_LONGEST_S = 30.0
 
 
 class Messenger(Protocol):
-    """A way to reach somebody."""
+    """A way to notify somebody."""
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Pass a notice on; says in a clause how that went, and never raises."""
+        """Send a notice; return a clause on its result, and never raise."""
 
 
 @dataclass(frozen=True)
 class CommandMessenger:
-    """Runs a command with the notice as JSON on its standard input; no shell has a say in it."""
+    """Runs a command with the notice as JSON on its standard input, without a shell."""
 
     arguments: tuple[str, ...]
 
     @classmethod
     def of(cls, command: str) -> "CommandMessenger":
-        """Take a command line apart, as a shell would, except for variables, wildcards and pipes.
+        """Split a command line as a shell does, without variables, wildcards and pipes.
 
         Raises
         ------
@@ -278,7 +278,7 @@ class CommandMessenger:
             raise ConfigurationError("the command is empty; give a program and its arguments")
         if shutil.which(arguments[0]) is None:
             raise ConfigurationError(
-                f"the command {arguments[0]!r} is no program that can be run here; give the path of one"
+                f"the command {arguments[0]!r} is not a program that can be run here; give the path of one"
             )
         return cls(arguments)
 
@@ -301,19 +301,19 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Follows a campaign, and passes faults and its end on. What fails there harms nothing."""
+    """Follows a campaign, and sends faults and its end. A failure here has no effect on the campaign."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
     ) -> None:
-        """``say``: told how each attempt to reach somebody went."""
+        """``say``: called with the result of each notice."""
         self._campaign = campaign
         self._folder = folder
         self._messengers = messengers
         self._say = say
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Pass an event on, if it is one to be told of."""
+        """Send an event, if it is one to report."""
         if event.kind not in TOLD_OF:
             return
         notice = {

@@ -1,6 +1,6 @@
-"""Beginning or resuming a campaign: what stands in the way, what is kept, and which journal is written on.
+"""Beginning or resuming a campaign: obstacles, kept recordings, and the journal.
 
-After a crash, journal and folder are brought together: what is true of the point that was running.
+After a crash, journal and folder are compared to find the state of the point that was running.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +15,7 @@ from ..plan import Campaign, Measurement, Point, played_alike, require_within_li
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
-from ._attempt_files import KeptRecording, attempts_in, complete_attempt, looked_at, next_attempt
+from ._attempt_files import KeptRecording, attempts_in, complete_attempt, next_attempt, read_attempt
 from ._bench_identity import BenchIdentity, differences
 from ._journal import (
     ChangedBench,
@@ -23,7 +23,7 @@ from ._journal import (
     Journal,
     JournalPointState,
     ReasonCode,
-    is_begun,
+    journal_exists,
     journal_path,
     read_journal,
 )
@@ -32,13 +32,13 @@ PROGRAM_ENDED = "its program ended in the middle of it"
 
 
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
-    """Bring a journal that is gone on with up to date with the files beside it.
+    """Update a resumed journal from the files in its folder.
 
-    A point whose recording is complete is done, whatever the journal says: its last word may be missing. One
-    that was running is interrupted otherwise; what was left of its recording becomes a readable file. A
-    done point is queued again when its recording has been taken away, or is not as it was sealed: that
-    one stays where it is, and the next attempt is made beside it. To read a folder may take minutes: after a
-    stop the rest is left for the next resume, since no other point will be made.
+    A point with a complete recording is done, whatever the journal says, because its last entry may be
+    missing. A point that was running is otherwise interrupted; the rest of its recording becomes a readable
+    file. A done point is queued again when its recording is missing or differs from its seal; the file is
+    kept, and the next attempt is made beside it. Reading a folder may take minutes: after a stop the rest is
+    left for the next resume, since no further point will be measured.
     """
     for point in journal.points():
         if stop.request is not None:
@@ -51,7 +51,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
             case JournalPointState.DONE if not path.exists():
                 journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
             case JournalPointState.DONE:
-                found = looked_at(path, point.measurement, SealDepth.WHOLE)
+                found = read_attempt(path, point.measurement, SealDepth.WHOLE)
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
             case state if point.file:
@@ -64,11 +64,11 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
 def found_recordings(
     points: Sequence[Point], folder: Path, depth: SealDepth, stop: StopSwitch | None = None
 ) -> dict[str, KeptRecording]:
-    """Find what lies in the folder already, for a campaign whose journal is lost, or older than journals.
+    """Find the recordings in a folder, for a campaign whose journal is lost or never existed.
 
-    After a stop no more samples are read; the next resume, which has a journal, reads them. Damaged ones are
-    found too, and those whose seal is not what any journal of the folder has: the campaign may have got
-    another name. Raises RecordingError when a recording is complete, but was made by another plan.
+    After a stop no more samples are read; the next resume, which has a journal, reads them. Damaged
+    recordings are found too, and those whose seal is in no journal of the folder: the campaign may have been
+    renamed. Raises RecordingError when a recording is complete, but was made by another plan.
     """
 
     def looked_for(point: Point) -> KeptRecording | None:
@@ -80,20 +80,20 @@ def found_recordings(
 
 
 def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:
-    """Recover every attempt at a point that was not finished; returns the errors by file name.
+    """Recover every unfinished attempt at a point; returns the errors by file name.
 
     Raises RecordingError when that fails for a complete one, which the next attempt would record again.
     """
     errors: dict[str, str] = {}
     for path in attempts:
         if not part_of(path).exists():
-            with suppress(OSError):  # it was being prepared: not a sample is in it
+            with suppress(OSError):  # it was being prepared and contains no sample
                 tmp_of(path).unlink()
             continue
         try:
             recover(path)
         except RecordingError as error:
-            left = looked_at(part_of(path), measurement, SealDepth.QUICK)
+            left = read_attempt(part_of(path), measurement, SealDepth.QUICK)
             if left.is_complete and left.is_of_this_plan and not path.exists():
                 raise
             errors[path.name] = str(error)
@@ -110,7 +110,7 @@ def _end_of_attempt(
 
 
 def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
-    found = looked_at(path, measurement, SealDepth.WHOLE)
+    found = read_attempt(path, measurement, SealDepth.WHOLE)
     if found.damage:
         return JournalPointState.INTERRUPTED, ReasonCode.DAMAGED, found.damage, found.seal
     if found.is_complete and found.is_of_this_plan:
@@ -128,12 +128,12 @@ def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointSt
 
 
 MOST_DIFFERENCES = 5
-"""Differences that a refusal lists."""
+"""Number of differences that a refusal lists."""
 
 
 @dataclass(frozen=True)
 class PlannedRecording:
-    """One recording that a campaign wants, and where it goes."""
+    """One recording of a campaign, and its path."""
 
     name: str
     measurement: Measurement
@@ -143,12 +143,12 @@ class PlannedRecording:
 
 
 def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
-    """Refuse a campaign of which any point passes a limit, or cannot be played; raises LimitExceeded."""
+    """Refuse a campaign with a point that exceeds a limit or cannot be played; raises LimitExceeded."""
     complaints: dict[str, None] = {}
     for point in played_alike(points):
         try:
             require_within_limits(point.measurement, bench.rig)
-            drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
+            drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
         except LimitExceeded as error:
             complaints[str(error)] = None
     if complaints:
@@ -158,7 +158,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
 def planned_recordings(
     campaign: Campaign, folder: Path, existing: ExistingRecordings
 ) -> tuple[PlannedRecording, ...]:
-    """Return which recordings are to be made and which are there; touches nothing.
+    """Return which recordings are to be made and which exist; changes nothing.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def planned_recordings(
             assert_never(existing)
 
 
-def opened_journal(
+def open_journal(
     bench: Bench,
     campaign: Campaign,
     folder: Path,
@@ -187,7 +187,7 @@ def opened_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    """Begin a journal, or open the one that the campaign was started with and bring it up to date.
+    """Begin a journal, or open the campaign's journal and update it.
 
     Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that, or
     the journal belongs to another plan, and CheckFailed when the bench is another one than the campaign was
@@ -199,8 +199,8 @@ def opened_journal(
         case ExistingRecordings.REFUSE:
             require_new(campaign, campaign.points(), folder)
             return Journal.begin(path, campaign, identity)
-        case ExistingRecordings.RESUME if is_begun(path):
-            return _gone_on_with(path, campaign, identity, folder, changed, stop)
+        case ExistingRecordings.RESUME if journal_exists(path):
+            return _resumed_journal(path, campaign, identity, folder, changed, stop)
         case ExistingRecordings.RESUME:
             for point in campaign.points():
                 _recover(attempts_in(folder, point.name), point.measurement)
@@ -220,7 +220,7 @@ def opened_journal(
 
 
 def require_same_bench(begun_on: BenchIdentity, now: BenchIdentity) -> None:
-    """Refuse to go on with a campaign on another bench; raises CheckFailed."""
+    """Refuse to continue a campaign on another bench; raises CheckFailed."""
     _require_no_differences(begun_on.differences(now))
 
 
@@ -245,7 +245,7 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def _gone_on_with(
+def _resumed_journal(
     path: Path,
     campaign: Campaign,
     now: BenchIdentity,
@@ -278,15 +278,15 @@ def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
 
 
 def _points_to_make(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:
-    """List what a plan makes, without notes: they may be added to."""
+    """Return the points of a plan, without notes, which may change."""
     return tuple((name, each.model_copy(update={"notes": ""})) for name, each in campaign.recordings())
 
 
 def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> None:
-    """Refuse to begin a campaign over an older one; raises RecordingError and touches nothing."""
+    """Refuse to begin a campaign over an older one; raises RecordingError and changes nothing."""
     present = [str(path) for point in points for path in attempts_in(folder, point.name)]
     path = journal_path(folder, campaign.name)
-    if not present and is_begun(path):
+    if not present and journal_exists(path):
         present = [str(path)]
     if present:
         shown = ", ".join(present[:MOST_DIFFERENCES]) + (
@@ -301,7 +301,7 @@ def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> 
 
 def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> tuple[PlannedRecording, ...]:
     path = journal_path(folder, campaign.name)
-    if not is_begun(path):
+    if not journal_exists(path):
         kept = found_recordings(points, folder, SealDepth.QUICK)
         found = {name: each.path for name, each in kept.items() if each.is_complete}
         wanted = [(each.name, each.measurement) for each in points]
@@ -311,7 +311,7 @@ def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> t
             each.name: folder / each.file
             for each in known
             if each.file
-            for kept in [looked_at(folder / each.file, each.measurement, SealDepth.QUICK)]
+            for kept in [read_attempt(folder / each.file, each.measurement, SealDepth.QUICK)]
             if (kept.is_complete and kept.is_of_this_plan)
             or (each.state is JournalPointState.DONE and not kept.damage)
         }

@@ -52,11 +52,11 @@ from ._log import (
     StatusLine,
     ignore_event,
 )
-from ._opening import make_folder, opened_journal, planned_recordings, require_all_within_limits, require_new
+from ._opening import make_folder, open_journal, planned_recordings, require_all_within_limits, require_new
 
 
 class CampaignRunner:
-    """The way through the points, with what results add to it."""
+    """Runs the points of a campaign, and those that results add."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class CampaignRunner:
         on_progress: Callable[[CampaignProgress], None],
         on_result: Callable[[PointResult], None],
     ) -> tuple[PointResult, ...]:
-        """Make the points one after the other; returns how each came out."""
+        """Measure the points one after the other; return the result of each."""
         done = sum(point.state is JournalPointState.DONE for point in self._coming)
         begun = (
             CampaignEventKind.RESUMED
@@ -121,7 +121,7 @@ class CampaignRunner:
         return tuple(self._results)
 
     def _name_damaged(self) -> None:
-        """Say of which points the recordings no longer count."""
+        """Report the points whose recordings are no longer valid."""
         for point in self._coming:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
                 text = f"{point.name} is made again: {point.reason}"
@@ -129,7 +129,7 @@ class CampaignRunner:
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Rest before a point that is to be made; a stop ends the rest, and the campaign."""
+        """Pause before a point that is to be measured; a stop ends the pause, and the campaign."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.pause_before(point.name)
         return self._stop.request is None
@@ -141,7 +141,7 @@ class CampaignRunner:
         try:
             return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
-            raise  # without instruments, or without room on the disk, the next point would fail too
+            raise  # without instruments, or without disk space, the next point would fail too
         except AcquisitionError as error:
             if self._after_failure is AfterFailure.STOP:
                 raise
@@ -151,7 +151,7 @@ class CampaignRunner:
             return PointResult(point.name, PointOutcome.FAILED, path, str(error), reason_code_of(error))
 
     def _follow_up(self, point: JournalPoint, point_result: PointResult) -> None:
-        """Ask what a result asks for, once, and put it next."""
+        """Call ``after`` once for a point, and insert the measurements that it requests."""
         is_done = point_result.outcome in (PointOutcome.RECORDED, PointOutcome.KEPT)
         if not is_done or point.is_followed_up or self._after is None:
             return
@@ -214,47 +214,46 @@ def run_campaign(
 ) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
-    All points are checked against the limits of the rig before the first one begins. What was done, what
-    failed and why stands in the campaign's journal, so that a campaign that was killed goes on with
-    ``existing="resume"`` at its first unfinished point. Ctrl-C ends the running measurement softly, and
-    the campaign with it.
+    All points are checked against the limits of the rig before the first one begins. The journal records
+    what was done, what failed and why, so that a killed campaign continues with ``existing="resume"`` at its
+    first unfinished point. Ctrl-C ramps the running measurement down, and ends the campaign.
 
     Parameters
     ----------
     bench, campaign, folder
-        On what, what, and where to.
+        The open bench, the plan, and the folder of the recordings.
     existing, after_failure, changed_bench
-        What to do about recordings that are there, about a point whose attempts are used up, and about
-        another bench than the campaign was started on; members of the enums or their words.
+        What to do with existing recordings, with a point whose attempts are used up, and with another
+        bench than the campaign was started on; members of the enums or their words.
     on_progress, on_result, on_event
-        Called after every block, after every recording, and whenever something happens.
+        Called after every block, after every recording, and at every event.
     switch
         Lets others hold the running measurement, or end the campaign.
     after
-        Asked after every point that is done; the measurements it gives are made next, in this session
+        Called after every point that is done; the measurements it returns are made next, in this session
         or after a resume.
     reopen
         Closes and opens the bench when an instrument is lost and the campaign's retries allow another
         attempt; absent, a lost instrument ends the campaign.
     messengers
-        Ways to reach somebody at every fault and at the end.
+        Ways to notify somebody at every fault and at the end.
 
     Returns
     -------
     tuple of PointResult
-        What was made, kept or failed; it ends early when the campaign was stopped.
+        The recordings made, kept or failed; it ends early when the campaign was stopped.
 
     Raises
     ------
     LimitExceeded
-        When any point would pass a limit; nothing was played.
+        When any point would exceed a limit; nothing was played.
     RecordingError
-        When the folder holds recordings already and ``existing`` refuses that, or another program carries
-        out the same campaign.
+        When the folder contains recordings already and ``existing`` refuses that, or another program
+        carries out the same campaign.
     CheckFailed
         When the bench has changed and ``changed_bench`` refuses that.
     AcquisitionError
-        Whatever a failing run raises, when ``after_failure`` says stop, or an instrument is lost.
+        The error of a failing run, when ``after_failure`` says stop, or an instrument is lost.
     """
     existing = chosen(ExistingRecordings, existing)
     after_failure = chosen(AfterFailure, after_failure)
@@ -268,9 +267,7 @@ def run_campaign(
     with ExitStack() as session:
         log = session.enter_context(_log_alone(folder, campaign))
         session.enter_context(stop_on_signal(stop, campaign.name))
-        journal = session.enter_context(
-            opened_journal(bench, campaign, folder, existing, changed_bench, stop)
-        )
+        journal = session.enter_context(open_journal(bench, campaign, folder, existing, changed_bench, stop))
         where = folder / f"{campaign.name}{STATUS_SUFFIX}"
         status = session.enter_context(StatusLine(where, campaign.name, journal.points(), campaign.rest_s))
         notifier = Notifier(campaign.name, folder, messengers, log)
@@ -291,7 +288,7 @@ def run_campaign(
 
 @contextmanager
 def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
-    """Open the log, which also marks the campaign as running; the mark goes with the process."""
+    """Open the log, which also marks the campaign as running; the mark ends with the process."""
     with CampaignLog(folder / f"{campaign.name}{LOG_SUFFIX}") as log, ExitStack() as mark:
         try:
             mark.enter_context(sole_use(log.path))
@@ -304,11 +301,11 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Rig time that passes on a virtual rig before its bench is opened again: cables are put back in it."""
+"""Rig time that passes on a virtual rig before its bench is opened again, in which cables are reconnected."""
 
 
 class ReconnectingBench:
-    """Opens a rig's bench, and opens it again without asking anybody anything. Use it in a ``with``."""
+    """Opens a rig's bench, and reopens it without asking anybody. Use it in a ``with``."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
@@ -326,11 +323,11 @@ class ReconnectingBench:
 
     @property
     def played_faults(self) -> tuple[str, ...]:
-        """What a script of faults has done to a virtual rig so far, in order."""
+        """Faults that a script has injected into a virtual rig so far, in order."""
         return tuple(each.fault for each in self._power.played_faults)
 
     def reopen(self) -> Bench:
-        """Close the bench and open it again; knobs count as they were confirmed, for nobody has turned them.
+        """Close the bench and open it again; knobs keep their confirmed settings.
 
         Raises
         ------
@@ -341,8 +338,8 @@ class ReconnectingBench:
         if before is not None:
             self._last_check = before.last_check
             sheet = before.confirmations
-            self._confirm = lambda knobs: _as_before(sheet, knobs)
-            with suppress(AcquisitionError):  # what is lost cannot be silenced; the others were
+            self._confirm = lambda knobs: _confirmed_before(sheet, knobs)
+            with suppress(AcquisitionError):  # a lost instrument cannot be silenced; the others were
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
         self._bench = open_bench(self._rig, self._confirm, power=self._power)
@@ -378,7 +375,7 @@ class ReconnectingBench:
             self._power.__exit__(kind, error, trace)
 
 
-def _as_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
+def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
     missing = [f"{knob.instrument} {knob.setting}" for knob in knobs if knob not in sheet.knobs]
     if missing:
         raise CheckFailed(
@@ -389,47 +386,47 @@ def _as_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""A finished recording over its size while it is made: white noise at 24 bit; dwells need less."""
+"""Size of a finished recording over its size while growing: white noise at 24 bit; dwells need less."""
 
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """How long and how large a campaign is; what is there already is not counted."""
+    """Duration and size of a campaign, without existing recordings."""
 
     recordings: int
     """Still to be made."""
     kept: int
     """Complete already."""
     duration_s: float
-    """On the rig, with bench checks, lead-ins and ramps."""
+    """Rig time, with bench checks, lead-ins and ramps."""
     rest_s: float
-    """Of that, silence between recordings."""
+    """Of that, pauses between recordings."""
     lead_in_s: float
-    """Of that, on the way to points along their chains."""
+    """Of that, lead-ins of points in chains."""
     largest_bytes: int
-    """Largest size [bytes] of one recording, while it is made."""
+    """Largest size [bytes] of one growing recording."""
     total_bytes: int
-    """Total size [bytes] of all recordings, finished."""
+    """Total size [bytes] of all finished recordings."""
     free_bytes: int
-    """On the disk of the folder, now."""
+    """Free space on the disk of the folder."""
     searching: int = 0
-    """How many of the recordings may end sooner: by their feedback, or when their results are known."""
+    """Number of recordings that may end earlier: by their feedback, or when their results are known."""
 
     @property
     def needed_bytes(self) -> int:
-        """Room that must be there for the campaign to come to its end."""
+        """Disk space [bytes] that the campaign needs."""
         return self.total_bytes + self.largest_bytes
 
     @property
     def fits(self) -> bool:
-        """Whether the disk has that room."""
+        """Whether the disk has that space."""
         return self.needed_bytes <= self.free_bytes
 
 
 def estimate_campaign(
     campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
 ) -> CampaignEstimate:
-    """Estimate the time and space that a campaign needs; open no instrument and write nothing.
+    """Estimate the time and space of a campaign; open no instrument and write nothing.
 
     Raises
     ------
@@ -465,5 +462,5 @@ def estimate_campaign(
 
 
 def _existing_part(folder: Path) -> Path:
-    """Return the folder, or the nearest one above it that exists already."""
+    """Return the folder, or the nearest existing one above it."""
     return next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())

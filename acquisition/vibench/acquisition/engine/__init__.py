@@ -1,10 +1,10 @@
-"""The process that owns a bench, and the protocol by which windows, commands and scripts ask it.
+"""The process that owns a bench, and the protocol for windows, commands and scripts.
 
-`start_engine` starts the process; `EngineClient` asks it over TCP on loopback, with a token, in JSON and
-raw samples (nothing is unpickled). Viewers pull; the engine pushes nothing and waits for nobody. An
-attended run is aborted when nobody has asked for half a second, or when the parent process ends. `Engine`,
-`RequestHandler`, `JobQueue` and `serving` are for programs that are an engine themselves, as ``vibench
-measure`` is. See docs/engine.md and docs/decisions/0021-engine.md.
+`start_engine` starts the process; `EngineClient` sends it requests over TCP on loopback, with a token, in
+JSON and raw samples (nothing is unpickled). Viewers request data; the engine sends nothing unasked and waits
+for nobody. An attended run is aborted after half a second without a request, or when the parent process
+ends. `Engine`, `RequestHandler`, `JobQueue` and `serving` are for programs that are themselves an engine,
+such as ``vibench measure``. See docs/engine.md and docs/decisions/0021-engine.md.
 
 The states in which the drive may be on for a recording:
 

@@ -1,4 +1,4 @@
-"""``python -m vibench.acquisition.engine``: an engine's process. Its first line says where to ask it."""
+"""``python -m vibench.acquisition.engine``: an engine's process. Its first line of output is its address."""
 
 import argparse
 import os
@@ -11,24 +11,24 @@ from ..stopping.program import heeded_signals, signal_name
 from ..stopping.stop import Cause
 from ._engine import Engine, JobQueue
 from ._request_handler import RequestHandler
-from ._server import LOOPBACK, serving, spoken
+from ._server import LOOPBACK, address_line, serving
 from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
-"""How often an engine that was left alone sees whether it has done what it was left with [s]."""
+"""How often an engine that was left alone checks whether it has finished [s]."""
 FORGOTTEN_S = 60.0
-"""An unattended engine that was never used waits this long for somebody to ask [s]."""
+"""How long an unattended engine without a job waits for a request before it ends [s]."""
 
 
 def main() -> None:
-    """Serve until told to end, by a request, a signal, or the end of the one that started it."""
+    """Serve until a request, a signal, or the end of the parent process."""
     options = _options()
     engine = Engine(options.attendance)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
     _heed_signals(handler)
     with serving(handler, options.what, options.host) as server:
-        print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
+        print(address_line(server.address), flush=True)  # noqa: T201 - this line is the handshake
         if options.attendance is Supervision.ATTENDED:
             Thread(target=_follow_parent, args=(handler,), name="engine parent", daemon=True).start()
         else:
@@ -39,13 +39,13 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
     parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
-    parser.add_argument("--what", default="engine", help="what it is started for, shown to others")
-    parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
+    parser.add_argument("--what", default="engine", help="purpose, shown to other viewers")
+    parser.add_argument("--host", default=LOOPBACK, help="address to listen at; a token is always required")
     parser.add_argument(
         "--forgotten-s",
         type=float,
         default=FORGOTTEN_S,
-        help="unattended: ends when nobody has asked for so long and nothing was ever carried out [s]",
+        help="unattended: ends after this time without a request, if no campaign was ever started [s]",
     )
     return parser.parse_args()
 
@@ -59,7 +59,7 @@ def _heed_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
-    """End an engine that does nothing when the program that started it has gone away: it may hold a bench."""
+    """End an idle engine whose parent program has gone: it may hold a bench."""
 
     def look() -> None:
         pause = Event()
@@ -71,8 +71,8 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """End with the program that started the engine (at the other end of the input), or after its last job."""
-    # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
+    """End with the parent program (at the other end of the input), or after the last job."""
+    # Not through sys.stdin: a buffer on which a thread waits cannot be closed at the end of the process.
     while os.read(sys.stdin.fileno(), 4096):
         pass
     pause = Event()

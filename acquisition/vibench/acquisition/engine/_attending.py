@@ -1,7 +1,7 @@
-"""``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which loads little.
+"""``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which imports little.
 
-Its input is a line that says where the engine is, then a byte at every sign of life of the program that
-started it, and ends with that program.
+Its input is a line with the engine's address, then one byte for each sign of life of the parent program. It
+ends with that program.
 """
 
 import json
@@ -18,13 +18,13 @@ from ._wire import ANSWERS, Message, receive, send
 BEAT_S = 0.04
 """Interval of the program's heartbeats to the engine [s]."""
 STOPPED = ("T", "t", "Z", "X")
-"""States of a Linux process that does nothing until somebody else makes it, or never again."""
+"""States of a Linux process that is stopped or dead."""
 LEAST_OWN = 0.25
-"""Part of the time without a sign of life, so much counts even where the system gave it all to others."""
+"""Smallest part of the time without a sign of life that counts, even if the system ran other programs."""
 
 
 class _Program:
-    """The program that started this process, as far as it can be seen: better where there is ``/proc``."""
+    """The parent program, as far as this process can see it (more with ``/proc``)."""
 
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")
@@ -33,11 +33,11 @@ class _Program:
         Thread(target=self._follow, name="follow program", daemon=True).start()
 
     def still_s(self) -> float:
-        """Look for how long it has given no sign of life, without its main thread's wait for a processor [s].
+        """Return for how long the program gave no sign of life, without its wait for a processor [s].
 
         That thread either works or waits while it could run; Linux tells of a wait when it is over, too late.
         """
-        lived_s = self._lived_s  # before the clock is read: the next sign may come in between
+        lived_s = self._lived_s  # read before the clock: the next sign of life may come in between
         now_s, worked_s = monotonic(), self._worked_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)
@@ -49,18 +49,18 @@ class _Program:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the system keeps it from running."""
+        """Whether the system has stopped it."""
         return self._state in STOPPED
 
     @property
     def _state(self) -> str:
-        return self._told("stat").rpartition(") ")[2][:1]
+        return self._read_proc("stat").rpartition(") ")[2][:1]
 
     @property
     def _worked_s(self) -> float:
-        return 1e-9 * int((self._told("schedstat").split() or ["0"])[0])
+        return 1e-9 * int((self._read_proc("schedstat").split() or ["0"])[0])
 
-    def _told(self, name: str) -> str:
+    def _read_proc(self, name: str) -> str:
         try:
             return (self._folder / name).read_text()
         except OSError:
@@ -73,7 +73,7 @@ class _Program:
 
 
 def main() -> None:
-    """Beat until the engine or the program has ended."""
+    """Send heartbeats until the engine or the program has ended."""
     told = json.loads(sys.stdin.buffer.readline())
     program, clock = _Program(), Event()
     with suppress(OSError), socket.create_connection(told["address"]) as connection:

@@ -1,4 +1,4 @@
-"""Engines of this user: where they are announced, calls that ask one, and the process that attends it."""
+"""Engines of this user: where they are announced, requests to them, and the process that attends them."""
 
 import json
 import os
@@ -39,7 +39,7 @@ from ._wire import ANSWERS, EngineError, EngineGone, EngineSilent, Message, rece
 
 
 class EngineAddress(FrozenModel):
-    """Where an engine can be asked, and the word that lets one in."""
+    """Address of an engine, and the token that admits a connection."""
 
     host: str
     port: int
@@ -47,18 +47,18 @@ class EngineAddress(FrozenModel):
 
 
 REFUSAL_S = 0.2
-"""How long a refusal is waited for; one on this computer comes at once [s]."""
+"""How long to wait for a refused connection; on this computer it comes at once [s]."""
 
 
 class Announcement(Program):
-    """An engine of this user on this computer: a program that can be asked, and not only stopped."""
+    """An engine of this user on this computer: a program that accepts requests, not only stops."""
 
     address: EngineAddress
 
 
 @contextmanager
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
-    """Be found by `announced_engines` while inside; ``press`` carries out the stops that are put down.
+    """Let `announced_engines` find this engine inside the context; ``press`` carries out stops from files.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str]
 
 
 def announced_engines() -> tuple[Announcement, ...]:
-    """Every engine of this computer whose process lives, oldest first, whether it answers or not.
+    """Return every engine of this computer whose process is alive, oldest first, whether it answers or not.
 
     One that refuses is none: where its process is known to live, it is among `programs_without_engine`.
     """
@@ -85,13 +85,15 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Every script or check that drives a bench, and every engine that lets nobody in, oldest first."""
+    """Return scripts and checks that drive a bench without an engine, and engines that refuse, oldest
+    first.
+    """
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
 
 def the_engine(pid: int | None) -> Announcement:
-    """Choose the engine that is meant: the one of that process, or the only one.
+    """Return the engine with this process number, or the only one.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ def the_engine(pid: int | None) -> Announcement:
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
         raise EngineError(
-            f"{wanted}; {_named(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
+            f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'"
         )
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
@@ -120,7 +122,8 @@ def the_engine(pid: int | None) -> Announcement:
 
 
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
-    """Return what a stop is meant for: engines, and scripts and checks that drive a bench themselves.
+    """Return the programs that a stop addresses: engines, and scripts and checks that drive a bench
+    themselves.
 
     Those of other containers on this computer are among them; what is left in the state folder reaches them.
 
@@ -143,11 +146,13 @@ def out_of_reach() -> str:
     """Name the programs of other computers that share the state folder; empty if there are none."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
-    return f"Not reached, since it is of another computer: {named}; run 'vibench stop' there" if named else ""
+    return (
+        f"Not reached, since it runs on another computer: {named}; run 'vibench stop' there" if named else ""
+    )
 
 
 def require_ended(engine: Announcement) -> None:
-    """Refuse to go on after an engine that was killed: nobody has confirmed that its output is off.
+    """Refuse to continue after an engine that was killed: nobody has confirmed that its output is off.
 
     Parameters
     ----------
@@ -174,7 +179,7 @@ def _named(programs: Sequence[Program]) -> str:
 
 
 def _refuses(address: EngineAddress) -> bool:
-    """Whether nobody listens there any more: to be slow, or too busy to answer, is no refusal."""
+    """Whether the connection is refused; a slow or busy engine does not refuse."""
     try:
         socket.create_connection((address.host, address.port), REFUSAL_S).close()
     except ConnectionRefusedError:
@@ -185,11 +190,11 @@ def _refuses(address: EngineAddress) -> bool:
 
 
 PATIENCE_S = 5.0
-"""How long an answer may take; the engine answers from what it holds, in milliseconds [s]."""
+"""How long an answer may take; the engine answers in milliseconds [s]."""
 
 
 class Hello(FrozenModel):
-    """The first thing said on every connection."""
+    """The first message on every connection."""
 
     ask: Literal["hello"] = "hello"
     token: str
@@ -197,7 +202,7 @@ class Hello(FrozenModel):
 
 
 def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
-    """Connect to a running engine and be let in; no answer on the connection may take ``patience_s``."""
+    """Connect to a running engine with its token; no answer on the connection may take ``patience_s``."""
     hello = Hello(token=address.token, role=role)
     try:
         connection = socket.create_connection((address.host, address.port), patience_s)
@@ -220,7 +225,7 @@ def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PA
 def exchange(
     connection: socket.socket, request: Message, work_s: float = 0.0
 ) -> tuple[dict[str, Any], bytes]:
-    """Send a request and wait for its answer: the parsed text, and the bytes behind it.
+    """Send a request and wait for its answer: the parsed text, and the bytes after it.
 
     ``work_s`` [s] is what the answer may take beyond the patience of the connection.
 
@@ -264,7 +269,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Raise here what was raised there, as far as it is one of ours."""
+    """Raise the engine's error here, if it is one of ours."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)
@@ -277,9 +282,9 @@ Answer = TypeVar("Answer")
 class EngineClient(EngineVerbs, ClosedOnLeaving):
     """A connection to an engine.
 
-    Asking anything over an attending connection tells the engine that somebody is there: an attended
-    run goes on only while something is asked at least twice a second. Each method raises `EngineGone`
-    when the engine's process has ended, and the engine's own `AcquisitionError` when it refuses.
+    Every request over an attending connection shows the engine that somebody is there: an attended run
+    continues only with at least two requests a second. Each method raises `EngineGone` when the engine's
+    process has ended, and the engine's own `AcquisitionError` when it refuses.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -294,7 +299,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         role: ConnectionRole | str = ConnectionRole.VISITING,
         patience_s: float = PATIENCE_S,
     ) -> "EngineClient":
-        """Connect to a running engine, for a look or to attend to its run.
+        """Connect to a running engine, to watch or to attend its run.
 
         Raises
         ------
@@ -306,7 +311,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 
     def status(self) -> EngineStatus:
-        """Where the engine stands."""
+        """Return the state of the engine."""
         number, rows = self._rows
         status = self.status_since(number)
         if status.rows_number == number:
@@ -317,13 +322,13 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
     def arm(
         self, campaign: Campaign, folder: Path, existing: ExistingRecordings | str = ExistingRecordings.REFUSE
     ) -> ArmedPlan:
-        """Get ready to carry out a campaign; `arm_request` takes all that can be said."""
+        """Prepare a campaign; `arm_request` takes all options."""
         return self.arm_request(
             CampaignRequest(campaign=campaign, folder=folder, existing=chosen(ExistingRecordings, existing))
         )
 
     def close(self) -> None:
-        """End the connection; the engine stays. Legal at any time."""
+        """End the connection; the engine continues. Legal at any time."""
         self._connection.close()
 
     def ask(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
@@ -334,18 +339,18 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
 
 
 TOLD_EVERY_S = 0.02
-"""More often a sign of life says nothing new [s]."""
+"""Shortest interval between signs of life [s]."""
 AGAIN_S = 1.0
-"""An attendant that has ended before its program is replaced, at most once in so long [s]."""
+"""An attendant that ended before its program is replaced at most once in this time [s]."""
 
 
 class Attendant:
     """Keeps an engine attended by a small separate process, which sleeps most of the time.
 
-    On a busy computer a thread of a window waits for Python's lock for a second and more, however often it
-    would beat; a process that only sleeps and says a word is given a processor at once. It ends with the
-    program that started it, falls silent while that is stopped by the system (Linux), and says with each beat
-    for how long `live` has not been called.
+    On a busy computer a thread of a window can wait a second or more for Python's lock; a process that
+    mostly sleeps gets a processor at once (decision 0068). It ends with the parent program, is silent while
+    the system has stopped that program (Linux), and reports with each beat for how long `live` has not been
+    called.
     """
 
     def __init__(self, address: EngineAddress) -> None:
@@ -361,7 +366,7 @@ class Attendant:
         return self._process.pid
 
     def live(self) -> None:
-        """Note that the program gets something done; it costs microseconds and waits for nobody."""
+        """Note a sign of life of the program; takes microseconds and never waits."""
         now_s = monotonic()
         if now_s - self._told_s < TOLD_EVERY_S:
             return
@@ -376,7 +381,7 @@ class Attendant:
                 self._begin()
 
     def close(self) -> None:
-        """Attend no more. Legal at any time."""
+        """Stop attending. Legal at any time."""
         self._told_s = inf  # whatever `live` says from now on
         self._end()
 

@@ -1,4 +1,4 @@
-"""The engine: it owns a bench, and shows everybody what it does with it."""
+"""The engine: it owns a bench, and publishes what it does with it."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -54,17 +54,17 @@ def bench_facts(bench: Bench) -> BenchFacts:
 
 
 class Engine:
-    """A bench and what is done with it; one thread calls its methods, and only that one touches instruments.
+    """A bench and the jobs on it; one thread calls the methods and alone uses the instruments.
 
-    Everybody else reads `published` and uses `switch`. A method raises what goes wrong, after it has
-    shown it; leave the engine through a ``with``, and the bench is silent and closed.
+    Other threads read `published` and use `switch`. A method publishes an error and then raises it. Leave the
+    engine through a ``with``: the bench is then silent and closed.
     """
 
     def __init__(self, supervision: Supervision) -> None:
         self.supervision = supervision
         self.published = PublishedState(supervision)
         self.switch = StopSwitch()
-        """Holds or ends what runs; a new one for every campaign."""
+        """Holds or ends the running campaign; a new one for every campaign."""
         self._reconnecting: ReconnectingBench | None = None
         self._twin = TwinProcess()
 
@@ -76,13 +76,13 @@ class Engine:
 
     @property
     def bench(self) -> Bench:
-        """The open bench; others may look at its rig, where the state says that there is one."""
+        """The open bench; other threads may read its rig if the state says that it is open."""
         assert self._reconnecting is not None, f"no bench is open while {self.published.state}"
         return self._reconnecting.bench
 
     @property
     def stop_sentence(self) -> str:
-        """Who stopped what ran, and whether the output is off; empty where nobody did."""
+        """Who stopped the run, and whether the output is off; empty without a stop."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""
@@ -90,7 +90,7 @@ class Engine:
 
     @property
     def played_faults(self) -> tuple[str, ...]:
-        """What a script of faults has done to a virtual rig so far, in order."""
+        """Faults that a script has injected into a virtual rig so far, in order."""
         return () if self._reconnecting is None else self._reconnecting.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
@@ -117,7 +117,7 @@ class Engine:
             raise failure
 
     def check(self, folder: Path, *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine, and keep what was found; see `check_bench`."""
+        """Check the bench with a small sine, and keep the report; see `check_bench`."""
         try:
             result = check_bench(self.bench, folder, switch=self.switch, new_reference=new_reference)
         except CheckStopped as stopped:
@@ -136,7 +136,7 @@ class Engine:
         on_event: CampaignListener = ignore_event,
         messengers: tuple[Messenger, ...] = (),
     ) -> tuple[PointResult, ...]:
-        """Make the recordings of a campaign; see `run_campaign`, which calls what is given here."""
+        """Make the recordings of a campaign; see `run_campaign`, which calls the functions given here."""
         assert self._reconnecting is not None
         facts = bench_facts(self.bench)
 
@@ -158,7 +158,7 @@ class Engine:
         if request.twin is TwinSwitch.ON or _may_end_by_change(request.campaign):
             self.turn_twin(TwinSwitch.ON)
         try:
-            # Before the check of the bench: what cannot be played is refused before anything moves.
+            # Before the check of the bench: a plan that cannot be played is refused before anything moves.
             require_all_within_limits(request.campaign.points(), self.bench)
             make_folder(request.folder)
             with stop_on_signal(self.switch):
@@ -189,12 +189,12 @@ class Engine:
         return point_results
 
     def turn_twin(self, switch: TwinSwitch) -> None:
-        """Start or end the live twin, a process of its own that nothing here waits for."""
+        """Start or end the live twin, a separate process that is never waited for."""
         self._twin.turn(switch)
         self.published.twin(TwinStatus() if self._twin.is_on else None)
 
     def look_after_twin(self) -> None:
-        """Say when the live twin has ended by itself: nobody looks for changes of the specimen then."""
+        """Report when the live twin has ended by itself: changes of the specimen are then not noticed."""
         if (words := self._twin.last_words()) is not None:
             self.published.twin(None)
             self.published.messages.warn(
@@ -204,16 +204,16 @@ class Engine:
             )
 
     def _check_ended(self, stopped: CheckStopped) -> None:
-        """Show that somebody wanted the check to end; nothing is wrong."""
+        """Publish that somebody stopped the check; this is not a fault."""
         self.published.messages.info(str(stopped))
         self.published.enter(EngineState.READY)
 
     def fault(self, error: Exception) -> None:
-        """Show what nobody has foreseen, and let the bench go."""
+        """Publish an unexpected error, and close the bench."""
         self._fails(error, EngineState.FAULT)
 
     def _fails(self, error: Exception, otherwise: EngineState) -> None:
-        """Show what went wrong; a bench that has lost an instrument is closed."""
+        """Publish an error; a bench that has lost an instrument is closed."""
         self.published.messages.fault(error)
         state = EngineState.FAULT if isinstance(error, InstrumentLost) else otherwise
         if state is EngineState.FAULT:
@@ -240,7 +240,7 @@ def _may_end_by_change(campaign: Campaign) -> bool:
 
 
 def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
-    """Say in a line how a campaign came out."""
+    """Return one line on the result of a campaign."""
     counts = {
         result: sum(point_result.outcome is result for point_result in point_results)
         for result in PointOutcome
@@ -262,27 +262,27 @@ class JobQueue:
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()
 
     def put(self, job: Job) -> None:
-        """Do this after everything asked before; from any thread."""
+        """Add a job behind all earlier ones; from any thread."""
         self._jobs.put(job)
 
     def leave(self) -> None:
-        """End after everything asked before; from any thread, and from a signal handler."""
+        """End after all earlier jobs; from any thread, and from a signal handler."""
         self._jobs.put(None)
 
     def run(self) -> None:
-        """Do jobs until told to leave. The bench is closed then, whatever happened."""
+        """Do jobs until told to leave; the bench is then always closed."""
         try:
             while (job := self._jobs.get()) is not None:
                 self._do(job)
         finally:
-            with suppress(AcquisitionError):  # the engine has shown it
+            with suppress(AcquisitionError):  # the engine has published it
                 self._engine.close()
 
     def _do(self, job: Job) -> None:
         try:
             job()
         except AcquisitionError:
-            pass  # the engine has shown it
+            pass  # the engine has published it
         except Exception as error:  # noqa: BLE001 - whatever it is: silence, and an engine that can tell of it
             self._engine.fault(error)
         request = self._engine.switch.request

@@ -1,4 +1,4 @@
-"""What viewers may see of an engine: written by its own thread, read by any other, never waited for."""
+"""The state of an engine that viewers see: written by its own thread, read by any other, never waited for."""
 
 import shutil
 import threading
@@ -33,7 +33,7 @@ from ._status import (
 )
 
 HELD_S = 10.0
-"""How much of the run is held for viewers [s]."""
+"""Length of the samples kept for viewers [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class SampleSlice:
 
 
 class SampleBuffer:
-    """A window over the newest samples: written by the run, read by anybody, bounded in memory."""
+    """The newest samples: written by the run, read by any thread, bounded in memory."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -63,7 +63,7 @@ class SampleBuffer:
         """Places at which samples are missing."""
 
     def begin(self, channels: int, sample_rate_hz: float) -> None:
-        """Forget the last run; a new one begins."""
+        """Start a new run, without the samples of the last one."""
         with self._lock:
             self._blocks.clear()
             self.run_id += 1
@@ -71,7 +71,7 @@ class SampleBuffer:
             self.samples = self.gaps = 0
 
     def add(self, block: Block) -> None:
-        """Take the next block, and forget what is older than `HELD_S`."""
+        """Add a block, and drop samples older than `HELD_S`."""
         volts = block.volts.astype(np.float32)
         with self._lock:
             if block.first_sample != self.samples:
@@ -84,7 +84,7 @@ class SampleBuffer:
                 self._blocks.popleft()
 
     def since(self, sample: int, most: int) -> SampleSlice:
-        """Return what is held from ``sample`` on, the newest ``most`` of it."""
+        """Return the samples from ``sample`` on, at most the newest ``most``."""
         with self._lock:
             blocks = tuple(self._blocks)
             end, run_id, rate_hz, channels = self.samples, self.run_id, self._rate_hz, self._channels
@@ -108,26 +108,26 @@ class Messages:
 
     @property
     def kept(self) -> tuple[EngineMessage, ...]:
-        """The newest, oldest first."""
+        """Return the newest messages, oldest first."""
         return tuple(self._kept)
 
     def info(self, what: str) -> None:
-        """Note something that needs no answer."""
+        """Add a message that needs no action."""
         self._add(MessageKind.INFO, what, "", "", "")
 
     def warn(self, what: str, done: str = "", next_step: str = "") -> None:
-        """Note something to be looked at."""
+        """Add a warning."""
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
-        """Note that something was stopped that nobody had wanted to stop."""
+        """Report that something was stopped against the operator's intention."""
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:
-        """Note an error; ours say in this order what happened, what was done, and what to do next."""
+        """Add an error; ours state what happened, what was done, and what to do next."""
         match error:
             case AcquisitionError():
-                what, done, next_step = told_apart(str(error))
+                what, done, next_step = message_parts(str(error))
             case _:
                 what = f"{type(error).__name__}: {error}"
                 done, next_step = "The drive was silenced.", "This is a fault of the program: report it."
@@ -143,7 +143,7 @@ class Messages:
         )
 
 
-def told_apart(text: str) -> tuple[str, str, str]:
+def message_parts(text: str) -> tuple[str, str, str]:
     """Split "What happened. What was done; what to do next" into its parts; missing ones are empty."""
     what, _, rest = text.partition(". ")
     done, _, next_step = rest.partition("; ")
@@ -156,12 +156,12 @@ def _sentence(clause: str) -> str:
 
 
 DISK_INTERVAL_S = 2.0
-"""How often the room on the disk is looked at [s]."""
+"""How often the free space of the disk is read [s]."""
 _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.RAMPING_DOWN}
 
 
 class PublishedState:
-    """The newest of everything. Each value is replaced as a whole, so that no reader sees half of it."""
+    """The newest status. Each value is replaced as a whole, so that no reader sees half of it."""
 
     def __init__(self, supervision: Supervision) -> None:
         self.sample_buffer = SampleBuffer()
@@ -181,11 +181,11 @@ class PublishedState:
 
     @property
     def state(self) -> EngineState:
-        """Where the engine stands."""
+        """State of the engine."""
         return self._status.state
 
     def status(self) -> EngineStatus:
-        """Return the newest of everything but the samples."""
+        """Return the newest status, without samples."""
         status = self._status
         armed = status.armed
         if armed is not None:
@@ -202,28 +202,28 @@ class PublishedState:
         )
 
     def enter(self, state: EngineState) -> None:
-        """Stand somewhere else; leaving a run or an armed plan forgets it."""
+        """Change the state; leaving a run or an armed plan clears it."""
         keeps_plan = state is EngineState.ARMED or state in _STATES.values() or state is EngineState.RUNNING
         forgotten = {} if keeps_plan else {"armed": None, "run": None, "levels": ()}
         self._put(state=state, **forgotten)
 
     def bench(self, bench: BenchFacts | None) -> None:
-        """Show which bench is open; another one has not been checked."""
+        """Set the open bench; a new one has not been checked."""
         self._put(bench=bench, check=None, checked_utc="")
         self._put_rows(())
 
     def checked(self, report: BenchReport, utc: str) -> None:
-        """Show what the check has found."""
+        """Set the report of the check."""
         self._put(check=report, checked_utc=utc)
 
     def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
-        """Show what is going to happen."""
+        """Set the plan that will start."""
         self._armed_until_s = monotonic() + plan.expires_in_s
         self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.ARMED, armed=plan)
 
     def begin(self, campaign: Campaign, folder: Path) -> None:
-        """Show that a campaign is being carried out."""
+        """Set the campaign that is running."""
         self._folder = folder
         self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
         self._planned_s = {name: measured_s(each) + campaign.rest_s for name, each in campaign.recordings()}
@@ -235,7 +235,7 @@ class PublishedState:
         self._put(state=EngineState.RUNNING, armed=None, run=None)
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
-        """Show what a block has changed."""
+        """Update the status after a block."""
         run = progress.run
         if progress.path != self._file:  # another attempt at one point is another recording
             self._begin(progress, bench)
@@ -250,7 +250,7 @@ class PublishedState:
         self._look_at_disk()
 
     def twin(self, told: TwinStatus | None) -> None:
-        """Show what the live twin tells; None when there is none any more."""
+        """Set the live twin's report; None without a twin."""
         buffer = self.sample_buffer
         if told is not None and told.run_id == buffer.run_id and self._status.bench is not None:
             late = max(0, buffer.samples - told.end_sample)
@@ -258,12 +258,12 @@ class PublishedState:
         self._put(twin=told)
 
     def note_pause(self, rest_s: float, text: str) -> None:
-        """Show that the campaign rests between two recordings."""
+        """Set the pause between two recordings."""
         self._done_s += rest_s
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Show how a recording came out; what an earlier run has made is done already."""
+        """Set the result of a recording; those of an earlier session are done already."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:
@@ -271,7 +271,7 @@ class PublishedState:
         self._row(point_result.name, point_result.outcome.value, point_result.reason, str(point_result.path))
 
     def failed(self, reason: str) -> None:
-        """Show that the recording that was running has failed."""
+        """Set the running recording to failed."""
         for row in self._status.rows:
             if row.state == "running":
                 self._row(row.name, "failed", reason, row.file)
@@ -307,7 +307,7 @@ class PublishedState:
         )
 
     def _look_at_disk(self) -> None:
-        """Look for the room that is left, beside the run: a folder that hangs would leave the drive on."""
+        """Read the free disk space in another thread: a folder that hangs must not keep the drive on."""
         if monotonic() < self._disk_due_s or self._beside.is_busy:
             return
         self._disk_due_s = monotonic() + DISK_INTERVAL_S
@@ -335,7 +335,7 @@ def _queue_rows(campaign: Campaign) -> tuple[RowStatus, ...]:
 
 
 def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:
-    """Return how far each channel was driven, of its full scale."""
+    """Return the level of each channel, relative to its full scale."""
     peaks = np.max(np.abs(block.volts), axis=1)
     rms = np.sqrt(np.mean(block.volts**2, axis=1))
     return tuple(

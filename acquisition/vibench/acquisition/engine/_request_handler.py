@@ -1,4 +1,4 @@
-"""The engine's request handler: answers at once, from any thread, and touches no instrument."""
+"""The engine's request handler: answers at once, from any thread, and uses no instrument."""
 
 from collections.abc import Callable, Mapping
 from datetime import timedelta
@@ -42,7 +42,7 @@ ARMED_S = 60.0
 
 
 def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision) -> ArmedPlan:
-    """Hold a campaign against bench and folder; nothing is played and nothing written.
+    """Check a campaign against bench and folder; nothing is played and nothing written.
 
     Raises AcquisitionError with every reason why it cannot be carried out.
     """
@@ -51,13 +51,13 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    # Equal plans are checked once: a long campaign would otherwise keep viewers waiting.
+    # Equal plans are checked once: otherwise a long campaign would make viewers wait.
     for point in played_alike(points):
         checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
-        drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
+        drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
-    # Points of a period or the length of a ramp may be used up without harm: loads are what may break.
+    # Points of a period or the length of a ramp may be used up without harm; only loads can damage.
     loads = [named for named in checks if named[1].load is not None]
     tightest, closest = max(loads or checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
@@ -92,8 +92,8 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     )
 
 
-def confirmed_by(sheet: KnobSheet | None) -> Confirm:
-    """Accept what is on the sheet, and nothing else."""
+def confirm_from(sheet: KnobSheet | None) -> Confirm:
+    """Return the confirmation that accepts the settings on a sheet, and no others."""
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
         seen = () if sheet is None else sheet.knobs
@@ -109,21 +109,21 @@ def confirmed_by(sheet: KnobSheet | None) -> Confirm:
 
 
 STALL_S = 0.2
-"""A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
+"""A check of the viewers that is later than this shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""A viewer is given this many times what this process itself comes late: it shares the computer."""
+"""A viewer's patience grows by this many times the lateness of this process: both share the computer."""
 TAKEN_OVER_S = 2.0
-"""An engine without parent is somebody's who has asked so lately: a window asks 25 times a second [s]."""
+"""An engine without parent is taken over by a viewer whose last request is more recent than this [s]."""
 FORGETTING = 0.995
-"""Part of the worst lateness, from one look to the next: half of it is forgotten in seven seconds."""
+"""Part of the worst lateness that remains at the next check; half of it is gone after seven seconds."""
 
 
 class RequestHandler:
-    """Takes what is asked of an engine.
+    """Handles the requests to an engine.
 
-    It answers from what is known, puts a job into the engine's queue or presses its switch. `carry_out` is
-    the way in for requests: it raises `EngineError` with one sentence when the engine's state does not
-    permit what was asked. Each verb has a method here, with the parameters of `EngineVerbs`.
+    It answers from the published state, puts a job into the engine's queue, or presses its switch.
+    `carry_out` takes requests: it raises `EngineError` with one sentence when the engine's state does not
+    permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
 
     def __init__(self, engine: Engine, jobs: JobQueue) -> None:
@@ -140,13 +140,14 @@ class RequestHandler:
         self._attendance, self._patience_s = engine.supervision, VIEWER_PATIENCE_S
 
     def carry_out(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
-        """Do what a verb asks for, if the engine's state permits it."""
+        """Carry out a request, if the engine's state permits it."""
         method: Callable[..., Answer] = getattr(self, verb.method)
-        if not verb.states:  # a stop gets through, whatever else is being asked
+        if not verb.states:  # a stop gets through, whatever else is being requested
             return method(**arguments)
         with self._asking:
             state = self._engine.published.state
-            # A viewer that has seen the bench closed may open it, though its closing has not returned yet.
+            # A viewer that has seen the bench closed may open it, even if the request to close it has not
+            # returned yet.
             if self._is_ending or (self._is_closing and state is not EngineState.CLOSED):
                 raise EngineError(
                     f"the bench is being closed, and the engine cannot {verb.word} meanwhile; "
@@ -161,21 +162,21 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that somebody is there: a viewer that checks, arms or starts, before any attendant beats."""
+        """Note a viewer that checks, arms or starts, before any attendant sends beats."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
-        """Note for how long the window has stood still; who asks has been noted."""
+        """Note for how long the window has stood still; the viewer itself has been noted."""
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
-        """Return where the engine stands."""
+        """Return the state of the engine."""
         status = self._engine.published.status()
         is_left_alone = self._is_orphan and not self._is_looked_after
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return where the engine stands, and leave out rows that are known."""
+        """Return the state of the engine, without rows that the viewer has."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 
@@ -186,7 +187,7 @@ class RequestHandler:
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig."""
         self._engine.published.enter(EngineState.OPENING)
-        confirm = None if rig.virtual is not None else confirmed_by(confirmations)
+        confirm = None if rig.virtual is not None else confirm_from(confirmations)
         self._jobs.put(lambda: self._engine.open(rig, confirm))
 
     def close_bench(self) -> None:
@@ -196,7 +197,7 @@ class RequestHandler:
         self._jobs.put(self._close)
 
     def check(self, folder: Path = Path(), *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine; ``folder`` is where recordings will go."""
+        """Check the bench with a small sine; ``folder`` is for the recordings."""
         self.note_presence()
         self._engine.switch = StopSwitch()
         self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S
@@ -204,9 +205,9 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.check(folder, new_reference=new_reference))
 
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
-        """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be.
+        """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
-        To hold a long campaign against the limits takes seconds, in which nothing is armed that a stop could
+        Checking the limits of a long campaign takes seconds, in which nothing is armed that a stop could
         disarm: it would be armed afterwards, and started.
         """
         stops = self._stops
@@ -223,12 +224,12 @@ class RequestHandler:
         return plan
 
     def disarm(self) -> None:
-        """Take back what was armed."""
+        """Disarm the campaign."""
         with self._asking:
             self._disarm()
 
     def start(self) -> None:
-        """Carry out what is armed."""
+        """Start the armed campaign."""
         assert self._request is not None
         self.note_presence()
         request, self._request = self._request, None
@@ -238,11 +239,11 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.measure(request))
 
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Hold or end what runs, and disarm what is armed."""
+        """Hold or end the run, and disarm an armed campaign."""
         self._stop(StopRequest(Cause.OPERATOR, level, reason))
 
     def resume(self) -> None:
-        """Go on after a hold."""
+        """End a hold."""
         self._engine.switch.resume()
 
     def mark(self, text: str) -> None:
@@ -264,7 +265,7 @@ class RequestHandler:
         return rig
 
     def carried_request(self) -> CampaignRequest:
-        """Return the campaign that was started last, and how."""
+        """Return the campaign that was started last, with its options."""
         if self._carried is None:
             raise EngineError("nothing was started by a request to this engine; arm and start a campaign")
         return self._carried
@@ -275,21 +276,23 @@ class RequestHandler:
             self._engine.turn_twin(switch)
 
     def tell_twin(self, told: TwinStatus) -> None:
-        """Show what the live twin tells."""
+        """Publish the live twin's report."""
         self._engine.published.twin(told)
 
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
-        """End what runs, silence everything, and let the engine end. Legal in every state."""
+        """End the run, silence everything, and let the engine end. Legal in every state."""
         self._stop(StopRequest.by(cause, reason))
         self._is_ending = True
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
-        """Do what time asks for: disarm what nobody starts, abort what nobody attends."""
+        """Act on deadlines: disarm a campaign that nobody starts, abort a run that nobody attends."""
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if since_s > STALL_S:  # the viewer that asked while this process did not run is not to blame
+        if (
+            since_s > STALL_S
+        ):  # the viewer whose requests waited while this process was stalled is not to blame
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -308,18 +311,18 @@ class RequestHandler:
 
     @property
     def goes_on_alone(self) -> bool:
-        """Whether something runs that was meant to be left alone."""
+        """Whether a run continues that was meant to be left alone."""
         return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
 
     @property
     def outlives_its_parent(self) -> bool:
-        """Whether there is something to do once the program that started the engine has ended.
+        """Whether work remains after the parent program has ended.
 
-        That is what was left alone; then, as long as somebody who has taken the engine over looks after it.
+        This is a campaign that was left alone; after it, the engine remains while somebody attends it.
         """
         if self.goes_on_alone and not self._is_orphan:
             self._is_orphan = True
-            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer that asked until now has gone
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer of the last requests has gone
         return self.goes_on_alone or (self._is_orphan and self._is_looked_after)
 
     @property
@@ -327,7 +330,7 @@ class RequestHandler:
         return monotonic() - self._last_request_s < TAKEN_OVER_S
 
     def is_forgotten(self, after_s: float) -> bool:
-        """Whether nobody has asked for so long, and nothing was carried out that they may come back to."""
+        """Whether no request came for this long, and no campaign ran whose results somebody may want."""
         status = self.status()
         is_idle = status.state in (EngineState.CLOSED, EngineState.READY)
         return (
@@ -360,7 +363,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # else a start has come in between, with a switch of its own
+        while switch is not self._engine.switch:  # otherwise a start has come in between, with its own switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

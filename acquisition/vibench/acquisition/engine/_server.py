@@ -1,6 +1,7 @@
-"""The engine's server: loopback, a token, and one thread a connection, which alone may wait for its viewer.
+"""The engine's server: loopback, a token, and one thread for each connection, which alone waits for its
+viewer.
 
-`serving` makes an engine one that others find and ask, with a watchdog that enforces deadlines while the
+`serving` makes an engine visible to other programs, with a watchdog that enforces deadlines while the
 engine's own thread is at work.
 """
 
@@ -35,9 +36,9 @@ from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireE
 
 WAITING_MOST = 64
 GREETING_S = 2.0
-"""A connection that has not shown the token by then is closed [s]."""
+"""A connection that has not shown the token after this time is closed [s]."""
 YOUNG_S = 0.01
-"""However many come, each may take so long to say who it is [s]."""
+"""Every connection has at least this time to show the token, however many there are [s]."""
 _NO_ROOM = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 Admitted = Callable[[socket.socket, ConnectionRole], None]
@@ -50,17 +51,17 @@ class _Waiting:
 
 
 class Admission:
-    """Accepts connections, and hands on those that show the token."""
+    """Accepts connections, and passes on those that show the token."""
 
     def __init__(
         self, listening: socket.socket, token: str, admitted: Admitted, make_room: Callable[[], None]
     ) -> None:
-        """``make_room``: closes a connection that was let in before, when there is no other way."""
+        """``make_room``: closes an admitted connection, when there is no other way."""
         self._listening = listening
         self._token = token.encode()
         self._admitted = admitted
         self._make_room = make_room
-        self._waiting: dict[socket.socket, _Waiting] = {}  # the longest waiting first
+        self._waiting: dict[socket.socket, _Waiting] = {}  # oldest first
         self._reserve: int | None = None
         self._wake, self._woken = socket.socketpair()
         self._selector = selectors.DefaultSelector()
@@ -71,7 +72,7 @@ class Admission:
         self._thread.start()
 
     def close(self) -> None:
-        """Let nobody in any more."""
+        """Accept no further connections."""
         with suppress(OSError):
             self._wake.send(b"x")
         self._thread.join()
@@ -80,7 +81,7 @@ class Admission:
 
     def _run(self) -> None:
         while True:
-            # Hold a descriptor that a connection can be given when the process may open no more.
+            # A reserved descriptor, for a connection when the process may open no more.
             if self._reserve is None:
                 with suppress(OSError):
                     self._reserve = os.open(os.devnull, os.O_RDONLY)
@@ -105,7 +106,7 @@ class Admission:
         oldest = next(iter(self._waiting.values()), None)
         if oldest is not None and len(self._waiting) >= WAITING_MOST:
             if monotonic() - oldest.since_s < YOUNG_S:
-                sleep(YOUNG_S / 10)  # what they say may be on its way: it is heard first
+                sleep(YOUNG_S / 10)  # their messages may be on the way: they are read first
                 return
             self._turn_away(next(iter(self._waiting)))
         try:
@@ -121,7 +122,7 @@ class Admission:
         self._selector.register(connection, selectors.EVENT_READ)
 
     def _accepted(self) -> tuple[socket.socket, object]:
-        """Accept the next connection, with the room of what is least needed where there is no other."""
+        """Accept the next connection; if there is no descriptor left, close the least important one."""
         try:
             return self._listening.accept()
         except OSError as error:
@@ -152,7 +153,10 @@ class Admission:
             hello = Hello(token="")
         if not hmac.compare_digest(hello.token.encode(), self._token):
             with suppress(OSError):
-                send(connection, refusal("the token is not this engine's; nobody was let in", EngineError()))
+                send(
+                    connection,
+                    refusal("the token is not this engine's; the connection was closed", EngineError()),
+                )
             self._turn_away(connection)
             return
         self._forget(connection)
@@ -180,8 +184,8 @@ class Admission:
         return True
 
 
-def answered(handler: RequestHandler, message: Message) -> Message:
-    """Do what a message asks for; what is refused comes back as one sentence."""
+def answer_to(handler: RequestHandler, message: Message) -> Message:
+    """Carry out the request in a message; a refusal is returned as one sentence."""
     try:
         arguments = dict(REQUEST.validate_json(message.text))
         verb = VERBS[arguments.pop("ask")]
@@ -198,7 +202,7 @@ def answered(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""With one more, the one that has asked nothing for longest is let go: a frozen one holds 20 MB."""
+"""With one more, the viewer with the oldest request is disconnected: a frozen one holds 20 MB."""
 REQUEST_S = 10.0
 """How long a request may take, from its first byte to its last [s]."""
 
@@ -211,7 +215,7 @@ class _Viewer:
 
 
 class Server:
-    """Answers through a request handler. Nobody is let in without the token."""
+    """Answers requests through a request handler; every connection needs the token."""
 
     def __init__(self, handler: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
         self._handler = handler
@@ -223,17 +227,17 @@ class Server:
 
     @property
     def address(self) -> EngineAddress:
-        """Where it listens."""
+        """Address of the server."""
         host, port = self._listening.getsockname()[:2]
         return EngineAddress(host=host, port=port, token=self._token)
 
     def close(self) -> None:
-        """Let nobody in any more."""
+        """Accept no further connections."""
         self._admission.close()
         self._listening.close()
 
     def _welcome(self, connection: socket.socket, role: ConnectionRole) -> None:
-        """Serve a viewer that has shown the token, in a thread of its own."""
+        """Serve a viewer that has shown the token, in its own thread."""
         viewer = _Viewer(connection, role, monotonic())
         with self._coming_and_going:
             self._viewers[id(viewer)] = viewer
@@ -241,20 +245,20 @@ class Server:
         if surplus > 0:
             self._make_room()
         try:
-            # Does not wait until it runs, as Thread.start does: for ever, where memory is exhausted.
+            # Does not wait until it runs, as Thread.start does: without memory that would be for ever.
             start_new_thread(self._serve, (viewer,))
         except RuntimeError:  # the system gives no more threads
             self._leave(viewer)
 
     def _make_room(self) -> None:
-        """Let go of who has asked nothing for longest; of one that attends only if there is no other."""
+        """Disconnect the viewer with the oldest request; an attending one only if there is no other."""
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),
                 key=lambda each: (each.role is ConnectionRole.ATTENDING, each.asked_s),
             )
         if viewers:
-            # Wakes its thread, wherever that waits; closing alone would not.
+            # Wakes its thread wherever that waits; closing alone would not.
             with suppress(OSError):
                 viewers[0].connection.shutdown(socket.SHUT_RDWR)
 
@@ -264,15 +268,15 @@ class Server:
         viewer.connection.close()
 
     def _serve(self, viewer: _Viewer) -> None:
-        """Answer one viewer until it goes. A viewer that does not read blocks this thread, and no other."""
+        """Answer one viewer until it disconnects. A viewer that does not read blocks only this thread."""
         try:
             self._note(viewer)
             send(viewer.connection, DONE.written(None))
             while True:
                 message = receive(viewer.connection, REQUESTS, REQUEST_S)
                 self._note(viewer)
-                send(viewer.connection, answered(self._handler, message))
-        except OSError:  # it has gone, or does not speak this protocol
+                send(viewer.connection, answer_to(self._handler, message))
+        except OSError:  # it has disconnected, or does not use this protocol
             pass
         finally:
             self._leave(viewer)
@@ -283,14 +287,14 @@ class Server:
             self._handler.note_presence()
 
 
-def spoken(address: EngineAddress) -> str:
-    """Put an address into one line of JSON, as an engine's process says it to the one that started it."""
+def address_line(address: EngineAddress) -> str:
+    """Return an address as one line of JSON, for the parent program."""
     return json.dumps(address.model_dump())
 
 
 @contextmanager
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
-    """Serve a request handler at ``host``; ``what`` is shown to those who look for an engine.
+    """Serve a request handler at ``host``; ``what`` describes the engine to other programs.
 
     Raises
     ------

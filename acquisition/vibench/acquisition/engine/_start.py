@@ -1,4 +1,4 @@
-"""Starting an engine's process, and being the one whose end it follows."""
+"""Starting an engine's process, and taking over or stopping one."""
 
 import subprocess
 import sys
@@ -22,11 +22,11 @@ from ._wire import EngineError, EngineGone, EngineSilent
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
 LOOK_S = 0.02
-"""How often the end of a process is looked for that is not a child of this one [s]."""
+"""Interval at which to check whether a process that is not a child has ended [s]."""
 
 
 class AdoptedEngine(ClosedOnLeaving):
-    """An engine that was left alone, taken over: from now on it ends with what it does, or when told to."""
+    """An engine that was left alone and is now attended: it ends with its campaign, or on request."""
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement
@@ -39,7 +39,7 @@ class AdoptedEngine(ClosedOnLeaving):
         return self._announcement.pid
 
     def leave(self) -> None:
-        """Let go of it; what was armed to be left alone goes on."""
+        """Stop attending; a campaign that was armed to be left alone continues."""
         self.client.close()
 
     def close(self) -> None:
@@ -53,7 +53,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def left_alone() -> Announcement | None:
-    """Find an engine that carries something out and was left alone by the program that started it."""
+    """Return an engine that carries out a campaign and was left alone by its parent program."""
     for told in announced_engines():
         with suppress(EngineGone), EngineClient.attach(told.address) as client:
             if client.status().is_left_alone:
@@ -62,12 +62,12 @@ def left_alone() -> Announcement | None:
 
 
 class EngineProcess(ClosedOnLeaving):
-    """An engine's process and a connection to it. An attended engine ends with its starting program."""
+    """An engine's process and a connection to it. An attended engine ends with its parent program."""
 
     def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
         self._process = process
         self.address = address
-        """Where others may ask it as well."""
+        """Address for other programs."""
         self.client = EngineClient.attach(address, ConnectionRole.ATTENDING)
 
     @property
@@ -77,11 +77,11 @@ class EngineProcess(ClosedOnLeaving):
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still runs."""
+        """Whether the process still runs."""
         return self._process.poll() is None
 
     def leave(self) -> None:
-        """Let go of an engine that was armed to be left alone; it ends when it has done its work."""
+        """Stop attending an engine that was armed to be left alone; it ends after its campaign."""
         self.client.close()
         self._close_pipes()
 
@@ -121,7 +121,7 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
         stdin=subprocess.PIPE if supervision is Supervision.ATTENDED else subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         text=True,
-        # The program that shows the run handles Ctrl-C, and decides what to ask of the engine.
+        # The program that shows the run handles Ctrl-C.
         start_new_session=True,
     )
     assert process.stdout is not None
@@ -140,10 +140,10 @@ PATIENCE_S = 1.0
 
 
 class StopDelivery(StrEnum):
-    """How a stop has reached a program."""
+    """How far a stop has reached a program."""
 
     TOLD = "told"
-    """An engine accepted it, and nothing drives: the output was read back as off."""
+    """An engine accepted it, and its output was read back as off."""
     TAKEN = "taken"
     """The same for a program that is not an engine."""
     UNHEEDED = "unheeded"
@@ -155,7 +155,7 @@ class StopDelivery(StrEnum):
 def stop_engine(
     engine: Program, level: StopLevel | str = StopLevel.RAMP, reason: str = "stopped by the operator"
 ) -> StopDelivery:
-    """Stop what an engine, or another program, drives, and the campaign with it.
+    """Stop the drive of an engine or another program, and its campaign.
 
     The stop is put down in the state folder, where it is obeyed within a twentieth of a second, and later
     where the process stands still. Returns when the program has confirmed that its output is off, or does
@@ -179,7 +179,9 @@ def stop_engine(
         When a hold is asked of a program that is no engine.
     """
     level = chosen(StopLevel, level)
-    reason = reason.encode(errors="replace").decode()  # a terminal gives what is no text as surrogates
+    reason = reason.encode(
+        errors="replace"
+    ).decode()  # a terminal gives text that cannot be decoded as surrogates
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(
@@ -204,7 +206,7 @@ def stop_engine(
             return StopDelivery.UNHEEDED
         case Fate.NOT_TAKEN if engine.is_alive:
             if isinstance(engine, Announcement):
-                with suppress(EngineError):  # it hangs: the stop is kept
+                with suppress(EngineError):  # it hangs: the stop stays in the folder
                     return _tell(engine, level, reason)
             return StopDelivery.KEPT
     with suppress(OSError):
@@ -229,7 +231,7 @@ def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
 def _heeds(client: EngineClient) -> bool:
     status = client.status()
     is_silent = status.run is not None and status.run.amplitude_vpp == 0.0
-    # Before its first run, and between two, nothing plays.
+    # Before its first run, and between two runs, nothing plays.
     is_between = status.state in (EngineState.RUNNING, EngineState.HELD) and status.run is None
     return is_silent or is_between or status.state not in SOUNDING
 

@@ -13,7 +13,7 @@ from ..recording import UntilNote
 
 
 class EngineState(StrEnum):
-    """Where an engine stands.
+    """State of an engine.
 
     ::
 
@@ -38,42 +38,44 @@ class EngineState(StrEnum):
 DRIVING = frozenset({EngineState.RUNNING, EngineState.HELD, EngineState.RAMPING_DOWN})
 """The drive may be on, for a recording."""
 SOUNDING = DRIVING | {EngineState.CHECKING}
-"""The drive may be on, if only for the small sine of a check."""
+"""The drive may be on, also for the small sine of a check."""
 
 
 class Supervision(StrEnum):
-    """Whether a run needs somebody who looks."""
+    """Whether a run needs a viewer."""
 
     ATTENDED = "attended"
-    """Nobody has asked for too long (`patience_s`): the run is aborted."""
+    """The run is aborted without requests for longer than `patience_s`."""
     UNATTENDED = "unattended"
     """A campaign that is left alone: viewers may come and go."""
 
 
 class ConnectionRole(StrEnum):
-    """What a connection is for."""
+    """Purpose of a connection."""
 
     ATTENDING = "attending"
-    """The client in charge of the run, which stops when this client stops asking."""
+    """The client in charge of the run, which stops when this client sends no more requests."""
     VISITING = "visiting"
-    """A look from elsewhere: it keeps nothing running."""
+    """A viewer that does not keep the run alive."""
 
 
 VIEWER_PATIENCE_S = 0.5
-"""How long an attended run at a limit of the rig goes on while nobody asks [s]."""
+"""How long an attended run at a limit of the rig continues without requests [s]."""
 LONGEST_PATIENCE_S = 10.0
-"""More cannot be granted to any drive [s]."""
+"""Longest patience that can be granted [s]."""
 HUNG_FACTOR = 4.0
-"""A viewer that is there and says that its window stands still is given this many times the patience."""
+"""Factor on the patience for a viewer that reports that its window is blocked."""
 
 
 def hung_patience_s(granted_s: float) -> float:
-    """How long a drive may go on while a window stands still that is granted ``granted_s`` in silence [s]."""
+    """Return how long a drive may continue while the window is blocked [s]; ``granted_s``: without
+    reports.
+    """
     return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
 
 
 def patience_s(longest_s: float, use: float) -> float:
-    """How long a drive may go on while nobody looks: the closer to a limit, the shorter [s].
+    """Return how long a drive may continue without requests: the closer to a limit, the shorter [s].
 
     ``use`` is the share of the tightest limit; ``longest_s`` [s] is what was granted far from all of them.
     """
@@ -81,7 +83,7 @@ def patience_s(longest_s: float, use: float) -> float:
 
 
 class ChannelFacts(FrozenModel):
-    """One channel, as needed to show its samples."""
+    """One channel, with the values needed to display its samples."""
 
     role: str
     unit: str
@@ -90,7 +92,7 @@ class ChannelFacts(FrozenModel):
 
 
 class BenchFacts(FrozenModel):
-    """Which bench is open."""
+    """The open bench."""
 
     rig_name: str
     is_simulated: bool
@@ -101,22 +103,22 @@ class BenchFacts(FrozenModel):
 
 
 class ArmedPlan(FrozenModel):
-    """What will happen at the start, in words that an experimenter can check."""
+    """What will happen at the start, in words for the experimenter."""
 
     campaign: str
     folder: str
     lines: tuple[str, ...]
-    """What, at which level, within which limits, how long, and where it is saved."""
+    """Signal, level, limits, duration, and folder."""
     expires_in_s: float
-    """The engine disarms itself after this long."""
+    """The engine disarms itself after this time."""
     attendance: Supervision
-    """Whether somebody must look while it runs."""
+    """Whether the run needs a viewer."""
     patience_s: float
-    """For how long nobody may look at it, if somebody must [s]."""
+    """How long the run continues without requests, if it needs a viewer [s]."""
 
 
 class RunStatus(FrozenModel):
-    """The measurement that runs."""
+    """The running measurement."""
 
     name: str
     number: int
@@ -133,13 +135,13 @@ class RunStatus(FrozenModel):
     amplitude_vpp: float
     frequency_hz: float | None
     plan: str = ""
-    """What is played, in words: kind and highest level."""
+    """The signal in words: kind and highest level."""
     until: UntilNote | None = None
-    """How well results are known, of a measurement that lasts until they are."""
+    """Bounds of the results so far, for a measurement with `until`."""
 
 
 class ChannelLevel(FrozenModel):
-    """How far a channel was driven during the last block, of its full scale."""
+    """Level of a channel during the last block, relative to its full scale."""
 
     role: str
     peak_share: float
@@ -157,7 +159,7 @@ class RowStatus(FrozenModel):
 
 
 class MessageKind(StrEnum):
-    """How a message is to be taken."""
+    """Severity of a message."""
 
     INFO = "info"
     WARNING = "warning"
@@ -165,7 +167,7 @@ class MessageKind(StrEnum):
 
 
 class EngineMessage(FrozenModel):
-    """Something that has happened: what, what was done about it, and what to do next."""
+    """An event: what happened, what was done about it, and what to do next."""
 
     number: int
     """Counts all messages of an engine, from 1."""
@@ -179,10 +181,10 @@ class EngineMessage(FrozenModel):
 
 
 class TwinStatus(FrozenModel):
-    """What the live twin told last: where m1 is between its stops, its numbers, and how late it is."""
+    """The live twin's last report: motion of m1 between its stops, numbers, and delay."""
 
     pid: int = 0
-    """Number of its process, once it has told anything."""
+    """Number of its process, after its first report."""
     state: str = "starting"
     """``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
     sentence: str = ""
@@ -190,31 +192,31 @@ class TwinStatus(FrozenModel):
     end_sample: int = 0
     """One past the newest sample that it used."""
     step_s: float = 0.0
-    """Between two values of ``p_m``, which end at the newest sample."""
+    """Time step of ``p_m``, which ends at the newest sample."""
     p_m: tuple[float | None, ...] = ()
-    """Relative displacement; None where it was not followed."""
+    """Relative displacement; None where the track was lost."""
     forecast_m: tuple[float, ...] = ()
-    """From the newest sample on, as far as it is worth anything."""
+    """Forecast from the newest sample on, as far as it is reliable."""
     forecast_error_m: tuple[float, ...] = ()
-    """Within which 68 % of earlier forecasts were, as far ahead."""
+    """Bound that contained 68 % of earlier forecasts, for each time ahead."""
     stops_m: tuple[float, float] = (0.0, 0.0)
-    """Places of the lower and the upper stop."""
+    """Positions of the lower and the upper stop."""
     numbers: tuple[tuple[str, str], ...] = ()
-    """What this run's collisions told: name, and value with bounds of 95 %."""
+    """Numbers found in this run's collisions: name, and value with 95 % bounds."""
     level: float | None = None
-    """Innovation of the last tenth of a second, 1 when nothing but noise is left; None when lost."""
+    """Innovation of the last tenth of a second; 1 for noise alone, None when lost."""
     limit: float | None = None
-    """Beyond which the specimen is suspected; None while the usual level is being learnt."""
+    """Level above which a change of the specimen is suspected; None while the usual level is being learnt."""
     busy_share: float = 0.0
     """Processor time of the twin's process over the time since the run began."""
     missed_s: float = 0.0
-    """Duration of motion that it was too slow for [s]; the recording has it."""
+    """Duration of motion that the twin skipped because it was too slow [s]; the recording contains it."""
     behind_s: float = 0.0
-    """By how much its newest sample was behind the newest of the run, when it told [s]."""
+    """Delay of the newest sample at the last report [s]."""
 
 
 class EngineStatus(FrozenModel):
-    """Everything a viewer shows, but the samples."""
+    """Everything that a viewer shows, except the samples."""
 
     state: EngineState
     attendance: Supervision
@@ -226,29 +228,27 @@ class EngineStatus(FrozenModel):
     levels: tuple[ChannelLevel, ...] = ()
     rows: tuple[RowStatus, ...] = ()
     rows_number: int = 0
-    """Changes whenever a row does: thousands of rows go over the wire only when they are news."""
+    """Changes whenever a row does, so that thousands of rows are sent only when needed."""
     overloads: int = 0
-    """Ranges of samples past a channel's full scale, in this run."""
+    """Number of sample ranges beyond a channel's full scale in this run."""
     lost_blocks: int = 0
     """Gaps in this run's samples."""
     disk_free_bytes: int = 0
     samples: int = 0
     """Samples per channel of this run so far."""
     run_id: int = 0
-    """Changes with every recording; what was seen of another one is no longer true."""
+    """Changes with every recording; data of another number are out of date."""
     twin: TwinStatus | None = None
-    """What the live twin told last; None while there is none."""
+    """The live twin's last report; None without a twin."""
     is_left_alone: bool = False
-    """The program that started the engine has ended, its job goes on, and nobody has taken it over."""
+    """The parent program has ended, the campaign continues, and nobody attends the engine."""
     messages: tuple[EngineMessage, ...] = ()
     """The newest, oldest first."""
 
 
-# The process of the live twin: started and ended by an engine, which never waits for it.
-#
-# It is a viewer like any other (`vibench twin`, reached by name as a virtual rig is): it pulls samples,
-# reports what it found, and keeps no run alive. When it is too slow it misses samples; the recording does
-# not.
+# The live twin's process, started and ended by an engine, which never waits for it. It is a viewer like any
+# other (`vibench twin`): it requests samples, reports its results, and keeps no run alive. When it is too
+# slow it skips samples; the recording does not.
 
 ENDING_S = 2.0
 
@@ -261,7 +261,7 @@ class TwinSwitch(StrEnum):
 
 
 class TwinProcess:
-    """The live twin of this process' engine."""
+    """The live twin of this process's engine."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
@@ -281,7 +281,7 @@ class TwinProcess:
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.PIPE,
                     text=True,
-                    # Ctrl-C in a terminal is handled by the program that shows the run.
+                    # The program that shows the run handles Ctrl-C in a terminal.
                     start_new_session=True,
                 )
             case TwinSwitch.OFF if self._process is not None:
@@ -296,7 +296,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return why it has ended by itself, once; None while it runs or is off."""
+        """Return once why it ended by itself; None while it runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

@@ -1,10 +1,9 @@
-"""Everything that can be asked of an engine, each verb declared once: request, answer, permission.
+"""All requests to an engine, each verb declared once: request, answer, permitted states.
 
-A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the wire; its
-decorator says the word on the wire, how the answer travels, and the engine's states that permit it. Client
-and server work by these declarations: a new verb is one more of them, and a method of the same name and
-parameters on `RequestHandler`. Anyone who knows the engine's token may ask everything; each is answered at
-once from what the engine holds.
+A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the connection;
+its decorator gives the word in the message, the form of the answer, and the engine's states that permit it.
+Client and server use these declarations: a new verb is one more of them, and a method of the same name and
+parameters on `RequestHandler`. The engine's token permits all requests.
 """
 
 import json
@@ -50,23 +49,24 @@ from ._wire import Message
 
 
 class CampaignRequest(FrozenModel):
-    """A campaign, and how it is to be carried out."""
+    """A campaign, and the options of its execution."""
 
     campaign: Campaign
     folder: Path
-    """Where its recordings go."""
+    """Folder for its recordings."""
     twin: TwinSwitch = TwinSwitch.OFF
-    """Whether the live twin runs beside it; it does where a plan's ``on_changed_specimen`` needs it."""
+    """Whether the live twin runs beside it; it always does for a plan with ``on_changed_specimen =
+    "stop"``."""
     existing: ExistingRecordings = ExistingRecordings.REFUSE
     after_failure: AfterFailure = AfterFailure.STOP
     changed_bench: ChangedBench = ChangedBench.REFUSE
     check: CheckRule = CheckRule.FRESH
     attendance: Supervision | None = None
-    """Whether somebody must look while it runs; what the engine was started for, if not given."""
+    """Whether the run needs a viewer; if absent, as the engine was started."""
     longest_patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)] = (
         VIEWER_PATIENCE_S
     )
-    """How long an attended drive far from every limit goes on while nobody looks [s]; see `patience_s`."""
+    """How long an attended drive far from every limit continues without requests [s]; see `patience_s`."""
 
 
 P = ParamSpec("P")
@@ -76,36 +76,36 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Answer(Generic[A]):
-    """How an answer goes over the wire."""
+    """How an answer is sent."""
 
     written: Callable[[A], Message]
     read: Callable[[Any, bytes], A]
-    """From the parsed JSON text and the bytes behind it."""
+    """From the parsed JSON text and the bytes after it."""
 
 
 @dataclass(frozen=True)
 class Verb(Generic[A]):
-    """One thing that can be asked of an engine."""
+    """One kind of request to an engine."""
 
     word: str
-    """On the wire, under ``ask``."""
+    """In the message, under ``ask``."""
     method: str
-    """The request handler's method, and the client's."""
+    """Name of the method of request handler and client."""
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]
-    """Where the engine must stand; empty: legal in every state, and never made to wait."""
+    """Permitted states; empty: legal in every state, and never delayed."""
     work_s: float
-    """What is to be worked out before the answer may take so long [s]; 0: it is held ready."""
+    """Time to compute the answer [s]; 0: it is ready."""
 
     def message(self, **arguments: object) -> Message:
-        """Put a request on the wire."""
+        """Return the message of a request."""
         request = validated(arguments, self.request, f"a request to {self.word}")
         return Message(request.model_dump_json().encode())
 
 
 ARMING_S = 300.0
-"""To hold a campaign of a hundred sweeps against the limits takes seconds, on a busy computer a minute."""
+"""Checking the limits of a hundred sweeps takes seconds, on a busy computer a minute."""
 VERBS: dict[str, Verb[Any]] = {}
 """Every verb, by its word."""
 
@@ -113,7 +113,7 @@ VERBS: dict[str, Verb[Any]] = {}
 def verb(
     word: str, answer: Answer[A], *states: EngineState, work_s: float = 0.0
 ) -> Callable[[Callable[Concatenate[Any, P], A]], Callable[Concatenate[Any, P], A]]:
-    """Declare a verb by the signature of its call; the call then asks for it."""
+    """Declare a verb by the signature of its method; the method then sends the request."""
 
     def declared(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
         parameters = signature(call)
@@ -150,7 +150,7 @@ def _model(kind: type[Model]) -> Answer[Model]:
     )
 
 
-def _samples_written(newest_samples: SampleSlice) -> Message:
+def _write_samples(newest_samples: SampleSlice) -> Message:
     facts = {
         "run_id": newest_samples.run_id,
         "first_sample": newest_samples.first_sample,
@@ -160,13 +160,13 @@ def _samples_written(newest_samples: SampleSlice) -> Message:
     return Message(json.dumps(facts).encode(), newest_samples.volts.astype("<f4").tobytes())
 
 
-def _samples_read(facts: Mapping[str, Any], payload: bytes) -> SampleSlice:
+def _read_samples(facts: Mapping[str, Any], payload: bytes) -> SampleSlice:
     volts = np.frombuffer(payload, "<f4").reshape(facts["shape"])
     return SampleSlice(facts["run_id"], facts["first_sample"], facts["sample_rate_hz"], volts)
 
 
 DONE: Answer[None] = Answer(lambda _: Message(b'{"ok": true}'), lambda _facts, _payload: None)
-SAMPLES = Answer(_samples_written, _samples_read)
+SAMPLES = Answer(_write_samples, _read_samples)
 PLAN, STATUS, RIG = _model(ArmedPlan), _model(EngineStatus), _model(Rig)
 REQUESTED = _model(CampaignRequest)
 
@@ -175,23 +175,23 @@ def _with_absolute_folder(request: CampaignRequest) -> CampaignRequest:
     return request.model_copy(update={"folder": request.folder.absolute()})
 
 
-# The engine's process may stand in another folder than the process that asks.
+# The engine's process may have another working folder than the client.
 AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
 AbsoluteRequest = Annotated[CampaignRequest, AfterValidator(_with_absolute_folder)]
 
 
 class EngineVerbs:
-    """The calls of an engine. `verb` replaces each body by one that asks; a subclass says how."""
+    """The requests to an engine. `verb` replaces each body by a call of `ask`, which a subclass defines."""
 
     def ask(self, verb: Verb[A], arguments: Mapping[str, object]) -> A:
-        """Send a request and give its answer."""
+        """Send a request and return its answer."""
         raise NotImplementedError
 
     @verb("open", DONE, EngineState.CLOSED, EngineState.FAULT)
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
-        """Open the bench of a rig; the status says when it is open.
+        """Open the bench of a rig; the status shows when it is open.
 
-        ``confirmations`` are the settings made by hand that somebody has seen; a virtual rig needs none.
+        ``confirmations`` are the confirmed settings made by hand; a virtual rig needs none.
         """
 
     @verb("close", DONE, EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED)
@@ -200,31 +200,31 @@ class EngineVerbs:
 
     @verb("check", DONE, EngineState.READY)
     def check(self, folder: AbsolutePath = Path(), *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine; ``folder`` is where recordings will go.
+        """Check the bench with a small sine; ``folder`` is for the recordings.
 
-        ``new_reference``: compare with no earlier check, since what has changed was meant.
+        ``new_reference``: do not compare with an earlier check, since the change was intended.
         """
 
     @verb("arm", PLAN, EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
     def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:
-        """Get ready to carry out a campaign, or be refused with the reasons."""
+        """Prepare a campaign, or refuse it with the reasons."""
         raise NotImplementedError
 
     @verb("disarm", DONE)
     def disarm(self) -> None:
-        """Take back what was armed."""
+        """Disarm the campaign."""
 
     @verb("start", DONE, EngineState.ARMED)
     def start(self) -> None:
-        """Carry out what is armed."""
+        """Start the armed campaign."""
 
     @verb("stop", DONE)
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Hold or end what runs, and disarm what is armed. Never refused."""
+        """Hold or end the run, and disarm an armed campaign. Never refused."""
 
     @verb("resume", DONE)
     def resume(self) -> None:
-        """Go on after a hold."""
+        """End a hold."""
 
     @verb("mark", DONE, *sorted(DRIVING))
     def mark(self, text: Annotated[str, Field(min_length=1, max_length=200)]) -> None:
@@ -232,7 +232,7 @@ class EngineVerbs:
 
     @verb("tell_change", DONE, *sorted(DRIVING))
     def tell_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:
-        """Note that the specimen has changed; a run whose plan asks for it is ended."""
+        """Report that the specimen has changed; a run with ``on_changed_specimen = "stop"`` ends."""
 
     @verb("rig", RIG)
     def open_rig(self) -> Rig:
@@ -241,25 +241,25 @@ class EngineVerbs:
 
     @verb("request", REQUESTED)
     def carried_request(self) -> CampaignRequest:
-        """Return the campaign that was started last, and how: for a viewer that did not arm it."""
+        """Return the campaign that was started last, with its options: for a viewer that did not arm it."""
         raise NotImplementedError
 
     @verb("twin", DONE)
     def turn_twin(self, switch: TwinSwitch) -> None:
-        """Start or end the live twin beside what runs."""
+        """Start or end the live twin."""
 
     @verb("tell_twin", DONE)
     def tell_twin(self, told: TwinStatus) -> None:
-        """Show what the live twin tells."""
+        """Publish the live twin's report."""
 
     @verb("status", STATUS)
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Where the engine stands, without its rows if ``known_rows`` is still their number."""
+        """Return the state of the engine, without its rows if ``known_rows`` is still their number."""
         raise NotImplementedError
 
     @verb("beat", DONE)
     def beat(self, still_s: NonNegativeFloat = 0.0) -> None:
-        """Say that somebody is there, and want nothing; ``still_s``: for how long the window stood still."""
+        """Report that the viewer is there, and for how long its window stood still (``still_s``)."""
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:

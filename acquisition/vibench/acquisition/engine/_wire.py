@@ -1,8 +1,8 @@
-"""Messages on a stream: a short binary head, a JSON text, and samples behind it where there are any.
+"""Messages on a stream: a short binary header, a JSON text, and samples after it if there are any.
 
-Nothing that is executable is ever sent: what comes from another process is parsed as JSON or taken as
-numbers, never unpickled. What is declared costs no memory: only what has come is held, and each side says
-how long a message may be.
+Nothing executable is sent: data from another process are parsed as JSON or read as numbers, never unpickled.
+A declared length allocates no memory: only received bytes are kept, and each side limits the length of a
+message.
 """
 
 import json
@@ -16,12 +16,12 @@ from ..errors import AcquisitionError
 HEAD = struct.Struct("!4sII")
 MAGIC = b"VBE1"
 PIECE_BYTES = 1 << 18
-"""Most that is read at once."""
+"""Largest number of bytes in one read."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """The longest message that is taken."""
+    """The longest message that is accepted."""
 
     text_bytes: int
     payload_bytes: int = 0
@@ -35,19 +35,19 @@ ANSWERS = Bounds(32_000_000, 64_000_000)
 
 
 class WireError(ConnectionError):
-    """The other side is gone, or does not speak this protocol."""
+    """The other side has disconnected, or does not use this protocol."""
 
 
 @dataclass(frozen=True)
 class Message:
-    """A JSON text and the bytes behind it."""
+    """A JSON text and the bytes after it."""
 
     text: bytes
     payload: bytes = b""
 
 
 class IncomingMessage:
-    """A message that comes in pieces."""
+    """A message that arrives in pieces."""
 
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
@@ -57,11 +57,11 @@ class IncomingMessage:
 
     @property
     def missing(self) -> int:
-        """Bytes to read before anything more can be said; 0 when the message is complete."""
+        """Bytes still to read; 0 when the message is complete."""
         return self._end - len(self._came)
 
     def take(self, piece: bytes) -> None:
-        """Take what has come, at most `missing` bytes; raises WireError for what is no message."""
+        """Add received bytes, at most `missing`; raises WireError for data that are not a message."""
         if not piece:
             raise WireError("the other side closed the connection")
         self._came += piece
@@ -77,19 +77,19 @@ class IncomingMessage:
         magic, text_bytes, payload_bytes = HEAD.unpack(self._came)
         is_ours = magic == MAGIC
         if not is_ours or text_bytes > self._bounds.text_bytes or payload_bytes > self._bounds.payload_bytes:
-            raise WireError("what came over the connection is no message of this protocol; it was closed")
+            raise WireError("the received data are not a message of this protocol; the connection was closed")
         self._has_head = True
         self._text_end += text_bytes
         self._end = self._text_end + payload_bytes
 
 
 def refusal(sentence: str, error: Exception) -> Message:
-    """Say no, in one sentence."""
+    """Return a message that refuses a request, with one sentence."""
     return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
 
 
 def send(connection: socket.socket, message: Message) -> None:
-    """Send one message; raises OSError when the other side is gone."""
+    """Send one message; raises OSError when the other side has disconnected."""
     head = HEAD.pack(MAGIC, len(message.text), len(message.payload))
     connection.sendall(head + message.text)
     if message.payload:
@@ -97,10 +97,10 @@ def send(connection: socket.socket, message: Message) -> None:
 
 
 def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
-    """Wait for one message, as long as the connection's timeout allows; from its first byte on ``within_s``.
+    """Wait for one message, up to the connection's timeout; from its first byte on ``within_s``.
 
-    Raises WireError when the connection ends, or what comes is not a message, and TimeoutError when it does
-    not come in time.
+    Raises WireError when the connection ends or the data are not a message, and TimeoutError when no message
+    comes in time.
     """
     incoming = IncomingMessage(bounds)
     patience_s, until_s = connection.gettimeout(), None
@@ -109,7 +109,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
             incoming.take(connection.recv(min(incoming.missing, PIECE_BYTES)))
             if within_s is not None:
                 until_s = monotonic() + within_s if until_s is None else until_s
-                # Not 0: that would mean not to wait at all.
+                # Not 0, which would mean no waiting at all.
                 connection.settimeout(max(until_s - monotonic(), 1e-3))
     finally:
         connection.settimeout(patience_s)
@@ -117,7 +117,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
 
 
 class EngineError(AcquisitionError):
-    """The engine does not do what was asked; the text says what state it is in and what is allowed."""
+    """The engine refuses a request; the text says what state it is in and what is allowed."""
 
 
 class EngineGone(EngineError, ConnectionError):
