@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.resonance_controller import fitted_mode
+from vibench.acquisition.control.resonance_controller import fit_mode
 from vibench.sim import gong2025
 
 SPECIMEN = gong2025()
@@ -27,7 +27,7 @@ def test_frequency_and_damping_are_the_eigenvalue_s_whatever_phase_the_sensors_a
     natural_hz, damping, turned
 ):
     frequency_hz, answers = points(natural_hz, damping)
-    found = fitted_mode(frequency_hz, answers * np.exp(1j * turned))
+    found = fit_mode(frequency_hz, answers * np.exp(1j * turned))
     assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-4)
     assert found.damping_ratio == pytest.approx(damping, rel=1e-3)
 
@@ -39,14 +39,14 @@ def test_the_stated_uncertainty_is_the_spread_of_repetitions(natural_hz, damping
     found = []
     for _ in range(300):
         noise = 1e-3 * (random.standard_normal(7) + 1j * random.standard_normal(7))
-        found.append(fitted_mode(frequency_hz, answers * (1 + noise)))
+        found.append(fit_mode(frequency_hz, answers * (1 + noise)))
     spread = np.std([each.frequency_hz for each in found])
     stated = np.sqrt(np.mean([each.frequency_u_hz**2 for each in found]))
     assert stated == pytest.approx(spread, rel=0.25)
 
 
 def test_four_points_are_too_few():
-    assert fitted_mode(*points(*MODES[1], count=4)) is None
+    assert fit_mode(*points(*MODES[1], count=4)) is None
 
 
 def test_points_that_scatter_tell_no_mode_that_nobody_damps():
@@ -54,9 +54,7 @@ def test_points_that_scatter_tell_no_mode_that_nobody_damps():
     random = np.random.default_rng(3)
     frequency_hz, answers = points(*MODES[1])
     found = [
-        fitted_mode(
-            frequency_hz, answers.mean() * (random.standard_normal(7) + 1j * random.standard_normal(7))
-        )
+        fit_mode(frequency_hz, answers.mean() * (random.standard_normal(7) + 1j * random.standard_normal(7)))
         for _ in range(300)
     ]
     told = [each for each in found if each is not None]

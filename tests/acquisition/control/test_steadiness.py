@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control.steadiness import in_drives, judged
+from vibench.acquisition.control.steadiness import in_drives, judgement_of
 from vibench.acquisition.excitation.feedback import Settling
 from vibench.acquisition.recording import Steadiness
 
@@ -33,7 +33,7 @@ def test_a_motion_that_repeats_after_k_periods_has_period_k(period, depth, seed)
     pattern = np.random.default_rng(seed).standard_normal(period)
     pattern[0] = np.abs(pattern).sum() + 3.0  # no shorter period, not even nearly and by chance
     signal = points(300, (0, depth * np.resize(pattern, 300))) + noise(300, 1e-3)
-    found = judged(signal, RULE)
+    found = judgement_of(signal, RULE)
     assert (found.steadiness, found.period) == (Steadiness.PERIODIC, period)
     assert found.scatter < 0.003
 
@@ -44,7 +44,7 @@ def test_a_dying_transient_is_waited_for_until_it_is_small(periods_of_decay):
     turning = np.exp(0.3j * np.arange(3000))
     for transient in (decay, decay * turning):
         first = next(
-            n for n in range(80, 3000, 10) if judged(points(n, (1, transient[:n])), RULE).period == 1
+            n for n in range(80, 3000, 10) if judgement_of(points(n, (1, transient[:n])), RULE).period == 1
         )
         assert abs(decay[first]) < 3 * RULE.tolerance
 
@@ -54,7 +54,7 @@ def test_a_transient_is_never_called_aperiodic():
     for turn in (0.0, 0.3, 1.9):
         transient = 2.0 * np.exp(-count / 250 + 1j * turn * count)
         signal = points(1200, (1, transient))
-        verdicts = {judged(signal[:n], RULE).steadiness for n in range(400, 1200, 40)}
+        verdicts = {judgement_of(signal[:n], RULE).steadiness for n in range(400, 1200, 40)}
         assert Steadiness.APERIODIC not in verdicts
 
 
@@ -68,7 +68,9 @@ def chaos(count, seed):
 
 
 def test_a_stationary_chaotic_motion_is_aperiodic_nineteen_times_of_twenty():
-    verdicts = [judged(points(400, (1, 0.4 * chaos(400, seed))), RULE).steadiness for seed in range(100)]
+    verdicts = [
+        judgement_of(points(400, (1, 0.4 * chaos(400, seed))), RULE).steadiness for seed in range(100)
+    ]
     assert verdicts.count(Steadiness.APERIODIC) >= 95
     assert Steadiness.PERIODIC not in verdicts
 
@@ -77,25 +79,25 @@ def test_chaos_that_grows_or_drifts_is_not_settled():
     growing = np.linspace(0.5, 1.5, 400)
     for seed in range(10):
         for motion in (0.4 * growing * chaos(400, seed), 0.4 * chaos(400, seed) + 0.6 * growing):
-            assert judged(points(400, (1, motion)), RULE).steadiness is Steadiness.UNSETTLED
+            assert judgement_of(points(400, (1, motion)), RULE).steadiness is Steadiness.UNSETTLED
 
 
 def test_a_quasi_periodic_motion_is_aperiodic():
     golden = 2 * np.pi * (np.sqrt(5) - 1) / 2
-    found = judged(points(600, (1, 0.2 * np.exp(1j * golden * np.arange(600)))), RULE)
+    found = judgement_of(points(600, (1, 0.2 * np.exp(1j * golden * np.arange(600)))), RULE)
     assert found.steadiness is Steadiness.APERIODIC
 
 
 def test_noise_of_the_channel_is_not_taken_for_chaos():
     loud = points(600) + noise(600, 0.05)
-    assert judged(loud, RULE).steadiness is Steadiness.APERIODIC
-    found = judged(loud, RULE, noise=0.05)
+    assert judgement_of(loud, RULE).steadiness is Steadiness.APERIODIC
+    found = judgement_of(loud, RULE, noise=0.05)
     assert (found.steadiness, found.period) == (Steadiness.PERIODIC, 1)
     assert found.noise == pytest.approx(0.05, rel=0.01)
 
 
 def test_the_scatter_has_the_uncertainty_that_repetitions_show():
-    found = [judged(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
+    found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
     # The stated one counts one degree of freedom a period; ten coordinates make it smaller in white noise.
@@ -103,7 +105,7 @@ def test_the_scatter_has_the_uncertainty_that_repetitions_show():
 
 
 def test_too_few_periods_are_unsettled():
-    assert judged(points(40), RULE).steadiness is Steadiness.UNSETTLED
+    assert judgement_of(points(40), RULE).steadiness is Steadiness.UNSETTLED
 
 
 @pytest.mark.parametrize(
@@ -114,7 +116,7 @@ def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drive
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
     seen[:, 1] += share
-    assert in_drives(judged(seen, RULE), seen, drives, 0.0).period == period
+    assert in_drives(judgement_of(seen, RULE), seen, drives, 0.0).period == period
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
@@ -122,4 +124,4 @@ def test_a_single_order_that_wanders_is_judged_like_all_of_them(kept):
     """It keeps its statistics and does not repeat, by itself too."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))
-    assert judged(moved + kept, RULE).steadiness is Steadiness.APERIODIC
+    assert judgement_of(moved + kept, RULE).steadiness is Steadiness.APERIODIC

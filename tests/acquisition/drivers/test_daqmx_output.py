@@ -10,7 +10,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import DaqmxDigitizer, DaqmxOutput
 from vibench.acquisition.drivers._daqmx import daqmx_session
-from vibench.acquisition.drivers._daqmx_output import _told_to_idle_at_zero
+from vibench.acquisition.drivers._daqmx_output import _set_idle_output
 from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput
 from vibench.acquisition.rig import OutputConfig, load_rig
@@ -105,7 +105,7 @@ def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output
 def test_an_output_is_told_to_idle_at_zero_and_says_when_it_cannot(virtual, device, idle):
     with nidaqmx.Task(grpc_options=daqmx_session(virtual.daq_address).options) as task:
         channel = task.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-2, max_val=2)
-        assert _told_to_idle_at_zero(channel) is idle
+        assert _set_idle_output(channel) is idle
 
 
 def test_the_output_of_a_4431_goes_to_zero_by_itself(output):

@@ -209,7 +209,7 @@ def test_an_output_that_no_card_has_is_told_as_that(card_rig, audio):
     rig = card_rig().model_copy(update={"virtual": None})
     output = rig.daq.output.model_copy(update={"physical": "out1"})
     rig = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
-    with pytest.raises(ConfigurationError, match="'out1' is nothing of a sound card"):
+    with pytest.raises(ConfigurationError, match="'out1' is not on a sound card"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 

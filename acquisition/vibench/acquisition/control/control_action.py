@@ -1,4 +1,4 @@
-"""What passes between a run and its controller: an action to take, and the samples of it."""
+"""Data between a run and its controller: an action, and its samples."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -16,34 +16,34 @@ from .steadiness import Phasors
 
 @dataclass(frozen=True)
 class ControlAction:
-    """The next phase, and what is noted at its first sample."""
+    """The next phase, and notes for its first sample."""
 
     phase: Phase | None
-    """None for the notes alone: nothing is heard then."""
+    """None for notes alone, without samples."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """The samples of a phase, from its first one, or from the last hole in them, to its end."""
+    """The samples of a phase, from its first one or the last gap to its end."""
 
     first_sample: int
     volts: Samples
     """Shape (channels, samples) [V]."""
     coefficients: tuple[Any, ...] = ()
-    """What a real-time controller measured meanwhile."""
+    """Coefficients that a real-time controller measured during the phase."""
 
 
 Result = TypeVar("Result")
 Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
-"""Yields actions and is sent the samples of each; returns what it was for."""
+"""Yields actions and receives the samples of each; returns the result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
-"""What is heard during notes alone."""
+"""Samples for notes alone."""
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
-    """Join the blocks of a phase; one before which samples are missing (the run was held) begins again."""
+    """Join the blocks of a phase; restart at a block before which samples are missing (the run was held)."""
     if not blocks:
         return SILENCE
     joined: list[Block] = []
@@ -55,13 +55,13 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""An error below this share of the tolerance is left alone: every change disturbs the motion."""
+"""A smaller error, as a share of the tolerance, is not corrected: every change disturbs the motion."""
 _SURE = 2.0
-"""Standard uncertainties from which on an error counts as one."""
+"""Number of standard uncertainties above which an error is significant."""
 _GAIN = 0.8
-"""Share of the error, in decibels, that is taken out at once: the specimen answers a change slowly."""
+"""Share of the error, in decibels, that is corrected at once: the specimen responds slowly."""
 _BATCHES = 8
-"""Stretches whose scatter gives the uncertainty of a mean: single periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean: single periods of chaos are not independent."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +72,12 @@ class MeasuredLevel:
     uncertainty: float
 
     def held(self, target: float, tolerance: float) -> Held:
-        """Return whether it lies within a share of ``target``."""
+        """Return whether it is within the tolerance of ``target``."""
         return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
 
 
 def measured_level(base: Phasors) -> MeasuredLevel:
-    """Average the fundamental over drive periods, shape (periods,), with the scatter of batches of them."""
+    """Average the fundamental over drive periods, shape (periods,), with the scatter of their batches."""
     if not len(base):
         return MeasuredLevel(0.0, 0.0)
     mean = complex(np.mean(base))
@@ -92,16 +92,16 @@ def measured_level(base: Phasors) -> MeasuredLevel:
 
 @dataclass(frozen=True)
 class LevelControl:
-    """The law of control: quasi-static, once for every stretch that was measured."""
+    """Quasi-static control of the level, once for every measured stretch."""
 
     level: BaseLevel
     most_vpp: float
     """Largest setting that the plan allows [V]."""
     least_vpp: float
-    """Smallest setting that the generator takes [V]."""
+    """Smallest setting that the generator accepts [V]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next setting; the same one when the level is held, or the error may be chance [V]."""
+        """Return the next setting [V]; unchanged if the level is held, or if the error may be chance."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

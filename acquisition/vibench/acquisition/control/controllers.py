@@ -1,4 +1,4 @@
-"""Controllers of measurements whose next step depends on what was measured."""
+"""Controllers of measurements with feedback, by kind of excitation."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -25,34 +25,34 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = Mapping
         "held_response": hold_response,
     }
 )
-"""Controller of each of our kinds with feedback: of the loop, and of a plan of its kind."""
+"""For each kind: a function of the loop and the plan that returns the controller."""
 
 
 def feedback_controller(
     measurement: Measurement, rig: Rig, channels: tuple[Channel, ...], sample_rate_hz: float
 ) -> Controller[None]:
-    """Control a measurement with feedback, from its ramp up to its ramp down.
+    """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
     Parameters
     ----------
     measurement
         Of a kind of excitation that has a controller.
     rig
-        What it is carried out on.
+        The rig on which it runs.
     channels
-        Those that are read, in the order of the rows of samples.
+        Recorded channels, in the order of the rows of samples.
     sample_rate_hz
-        Of all of them.
+        Sample rate of all channels.
 
     Yields
     ------
     ControlAction
-        What is played next. The samples of each phase, shape (channels, n) [V], are sent back in.
+        The next phase. The samples of each phase, shape (channels, n) [V], are sent back in.
 
     Raises
     ------
     ConfigurationError
-        When the rig lacks a channel that feedback listens to, or no package offers the controller; before
+        When the rig lacks a channel that feedback needs, or no package offers the controller; before
         anything is yielded.
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)

@@ -1,4 +1,4 @@
-"""The three channels that feedback listens to, in their units."""
+"""The three channels that feedback uses, in their units."""
 
 from dataclasses import dataclass
 from math import pi
@@ -16,29 +16,29 @@ from .steadiness import Phasors, Stroboscope
 
 @dataclass(frozen=True)
 class FeedbackChannels:
-    """Finds drive, base and m0 in the samples."""
+    """Rows and scales of drive, base and m0 in the samples."""
 
     drive: int
     """Row of the drive's channel."""
     base: int
     response: int
     drive_units_per_volt: float
-    """Behind its divider."""
+    """With the divider."""
     base_units_per_volt: float
     """[m/s2 per V]"""
     response_units_per_volt: float
     """[m/s per V]"""
     response_delay_s: float
-    """Delay of the vibrometer; taken out of every phase [s]."""
+    """Delay of the vibrometer; corrected in every phase [s]."""
     base_cut_hz: float
-    """-3 dB of the channel's coupling, taken out of every phase too; 0 where direct voltage passes [Hz]."""
+    """-3 dB frequency of the channel's coupling, corrected in every phase; 0 for DC [Hz]."""
     response_cut_hz: float
     sample_rate_hz: float
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Return drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,).
 
-        Where the vibrometer lost its light the motion is bridged.
+        Drop-outs of the vibrometer are bridged.
         """
         response = samples.volts[self.response] * self.response_units_per_volt
         return (
@@ -48,16 +48,17 @@ class FeedbackChannels:
         )
 
     def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
-        """Begin to look once a period of the motion, which is this many of the drive."""
+        """Return a stroboscope for a motion whose period is ``drives`` drive periods."""
         return Stroboscope(near_hz, self.sample_rate_hz, drives)
 
     def transmissibility(
         self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0
     ) -> complex:
-        """Displacement of m0 over that of the base, from velocity and the fundamental of the acceleration.
+        """Return the displacement of m0 over that of the base, from velocity and acceleration.
 
-        Of a harmonic of m0, half or a third of the drive's frequency too, over the size of the base's
-        fundamental and its phase times as much. Zero where the base shows nothing at all.
+        For a harmonic of m0 (also half or a third of the drive's frequency): its amplitude over that of the
+        base's fundamental, and its phase less ``harmonic`` times that of the base. Zero if the base does not
+        move.
         """
         if not np.any(base):
             return 0j
@@ -92,28 +93,30 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
     roles = [channel.role for channel in channels]
     if role not in roles:
         raise ConfigurationError(
-            f"feedback listens to {role.value}, and this rig has no such channel. Nothing was played; add it "
+            f"feedback needs {role.value}, and this rig has no such channel. Nothing was played; add it "
             "to daq.channels, or use an excitation without feedback"
         )
     return roles.index(role)
 
 
 _REMEMBERED_S = 0.1
-"""Length of the last samples kept: a drop-out is recognised and bridged by the motion before it."""
+"""Length of stored samples [s]: a drop-out is recognised and bridged from the motion before it."""
 
 
 class BridgedRows:
-    """Hands samples on, except for what may be the beginning of a drop-out: that waits for the next ones."""
+    """Passes samples on, with a delay for the possible beginning of a drop-out."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
         self._rows = np.empty((3, 0))
         self._first = 0
         self._next = 0
-        """Sample that is handed on next."""
+        """Number of the next sample to be passed on."""
 
     def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
-        """Take the next samples, shape (3, samples) with the response last; give those handed on."""
+        """Add samples, shape (3, samples) with the response last; return the first number and those passed
+        on.
+        """
         if first_sample != self._first + self._rows.shape[1]:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)
@@ -130,7 +133,7 @@ class BridgedRows:
         return first, handed_on
 
     def skip(self) -> None:
-        """Leave out what waits: it belongs to what was played before."""
+        """Drop waiting samples, which belong to an earlier phase."""
         self._next = self._first + self._rows.shape[1]
 
 
@@ -140,7 +143,7 @@ resonance holds a light table back to about a fifth."""
 
 
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
-    """Refuse to go on when the base hardly answers.
+    """Raise LimitExceeded when the base hardly moves, so that the run ramps down.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Localising one jump: back to before it, on the branch it was left from, and halving the way to it.
+"""Locating a jump: return to the branch before it, then halve the interval.
 
-Letting a motion die by lowering its drive and bringing it back: the way out of a stubborn branch.
+A motion can be stopped by lowering its drive, which is a way out of a persistent branch.
 """
 
 from collections.abc import Sequence
@@ -27,13 +27,13 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor of one rung: the lowest setting is a ninth of the one of now."""
+"""Factor of one step down; the lowest setting is a ninth of the present one."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
 def decay_motion(loop: SineLoop) -> Controller[None]:
-    """Lower the setting rung by rung, wait, and raise it to what it was."""
+    """Lower the setting step by step, wait, and raise it to its earlier value."""
     now = loop.setting
     for rung in range(1, RUNGS + 1):
         loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
@@ -45,11 +45,11 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""How often the search begins again where the motion left its branch earlier than the last time."""
+"""How often the search restarts when the motion leaves its branch earlier than before."""
 
 
 class _Return(Enum):
-    """How the way back to the branch ended."""
+    """Result of the return to the branch."""
 
     BACK = auto()
     NOT_FOUND = auto()
@@ -58,7 +58,7 @@ class _Return(Enum):
 
 
 class _Pace(Enum):
-    """How the way forward is gone."""
+    """How frequencies are changed on the way forward."""
 
     GLIDE = auto()
     STEP = auto()
@@ -66,20 +66,20 @@ class _Pace(Enum):
 
 @dataclass
 class _JumpSearch:
-    """Where the search stands."""
+    """State of the search."""
 
     branch: list[SettledPoint]
-    """Visits on the branch before the jump, in the order of the pass."""
+    """Points on the branch before the jump, in the order of the pass."""
     after: SettledPoint
     here: JumpSide
 
     @property
     def bracket(self) -> LocatedJump:
-        """What is known of the jump."""
+        """The present bracket of the jump."""
         return LocatedJump(self.branch[-1], self.after)
 
     def narrow(self, point: SettledPoint) -> None:
-        """Take in a visit between the two ends."""
+        """Use a point between the two ends."""
         self.here = side(point, self.branch[-1], self.after)
         match self.here:
             case JumpSide.BEFORE:
@@ -88,13 +88,13 @@ class _JumpSearch:
                 self.after = point
 
     def left(self, place: int, point: SettledPoint) -> None:
-        """Take in that the branch was left on the way to its visit number ``place``."""
+        """Note that the branch was left at its point number ``place``."""
         del self.branch[place:]
         self.after = point
 
 
 class JumpLocator:
-    """Looks into one jump of a pass."""
+    """Locates one jump of a pass."""
 
     def __init__(
         self, settling_controller: SettlingController, plan: SettledSine, direction: str, number: int
@@ -107,48 +107,50 @@ class JumpLocator:
         self._number = number
         self._until_s = settling_controller.loop.elapsed_s + plan.search_s
 
-    def localised(
+    def localise(
         self, points: Sequence[SettledPoint], after: SettledPoint
     ) -> Controller[tuple[SettledPoint, bool]]:
-        """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
+        """Narrow the bracket between the last of ``points`` and ``after``; end at ``after``'s frequency.
 
-        Gives the point there, and whether a jump led to it.
+        Return the point there, and whether a jump led to it.
 
-        A response that only changes steeply is no jump: it closes as the bracket does. Where both
-        branches are there at ``after``, the way to it may end on either, which is said.
+        A response that only changes steeply is not a jump: its difference shrinks with the bracket. If both
+        branches exist at ``after``, the search may end on either, which is noted.
         """
         search = _JumpSearch(list(points), after, JumpSide.AFTER)
-        found, why = yield from self._bisected(search)
+        found, why = yield from self._bisect(search)
         is_jump = found.is_jump(self._rule.factor)
-        end = yield from self._moved_to(after.frequency_hz)
+        end = yield from self._move_to(after.frequency_hz)
         point = end.point
         has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
         self._say(found, why, branch)
         return point, is_jump and has_arrived
 
-    def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
+    def _bisect(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
         for _ in range(_MOST_BRACKETS):
-            found = yield from self._halved(search)
+            found = yield from self._halve(search)
             if found is not None:
                 return found
         return search.bracket, JumpSearchEnd.ELSEWHERE
 
-    def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
-        """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
+    def _halve(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
+        """Halve the bracket to its end; None when the motion left its branch earlier, which gives a new
+        bracket.
+        """
         seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
             while True:
                 if search.here is JumpSide.AFTER:
-                    match (yield from self._returned_to_branch(search)):
+                    match (yield from self._return_to_branch(search)):
                         case _Return.NOT_FOUND if not self._is_late():
                             return search.bracket, JumpSearchEnd.BRANCH_LOST
                         case _Return.LEFT:
                             return None
                 if self._is_late():
                     return search.bracket, JumpSearchEnd.OUT_OF_TIME
-                point = yield from self._searched(frequency_hz)
+                point = yield from self._search_at(frequency_hz)
                 search.narrow(point)
                 if not search.bracket.is_jump(self._rule.factor):
                     return search.bracket, JumpSearchEnd.STEEP
@@ -156,14 +158,14 @@ class JumpLocator:
         except StopIteration:
             return search.bracket, JumpSearchEnd.LOCALISED
 
-    def _returned_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
+    def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until its branch is found again, then forward to the branch's end.
 
-        Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
+        Forward in one fast glide; if that leaves the branch, step by step, to find where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
-            place = yield from self._rejoined(search.branch)
+            place = yield from self._rejoin(search.branch)
             if place is None:
                 return _Return.NOT_FOUND
             end = len(search.branch)
@@ -180,39 +182,41 @@ class JumpLocator:
     def _left(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward; give place and finding where the motion has left the branch."""
+        """Go forward; return place and point where the motion has left the branch."""
         for place in steps:
-            found = yield from self._moved_to(branch[place].frequency_hz)
+            found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
                 return place, found.point
         return None
 
-    def _rejoined(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
+    def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
+        """Go back in growing steps until a response of the branch is found; return its place."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
-            found = yield from self._moved_to(branch[place].frequency_hz)
+            found = yield from self._move_to(branch[place].frequency_hz)
             if is_on_branch(found.point, branch[place], self._rule.factor):
                 return place
             if place == 0:
-                return (yield from self._revived(branch[0]))
+                return (yield from self._restart_from_rest(branch[0]))
             place, stretch = max(0, place - stretch), 2 * stretch
         return None
 
-    def _revived(self, first: SettledPoint) -> Controller[int | None]:
-        """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
+    def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
+        """Stop the motion at the branch's first frequency: a branch that began from rest is then reached
+        again.
+        """
         yield from decay_motion(self._settling_controller.loop)
         found = yield from self._settling_controller.settled()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
-    def _moved_to(self, frequency_hz: float) -> Controller[SettledState]:
+    def _move_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
         yield from glide(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
         return (yield from self._settling_controller.settled())
 
-    def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
-        found = yield from self._moved_to(frequency_hz)
+    def _search_at(self, frequency_hz: float) -> Controller[SettledPoint]:
+        found = yield from self._move_to(frequency_hz)
         segment = Segment(
             SegmentLabel.SEARCH,
             {
@@ -247,21 +251,21 @@ class JumpLocator:
 
 
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
-    """Carry out every pass, from the first ramp up to the last ramp down."""
+    """Carry out all passes, from the first ramp up to the last ramp down."""
     settling_controller = SettlingController(loop, plan.settling, plan.base_level)
     passes = tuple(plan.passes())
     yield from start(loop, passes[0][1][0], plan.base_level)
     came_from = "rest"
     for number, (direction, frequencies_hz) in enumerate(passes, start=1):
         stepping = Pass(settling_controller, plan, number, direction)
-        yield from stepping.carried_out(frequencies_hz, came_from)
+        yield from stepping.carry_out(frequencies_hz, came_from)
         came_from = f"{direction} pass {number}, {frequencies_hz[-1]:g} Hz"
     yield from loop.ramp_down()
     yield from loop.say()
 
 
 class Pass:
-    """One way through the frequencies, and the branch that was followed."""
+    """One pass through the frequencies, and its branch."""
 
     def __init__(
         self, settling_controller: SettlingController, plan: SettledSine, number: int, direction: str
@@ -271,27 +275,27 @@ class Pass:
         self._number = number
         self._direction = direction
         self._branch = 1
-        """Counts the branches of this pass: one more after every jump."""
+        """Number of the branch in this pass: one more after every jump."""
 
-    def carried_out(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
-        """Visit and record every frequency; look into the jumps between them."""
+    def carry_out(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
+        """Visit and record every frequency; locate the jumps between them."""
         points: list[SettledPoint] = []
         searched = 0
         search = self._plan.jumps
         for frequency_hz in frequencies_hz:
-            point = yield from self._stepped(frequency_hz, came_from)
+            point = yield from self._step_to(frequency_hz, came_from)
             has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
             if search is not None and has_jumped and searched < search.most_searches:
                 searched += 1
                 locator = JumpLocator(self._settling_controller, self._plan, self._direction, self._number)
-                point, is_on_next_branch = yield from locator.localised(points, point)
+                point, is_on_next_branch = yield from locator.localise(points, point)
                 if is_on_next_branch:
                     self._branch += 1
                     points = []
             points.append(point)
             came_from = f"{frequency_hz:g} Hz"
 
-    def _stepped(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
+    def _step_to(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
         settling_controller = self._settling_controller
         yield from glide(
             settling_controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz

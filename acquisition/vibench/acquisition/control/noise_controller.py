@@ -1,4 +1,4 @@
-"""Noise equalised at the base: the gain of every line measured, and the drive made again from it."""
+"""Equalised noise at the base: the gain of every line is measured and corrects the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt
@@ -18,13 +18,13 @@ from .feedback_channels import LEAST_ANSWER
 from .sine_loop import SineLoop
 
 _NEWEST = 0.5
-"""Weight of the newest gains among those before: impacts make them scatter."""
+"""Weight of the newest gains relative to earlier ones, because impacts make them scatter."""
 _MOST_CHANGE = 4.0
 """Largest change of the squared gain of a line from one realisation to the next."""
 
 
 @dataclass(frozen=True)
-class Heard:
+class MeasuredDensities:
     """Densities at the lines of one realisation, averaged over the plan's resolution."""
 
     drive: Samples
@@ -38,7 +38,7 @@ class Heard:
 
 
 class Equaliser:
-    """What is known of every line: its gain from drive to base, and from base to m0."""
+    """Estimated gains of every line: from drive to base, and from base to m0."""
 
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
@@ -52,14 +52,14 @@ class Equaliser:
 
     @property
     def target(self) -> Samples:
-        """What the base should have: the spectrum, lowered where m0 would pass its limit [(m/s2)2/Hz]."""
+        """Target of the base: the spectrum, lowered where m0 would exceed its limit [(m/s2)2/Hz]."""
         if self._to_response is None or not self._plan.response_limits:
             return self._plan.density
         limit = density_at(self._plan.response_limits, self.frequency_hz)
         return np.minimum(self._plan.density, limit / np.maximum(self._to_response, 1e-300))
 
     def waveform(self, number: int, level_db: float) -> Waveform:
-        """Make the next period, as the gains of now ask for it.
+        """Return the next period of the drive for the present gains.
 
         Raises
         ------
@@ -75,19 +75,21 @@ class Equaliser:
             raise LimitExceeded(
                 f"the spectrum needs {needed_vpp:.3g} Vpp at {level_db:g} dB, and amplitude_vpp = "
                 f"{plan.amplitude_vpp:g} is the most that the plan allows. It was ramped down and kept; "
-                "raise amplitude_vpp, or lower the spectrum where the base answers least"
+                "raise amplitude_vpp, or lower the spectrum where the base responds least"
             )
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
 
-    def hear(self, drive: Samples, base: Samples, response: Samples) -> Heard:
-        """Take the densities of a realisation into what is known.
+    def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
+        """Update the gains with the densities of a realisation.
 
         Raises
         ------
         LimitExceeded
             When a density is past its abort line, or the base hardly answers.
         """
-        heard = Heard(self._density(drive), self._density(base), self._density(response), _kurtosis(base))
+        heard = MeasuredDensities(
+            self._density(drive), self._density(base), self._density(response), _kurtosis(base)
+        )
         self._require_answer(heard)
         newest = heard.base / np.maximum(heard.drive, 1e-300)
         mixed = _NEWEST * newest + (1 - _NEWEST) * self._gain
@@ -97,8 +99,8 @@ class Equaliser:
         self._to_response = ratio if known is None else _NEWEST * ratio + (1 - _NEWEST) * known
         return heard
 
-    def require_below_abort(self, heard: Heard) -> None:
-        """Raise LimitExceeded when the base or m0 is past its abort line."""
+    def require_below_abort(self, heard: MeasuredDensities) -> None:
+        """Raise LimitExceeded when the base or m0 is above its abort line."""
         most = 10 ** (self._plan.abort_db / 10)
         lines = [("base", "(m/s2)2/Hz", heard.base, self._plan.density)]
         if self._plan.response_limits:
@@ -114,12 +116,12 @@ class Equaliser:
                     "or give more equalisations"
                 )
 
-    def off_db(self, heard: Heard, level_db: float) -> Samples:
-        """How far the base lies from what was wanted of this realisation, line by line [dB]."""
+    def off_db(self, heard: MeasuredDensities, level_db: float) -> Samples:
+        """Return the difference of the base from the target of this realisation, line by line [dB]."""
         return np.asarray(10 * np.log10(np.maximum(heard.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Give the density at the lines, averaged over the resolution; of whole periods, without leakage."""
+        """Return the density at the lines, averaged over the resolution; whole periods, without leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
@@ -129,7 +131,7 @@ class Equaliser:
     def _width(self) -> int:
         return max(1, round(self._plan.resolution_hz / self._plan.repetition_hz))
 
-    def _require_answer(self, heard: Heard) -> None:
+    def _require_answer(self, heard: MeasuredDensities) -> None:
         modelled = sqrt(float(np.sum(heard.drive * self._modelled)))
         measured = sqrt(float(np.sum(heard.base)))
         if measured < LEAST_ANSWER * modelled:
@@ -141,7 +143,7 @@ class Equaliser:
 
 
 def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
-    """Equalise at levels that rise to the spectrum, then keep what follows, equalising on."""
+    """Equalise at levels that rise to the spectrum, then record, and continue to equalise."""
     equaliser = Equaliser(loop, plan)
     yield from loop.listen_to_silence()
     segments = [step.segment for step in plan.steps()]
@@ -161,7 +163,9 @@ def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
         yield ControlAction(ramp(RunState.RAMPING_DOWN, play, loop.measurement))
 
 
-def _note(plan: HeldNoise, equaliser: Equaliser, heard: Heard, off_db: Samples, kept: int) -> NoiseNote:
+def _note(
+    plan: HeldNoise, equaliser: Equaliser, heard: MeasuredDensities, off_db: Samples, kept: int
+) -> NoiseNote:
     worst = int(np.argmax(np.abs(off_db)))
     return NoiseNote(
         realisation=max(kept, -1),
@@ -176,7 +180,7 @@ def _note(plan: HeldNoise, equaliser: Equaliser, heard: Heard, off_db: Samples, 
 
 
 def _average(values: Samples, width: int) -> Samples:
-    """Average over neighbours; at the ends over those that there are."""
+    """Average over neighbours; at the ends over those available."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)
     first = np.maximum(places - width // 2, 0)

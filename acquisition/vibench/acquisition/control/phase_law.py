@@ -1,4 +1,4 @@
-"""The law of the phase-locked loop that follows a resonance, and what it learns of the mode on the way."""
+"""The phase-locked loop that follows a resonance, and its estimate of the mode."""
 
 from dataclasses import dataclass, field, replace
 from math import exp, hypot, log, pi, radians
@@ -10,77 +10,79 @@ from ..plan import LOOK_PERIODS
 from .settling_controller import SettledState
 
 _GAIN = 0.3
-"""Part of the error of the phase that the loop takes out at each look."""
+"""Share of the phase error that the loop corrects at each look."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""An error that keeps more than this of itself in a look makes the gain grow by this factor, up to this."""
+"""If more than this share of an error remains after a look, the gain grows by this factor, up to this
+value.
+"""
 _WIDER = np.linspace(-0.25, 0.25, 15)
-"""Logarithms by which the half-width may have changed from one level to the next."""
+"""Typical change of the logarithm of the half-width from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
-"""The same for a super- or subharmonic, whose first one the search knows roughly."""
+"""The same for a super- or subharmonic, whose first half-width is known only roughly."""
 _SURE_RAD = radians(12.0)
-"""Unexplained drift of the phase that weighs as much as a half-width that has changed by e."""
+"""Unexplained drift of the phase with the same weight as a half-width that has changed by e."""
 _STEEPER = 0.5
-"""Share of its bend by which that of a backbone may grow from level to level."""
+"""Largest relative growth of a backbone's bend from level to level."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms of that drift above which the motion is none that grows from one level to the next."""
+"""Rms of that drift above which the motion is another one."""
 
 
 @dataclass(frozen=True)
 class LearntMode:
-    """What the phase-locked loop knows of a mode."""
+    """Properties of a mode that the phase-locked loop has estimated."""
 
     narrowest_hz: float
-    """Half-width of the resonance as it was searched for; contacts and hard springs only widen it. Zero for a
+    """Half-width of the resonance in the first search; contacts and hard springs only widen it. Zero for a
     super- or subharmonic."""
     half_width_hz: float
     bend_hz: float = 0.0
-    """What the resonance moved by while the level grew by e; zero where that is not known."""
+    """Change of the resonance while the level grew by e; zero if unknown."""
     steeper_hz: float = 0.0
-    """By how much more it should move towards the next level."""
+    """Additional change expected towards the next level."""
 
 
 @dataclass(frozen=True)
 class TrackedPlace:
-    """Where a level was left."""
+    """State at the end of a level."""
 
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """None as long as no level was found: the next one is searched for."""
+    """None until a level was found: the next one is searched for."""
 
 
 class PhaseLaw:
     """The law of the phase-locked loop.
 
-    The phase of a motion over its drive drifts by ``2 pi L (r - f) - h e`` in a look of the time L: f the
-    frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
-    forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
-    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. For the n-th
-    harmonic, r and w refer to the drive (the mode's, divided by n), and L is n times as long. For a
-    subharmonic of order n, e is the error of n times its phase, r and w refer to the drive again, and a look
-    has n times as many drive periods.
+    In a look of the time L the phase of a motion over its drive drifts by ``2 pi L (r - f) - h e``: f is the
+    frequency, r the resonance, e the phase error in radians, and h = 2 pi L w the decay of the mode, with
+    its half-width w. The frequency moves by g times the resulting r - f, so that the error falls by the
+    share g at every look. If it does not, its own part, ``g w e``, grows. For the n-th harmonic, r and w
+    refer to the drive (the mode's, divided by n), and L is n times as long. For a subharmonic of order n, e
+    is the error of n times its phase, r and w refer to the drive, and a look has n times as many drive
+    periods.
 
-    A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
-    follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and
-    that is added to the frequency in advance.
+    A bent resonance moves while the motion grows to its new level. The level that the motion has reached
+    follows the base with the decay of the mode; r moves with its logarithm, as estimated from earlier
+    levels, and this is added to the frequency in advance.
     """
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
         self._plan = plan
         self._turns = plan.harmonic * plan.subharmonic * LOOK_PERIODS
-        """By how many turns a look's phase counts: periods of a harmonic, drives of a subharmonic."""
+        """Factor on a look's phase: order of a harmonic, drive periods of a subharmonic."""
         self._last = last
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """The level at which the motion would rest as it is [m/s2]."""
+        """Level at which the motion would settle [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []
-        """Frequency [Hz], error of the phase [rad] and level [m/s2] of each."""
+        """Frequency [Hz], error of the phase [rad] and level [m/s2] of each look."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Take in a look; gives the error of the phase [rad] and what the motion has still to go, a share."""
+        """Add a look; return the phase error [rad] and the remaining change of the motion, a share."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -94,16 +96,19 @@ class PhaseLaw:
         return error_rad, max(left, bends)
 
     def next_hz(self, frequency_hz: float, base: float) -> float:
-        """Return the next frequency, within the plan's band; the base will move with ``base`` [m/s2]."""
+        """Return the next frequency, within the plan's band; ``base`` is the coming level of the base
+        [m/s2].
+        """
         foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
         widest_hz = self._plan.widest_step_hz
         step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
     def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
-        """Return the half-width that explains how the phase drifted from look to look, and the bend.
+        """Return the half-width that explains the drift of the phase from look to look, and the bend.
 
-        Where nothing near the half-width before explains it, the motion is another one: it stays.
+        If no value near the earlier half-width explains it, the motion is another one, and the estimate
+        stays.
         """
         grown, bend_hz = log(found.base.amplitude / self._last.base_m_per_s2), self._mode.bend_hz
         if abs(grown) > self._plan.level_tolerance:
@@ -112,7 +117,7 @@ class PhaseLaw:
         turned = 2 * pi * self._turns / frequency_hz.mean()
 
         def unexplained(width_hz: float) -> float:
-            """Mean square of the drift that is left [rad2]."""
+            """Mean square of the remaining drift [rad2]."""
             levels, level = [], log(self._last.base_m_per_s2)
             for each in np.log(base):
                 level += (1.0 - exp(-turned * width_hz)) * (each - level)
@@ -133,11 +138,11 @@ class PhaseLaw:
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
 
     def _off_hz(self, frequency_hz: float) -> float:
-        """Return how far the frequency goes for what the newest looks show of the phase."""
+        """Return the change of frequency for the phase of the newest looks."""
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Nothing is known of what was before the first look but that it was another level.
+        # Before the first look only the level was different.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -145,24 +150,24 @@ class PhaseLaw:
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
     def _kept(self, frequency_hz: float) -> float:
-        """Return the share of a motion that the mode has not forgotten after a look."""
+        """Return the share of a motion that has not decayed after a look."""
         return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)
 
 
 _NEAR_DEG = 35.0
-"""Errors up to this are on the straight part of the phase: its slope is taken from them."""
+"""Errors up to this are on the straight part of the phase, which gives the slope."""
 _FEWEST = 2
 _NEAREST = 3
-"""Tries from which a slope is taken that changes from place to place."""
+"""Number of nearest tries for a slope that changes with frequency."""
 _STEEPEST_DEG = 85.0
-"""Errors beyond are taken for this: the tangent of a right angle has no end."""
+"""Larger errors are replaced by this: the tangent of a right angle is infinite."""
 _BEND = 0.15
-"""How far the slope over that part is off the one at the resonance, at most."""
+"""Largest relative difference between the slope over that part and the slope at the resonance."""
 
 
 @dataclass(frozen=True)
 class PhaseError:
-    """Phase minus the wanted one at a frequency [degrees], with its standard uncertainty by chance."""
+    """Phase minus its target at a frequency [degrees], with its standard uncertainty by chance."""
 
     frequency_hz: float
     error_deg: float
@@ -171,11 +176,11 @@ class PhaseError:
 
 @dataclass(frozen=True)
 class PhaseResonance:
-    """Where the phase is met."""
+    """The frequency of the phase resonance."""
 
     frequency_hz: float
     uncertainty_hz: float
-    """Standard uncertainty, that of the sensors' phases included [Hz]."""
+    """Standard uncertainty, including the sensors' phases [Hz]."""
     slope_deg_per_hz: float
 
     @property
@@ -186,15 +191,15 @@ class PhaseResonance:
 
 @dataclass
 class PhaseSearch:
-    """Seeks a falling phase's crossing: motion lags more and more as the frequency rises through a mode."""
+    """Searches the frequency at which a falling phase crosses its target."""
 
     low_hz: float
     high_hz: float
     widest_step_hz: float
-    """What one step takes at most while the resonance is not bracketed [Hz]."""
+    """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase goes as that of a linear mode; of another its slope is known close by alone."""
+    """Whether the phase is that of a linear mode; otherwise its slope is known only close by."""
 
     def next_hz(self) -> float:
         """Return the next frequency to try, after at least one."""
@@ -212,7 +217,7 @@ class PhaseSearch:
         return self._bounded(self._outwards(last))
 
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
-        """Draw a line through the tries near the resonance; it crosses zero there.
+        """Return the zero of a line through the tries near the resonance.
 
         Parameters
         ----------
@@ -228,12 +233,12 @@ class PhaseSearch:
             used = away[:_NEAREST]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
-        # The tangent of the error is a straight line through a mode, whose phase itself bends away from it.
+        # In a mode the tangent of the error is a straight line over frequency; the phase itself is not.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
-            # All at one frequency, or all beyond a right angle: nothing tells where it is crossed.
+            # All at one frequency, or all beyond a right angle: the crossing is not determined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        # A given phase moves the tangent the more, the further out it is.
+        # A given phase changes the tangent more, the further out it is.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
@@ -255,7 +260,7 @@ class PhaseSearch:
 
 
 def _between(low: PhaseError, high: PhaseError) -> float:
-    """Cross the secant, kept away from both ends so that the bracket shrinks from either side."""
+    """Return the secant's zero, away from both ends so that the bracket shrinks from either side."""
     share = low.error_deg / (low.error_deg - high.error_deg)
     edge = 0.05
     return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)

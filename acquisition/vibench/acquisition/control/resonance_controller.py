@@ -15,14 +15,14 @@ from ..rig import OnTable
 from .control_action import Controller
 from .feedback_channels import require_answer
 from .phase_law import LearntMode, PhaseError, PhaseLaw, PhaseResonance, PhaseSearch, TrackedPlace
-from .settling_controller import SettledState, SettlingController, record_settled, recorded_and_judged
+from .settling_controller import SettledState, SettlingController, record_and_judge, record_settled
 from .sine_loop import SineLoop, move, start
 from .steadiness import ORDERS, Periods
 
 _UNKNOWNS = 8
-"""Real numbers that are fitted: frequency, damping, and a complex polynomial of degree two."""
+"""Real unknowns of the fit: frequency, damping, and a complex polynomial of degree two."""
 _SURE = 2.0
-"""Standard uncertainties by which a damping differs from none."""
+"""Standard uncertainties by which a damping differs from zero."""
 
 
 @dataclass(frozen=True)
@@ -32,18 +32,18 @@ class Mode:
     frequency_hz: float
     """Undamped natural frequency [Hz]."""
     frequency_u_hz: float
-    """Standard uncertainty, from what the points leave [Hz]."""
+    """Standard uncertainty, from the residuals [Hz]."""
     damping_ratio: float
 
 
-def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
-    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None where points tell no mode.
+def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
+    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None where it gives no mode.
 
-    They are too few, or what they tell is damped no more than they scatter, or lies beside them all.
+    That is with too few points, a damping within its uncertainty, or a frequency beside all points.
 
-    The polynomial on the right holds the mode's residue, the motion of the base itself and the flanks
-    of other modes; a constant error of all phases only turns it. Levy's linear least squares, weighted
-    once more by the denominator that it found.
+    The polynomial on the right contains the mode's residue, the motion of the base itself and the flanks of
+    other modes; a constant error of all phases only turns it. Levy's linear least squares, weighted once
+    more by the fitted denominator.
 
     Parameters
     ----------
@@ -88,24 +88,24 @@ def _solve(
 
 
 _LOST_RAD = pi / 4
-"""An error of the phase beyond which the loop is no longer on the resonance."""
+"""Phase error beyond which the loop is no longer on the resonance."""
 _CORRECTED = 0.5
-"""Standard uncertainty of the correction for the phase that is left, as a share."""
+"""Relative standard uncertainty of the correction for the remaining phase."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""How far the motion may have to go still, over the tolerance of the phase in radians; one that creeps."""
+"""Largest remaining change of the motion, over the tolerance of the phase in radians; for a slow motion."""
 _LOOKS_LOCKED = 3
-"""Looks in a row with phase and level where they should be, before it counts as locked."""
+"""Looks in a row with phase and level within tolerance that count as locked."""
 _FINEST = 2e-6
-"""Share of a frequency by which a search goes at least: closer together lie the sides of a jump."""
+"""Smallest step of a search, relative to the frequency: the sides of a jump are closer together."""
 _BATCHES = 8
 _KNOWN = 4.0
-"""Standard errors of a motion above which it has a phase."""
+"""Standard errors of a motion above which its phase is defined."""
 _FURTHEST = 1.5
-"""Half-widths of the resonance between it and the furthest point of a flank."""
+"""Distance of the furthest flank point from the resonance, in half-widths."""
 
 
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
-    """Lock on to the resonance at every level, record there, go on to the next level from there."""
+    """Lock on to the resonance at every level and record there; continue to the next level from there."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
         # It may be a hundredth of the whole motion, which then seems settled long before.
@@ -122,7 +122,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
 def _go_on(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
 ) -> Controller[TrackedPlace | None]:
-    """Go to the next level under the phase-locked loop and record there; None far off the resonance."""
+    """Follow the resonance to the next level and record there; None if the loop lost it."""
     level, law = plan.held_levels[number], PhaseLaw(plan, last, mode)
     change = _first_change(loop, level, last)
     begin_hz = law.next_hz(last.frequency_hz, last.base_m_per_s2 * change)
@@ -133,7 +133,7 @@ def _go_on(
         return None
     periods = looks * LOOK_PERIODS * loop.drives
     segment = plan.segment(number, loop.setting.frequency_hz)
-    found = yield from recorded_and_judged(controller, segment, plan.record_s, periods / loop.drive_hz)
+    found = yield from record_and_judge(controller, segment, plan.record_s, periods / loop.drive_hz)
     error = _phase_error(loop.periods, found, plan)
     is_steady = found.held is Held.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
     is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
@@ -153,7 +153,9 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance."""
+    """Control phase and level together; return the number of looks, and the result: None off the
+    resonance.
+    """
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -175,10 +177,10 @@ def _lock(
 
 
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
-    """Return the factor by which the setting changes at first when the level does.
+    """Return the factor by which the setting changes first when the level does.
 
-    A specimen that holds a light table back to a share of its motion does so only when it has grown: at once
-    the base moves by the whole change of the setting, over that share.
+    A specimen reduces the motion of a light table only after it has grown: at first the base moves by the
+    whole change of the setting, over that reduction.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
     share = min(1.0, bare_vpp / loop.setting.setting_vpp)
@@ -192,7 +194,7 @@ def _search(
     """Search the resonance at one level in settled motion, and record there."""
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Its motion creeps: tries of motions that have still to go would tell a wrong slope of the phase.
+        # Its motion settles slowly: unsettled tries would give a wrong slope of the phase.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     settling_controller = SettlingController(loop, rule, level)
@@ -204,7 +206,7 @@ def _search(
         states.append((yield from settling_controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
-        # Where a harmonic is noise, its phase is any, and while it creeps, one that passes.
+        # Where a harmonic is noise its phase is random, and while it settles the phase changes.
         rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
         is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
         if not any(_is_there(plan, each) for each in states[-2:]):
@@ -215,7 +217,7 @@ def _search(
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
-            # The tries are in the converter's time, what is played in the generator's.
+            # The tries are in the converter's time, the drive in the generator's.
             next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE
@@ -241,8 +243,8 @@ def _search(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks: the first width, found without them, is kept. What drives a superharmonic
-    # hangs on the frequency too, the more the nearer contacts are to their first: that width is no bound.
+    # Contacts bend the flanks, so the first width, measured without them, is kept. A superharmonic also
+    # depends on how near contacts are to their first: its width is not a bound.
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
@@ -250,14 +252,14 @@ def _search(
 
 @dataclass(frozen=True)
 class Tracked:
-    """What was found of a mode at one level."""
+    """Result of one level."""
 
     resonance: PhaseResonance
     mode: Mode | None
     lock: LockResult
     tries: int
     periods: int
-    """Periods of the drive, until then."""
+    """Number of drive periods until then."""
 
 
 def _flanks(
@@ -275,38 +277,38 @@ def _flanks(
 
 
 def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
-    """Fit the mode to all that was visited near it."""
+    """Fit the mode to all points near it."""
     reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
     near = [each for each in states if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
-    return fitted_mode(
+    return fit_mode(
         np.array([each.drive_hz for each in near]), np.array([each.transmissibility for each in near])
     )
 
 
 def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Whether a motion may be the one that is tracked: a subharmonic one does not repeat every drive."""
+    """Whether the motion can be the tracked one: a subharmonic does not repeat every drive period."""
     return plan.subharmonic == 1 or found.judgement.period != 1
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
-    """Return what both sensors' phases and sensitivities leave open of the phase [degrees].
+    """Return the uncertainty of the phase from both sensors' phases and sensitivities [degrees].
 
-    Of a super- or subharmonic also what its motion may have to go still; a subharmonic one creeps, too slowly
-    to be seen from one look to the next, so that all counts which passes for settled.
+    For a super- or subharmonic it includes the possible remaining change of its motion; a subharmonic
+    settles too slowly to be seen from one look to the next, so the whole tolerance counts.
     """
     if not plan.is_fundamental:
         remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0
         if plan.subharmonic > 1:
             remaining = max(remaining, plan.settling.tolerance)
         return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
-    # Of a difference of motions the phase also turns with their ratio; of a single one it does not.
+    # The phase of a difference of motions also depends on their ratio, that of a single one does not.
     turned = plan.motion(found.harmonics) - found.transmissibility
     size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
     return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Compare the phase of m0 against the base with the wanted one; batches tell its uncertainty."""
+    """Compare the phase of m0 relative to the base with the target; batches give its uncertainty."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES
@@ -317,14 +319,14 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
-    # Each harmonic over the phase of the base times as much; turned and scaled as all together are.
+    # Each harmonic over the phase of the base times its order; turned and scaled as all together.
     away = np.angle(base * base.mean().conjugate())
     orders = np.arange(1, ORDERS) / plan.subharmonic
     ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]
     ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
     ratios = np.array([plan.motion(each) for each in ratios])
     if abs(ratios.mean()) <= _KNOWN * float(np.std(ratios, ddof=1)) / sqrt(_BATCHES):
-        # Noise: the spread of its phases has a bound, and with it what they would be known to.
+        # Noise: the spread of its phases is bounded, which bounds their uncertainty too.
         return PhaseError(found.drive_hz, error_deg, 180.0)
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))

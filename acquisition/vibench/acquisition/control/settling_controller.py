@@ -1,4 +1,4 @@
-"""Waiting until a motion has settled, while the base is brought to its level and kept there."""
+"""Waiting until a motion has settled, while the base is brought to its level and held there."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -24,17 +24,17 @@ from ..recording import (
 from .control_action import Controller, LevelControl, MeasuredLevel, measured_level
 from .feedback_channels import require_answer
 from .sine_loop import GainEstimator, SineLoop, start, track, update_track
-from .steadiness import ORDERS, Judgement, Phasors, in_drives, judged
+from .steadiness import ORDERS, Judgement, Phasors, in_drives, judgement_of
 
 
 @dataclass(frozen=True)
 class SettledPoint:
-    """A frequency at which the motion was let settle, and the Response II that was found."""
+    """A frequency with settled motion, and its Response II."""
 
     frequency_hz: float
     response: float
     period: int = 1
-    """Period of the motion, in drive periods; 0 when it has none."""
+    """Period of the motion, in drive periods; 0 without a period."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class LocatedJump:
 
 
 Seek = Generator[float, SettledPoint, LocatedJump]
-"""Yields a frequency to be reached on the branch before the jump, and receives what was found there."""
+"""Yields a frequency to reach on the branch before the jump, and receives the settled point there."""
 
 
 def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
@@ -74,17 +74,17 @@ def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float)
 
 
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
-    """Say on which side of a jump a response lies that was found between them.
+    """Return the side of a jump to which a response between its ends belongs.
 
-    Before it is what is nearer to the response before, and no further from that than the one after: a
-    third branch has been jumped to, just as the second.
+    It belongs before the jump if it is nearer to the response before, and no further from that than the
+    response after; a jump to a third branch counts like one to the second.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:
-    """Larger over smaller response; 1 when they are equal, and infinite when one of them is none."""
+    """Larger over smaller response; 1 when they are equal, infinite when one of them is zero."""
     if min(one.response, other.response) <= 0.0:
         return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
@@ -93,9 +93,9 @@ def ratio(one: SettledPoint, other: SettledPoint) -> float:
 def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Whether a motion is the one that was found before at the same frequency.
 
-    It has the same period, or as little of one. The branches differ by ``factor`` at least; half of
-    that, in decibels, tells them apart. Two looks at one chaotic motion differ more than two at a
-    periodic one: the whole factor is granted to them.
+    It has the same period, or neither has one. Branches differ by at least ``factor``; half of that, in
+    decibels, separates them. Two measurements of one chaotic motion differ more than those of a periodic
+    one: they may differ by the whole factor.
     """
     if point.period != expected.period:
         return False
@@ -104,19 +104,19 @@ def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> 
 
 _SURE = 2.0
 _SAME_LEVEL = 0.004
-"""Tolerance with which the level is held where one order of the response alone is judged, a share."""
+"""Relative tolerance of the level when a single order of the response is judged."""
 _PROMPT = 0.7
-"""Part of a correction that is made at once where the specimen still answers the one before."""
+"""Part of a correction made at once while the specimen still responds to the last one."""
 
 
 @dataclass(frozen=True)
 class SettledState:
-    """What was found at one frequency after waiting."""
+    """Result at one frequency after waiting."""
 
     frequency_hz: float
     """As commanded [Hz]."""
     drive_hz: float
-    """As seen by the converter [Hz]."""
+    """In the converter's time [Hz]."""
     setting_vpp: float
     waited_s: float
     judgement: Judgement
@@ -126,7 +126,7 @@ class SettledState:
     harmonics: tuple[complex, ...]
     """Displacement of m0, first and higher orders of its period, over that of the base's fundamental."""
     drives: int = 1
-    """Periods of the drive in one of m0."""
+    """Drive periods in one period of m0."""
 
     @property
     def transmissibility(self) -> complex:
@@ -140,19 +140,19 @@ class SettledState:
 
     @property
     def point(self) -> SettledPoint:
-        """What a search for a jump needs of it."""
+        """The values that a search for a jump needs."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
     @property
     def note(self) -> SettledNote:
-        """What is noted of it; the same numbers stand beside the samples."""
+        """Values for the note; the same numbers are stored with the segment."""
         found = self.judgement
         return SettledNote(
             frequency_hz=self.frequency_hz,
             motion=found.steadiness,
             period=found.period,
             waited_s=round(self.waited_s, 3),
-            # Too few periods for a figure: as wide as the motion itself.
+            # Too few periods for a value: as uncertain as the motion itself.
             scatter=found.scatter if isfinite(found.scatter) else 1.0,
             noise=found.noise if isfinite(found.noise) else 0.0,
             setting_vpp=self.setting_vpp,
@@ -164,14 +164,14 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Brings the motion at one frequency to rest, as far as it comes to rest."""
+    """Waits until the motion at one frequency has settled, as far as it does."""
 
     loop: SineLoop
     rule: Settling
     level: BaseLevel | None
 
     def settled(self) -> Controller[SettledState]:
-        """Wait at the frequency that is played; correct the setting whenever the level is off."""
+        """Wait at the present frequency; correct the setting whenever the level is off."""
         waited_s = 0.0
         while True:
             stretch_s = look_s(self.loop.motion_hz)
@@ -180,7 +180,7 @@ class SettlingController:
             is_late = waited_s + stretch_s > self.rule.longest_wait_s
             if waited_s < self.rule.shortest_wait_s and not is_late:
                 continue
-            if not is_late and self._corrected():
+            if not is_late and self._correct_level():
                 continue
             found = self.found(waited_s)
             if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
@@ -188,7 +188,7 @@ class SettlingController:
                 return found
 
     def measured(self) -> MeasuredLevel:
-        """Measure the base over the newer half of what was seen since the last change."""
+        """Measure the base over the newer half of the periods since the last change."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
@@ -202,19 +202,19 @@ class SettlingController:
         return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
     def held(self, measured: MeasuredLevel) -> Held:
-        """Return whether a measured level is the one to be held."""
+        """Return whether a measured level is within its tolerance."""
         if self.level is None:
             return Held.OPEN
         return measured.held(self._target, self.level.tolerance)
 
     @property
     def _target(self) -> float:
-        """Acceleration that the base should have here [m/s2]."""
+        """Target acceleration of the base at this frequency [m/s2]."""
         assert self.level is not None
         return self.level.acceleration_at(self.loop.setting.frequency_hz)
 
-    def _corrected(self) -> bool:
-        """Change the setting if the level asks for it; whether it did."""
+    def _correct_level(self) -> bool:
+        """Change the setting if the level needs it; return whether it did."""
         if self.level is None or self.loop.periods.count < LOOK_PERIODS:
             return False
         now = self.loop.setting
@@ -222,7 +222,7 @@ class SettlingController:
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         level = self.level
         if self.loop.judged_order is not None:
-            # Its phase moves with the level as well: all that is compared is seen at the same one.
+            # Its phase depends on the level too, so all compared periods need the same level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
@@ -232,9 +232,9 @@ class SettlingController:
         return True
 
     def found(self, waited_s: float) -> SettledState:
-        """Judge what was seen since the last change."""
+        """Judge the periods since the last change."""
         loop, periods = self.loop, self.loop.periods
-        # What creeps has only just come to rest.
+        # A slow motion has only just settled.
         newest = periods.last(
             max(self.rule.periods, periods.count // 2) if loop.judged_order is None else self.rule.periods
         )
@@ -244,7 +244,7 @@ class SettlingController:
             drive_hz=loop.drive_hz,
             setting_vpp=loop.setting.setting_vpp,
             waited_s=waited_s,
-            judgement=self._judged(periods.response),
+            judgement=self._judgement(periods.response),
             base=measured,
             held=self.held(measured),
             harmonics=tuple(
@@ -256,14 +256,14 @@ class SettlingController:
             drives=loop.drives,
         )
 
-    def _judged(self, points: Phasors) -> Judgement:
+    def _judgement(self, points: Phasors) -> Judgement:
         order, noise = self.loop.judged_order, self.loop.noise
-        found = judged(points if order is None else points[:, order : order + 1], self.rule, noise)
+        found = judgement_of(points if order is None else points[:, order : order + 1], self.rule, noise)
         newest = points[-self.rule.periods :]
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Whether the level is known well enough to be called held; it may be out of reach, too."""
+        """Whether the level is known well enough to be called held; it may also be out of reach."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
@@ -298,7 +298,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
                 level=held,
             )
         )
-        # The figures of all pieces since the last change are one mean: chaos needs it long.
+        # All pieces since the last change form one mean, because chaos needs a long one.
         next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
@@ -310,15 +310,15 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
 def record_settled(
     settling_controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
-    """Record a settled motion as a segment, and note the level that was achieved in it."""
+    """Record a settled motion as a segment, and note its level."""
     yield from _record_held(settling_controller, segment, duration_s)
     _note(settling_controller, found, segment)
 
 
-def recorded_and_judged(
+def record_and_judge(
     settling_controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
-    """Record a motion as a segment, long enough to judge it by that."""
+    """Record a motion as a segment, long enough to judge it from that."""
     shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _record_held(settling_controller, segment, duration_s)

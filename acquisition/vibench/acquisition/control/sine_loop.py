@@ -1,4 +1,4 @@
-"""One sine at a time, played and measured: the actions that all feedback is made of."""
+"""One sine at a time, played and measured: the actions of all controllers."""
 
 from collections import deque
 from collections.abc import Generator
@@ -21,25 +21,25 @@ from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
 from .steadiness import Periods, Phasors, Stroboscope
 
 _SURE = 4.0
-"""Standard uncertainties from which on a trend is followed instead of averaged away."""
+"""Standard uncertainties above which a trend is followed instead of averaged."""
 _FEWEST = 3
-"""Steps from which a trend and its scatter can be told."""
+"""Smallest number of steps for a trend and its scatter."""
 
 
 @dataclass(frozen=True)
 class _Answer:
     time_s: float
     gain: complex
-    """Measured over what the rig's linear model says."""
+    """Measured value over that of the rig's linear model."""
     level: complex
-    """Measured over what should be held."""
+    """Measured value over its target."""
 
 
 class GainEstimator:
-    """What the base did over what the linear model of the rig says, for the last while.
+    """Recent gain of the base, relative to the linear model of the rig.
 
-    In chaos the fundamental of a few periods is mostly chance: the mean of the track counts. Where the
-    answer changes steadily, as over a resonance, the track's line is drawn on to the next step.
+    In chaos the fundamental of a few periods is mostly chance, so the mean of the track counts. If the gain
+    changes steadily, as over a resonance, a line through the track is extrapolated to the next step.
     """
 
     def __init__(self, memory_s: float) -> None:
@@ -47,7 +47,7 @@ class GainEstimator:
         self._answers: deque[_Answer] = deque()
 
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
-        """Take in the periods of a step, shape (periods,).
+        """Add the periods of a step, shape (periods,).
 
         Parameters
         ----------
@@ -63,18 +63,18 @@ class GainEstimator:
 
     @property
     def is_known(self) -> bool:
-        """Whether anything was measured yet."""
+        """Whether anything has been measured."""
         return bool(self._answers)
 
     @property
     def level(self) -> float:
-        """Return the mean amplitude over the track, as a share of what should be held."""
+        """Return the mean amplitude over the track, as a share of its target."""
         if not self._answers:
             return 1.0
         return float(abs(np.mean([each.level for each in self._answers])))
 
     def gain_at(self, time_s: float) -> float:
-        """Foresee the magnitude of the gain; 1, the model, while nothing is known."""
+        """Predict the magnitude of the gain; 1, the model, without measurements."""
         if not self._answers:
             return 1.0
         gain = np.array([each.gain for each in self._answers])
@@ -94,14 +94,14 @@ class GainEstimator:
 
 @dataclass(frozen=True)
 class DriveSetting:
-    """What the generator is set to."""
+    """Frequency and level of the generator."""
 
     frequency_hz: float
     setting_vpp: float
 
 
 class SineLoop:
-    """Knows what is played, and looks at it once a period."""
+    """Sets the drive, and evaluates it once a period."""
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self.measurement = measurement
@@ -114,18 +114,19 @@ class SineLoop:
         self.most_vpp = measurement.excitation.amplitude_vpp
         """Largest setting of the plan [V]."""
         self.drives = 1
-        """Periods of the drive in one of the motion that is looked at; set before anything is played."""
+        """Drive periods in one period of the motion; set before anything is played."""
         self.judged_order: int | None = None
-        """Of the response, if one alone tells whether the motion has settled; likewise."""
+        """Order of the response that alone decides whether the motion has settled; set before anything is
+        played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
-        """Smallest setting of what plays [V]."""
+        """Smallest setting of the source [V]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
         self.elapsed_s = 0.0
-        """Listened so far [s]."""
+        """Duration of all samples so far [s]."""
 
     @property
     def periods(self) -> Periods:
-        """What was seen since the last change."""
+        """Periods since the last change."""
         return self._scope.periods()
 
     @property
@@ -135,23 +136,23 @@ class SineLoop:
 
     @property
     def motion_hz(self) -> float:
-        """One over the period of the motion that is looked at [Hz]."""
+        """One over the period of the motion [Hz]."""
         return self.setting.frequency_hz / self.drives
 
     @property
     def noise(self) -> float:
-        """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
+        """Rms noise of the response channel, in the orders at the present frequency [m/s]."""
         return Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
 
     def listen_to_silence(self) -> Controller[None]:
-        """Listen to silence: what the response shows then is noise."""
+        """Record silence: the response then shows noise."""
         samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
         # The first half lets the bench check ring out.
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
-        """Play something else from the next move on."""
+        """Change the drive from the next phase on."""
         if frequency_hz != self.setting.frequency_hz:
             self._scope = self.channels.stroboscope(frequency_hz, self.drives)
             self._rows.skip()
@@ -159,27 +160,27 @@ class SineLoop:
         self.forget()
 
     def bounded_vpp(self, setting_vpp: float) -> float:
-        """Keep a setting between the generator's smallest and the plan's largest [V]."""
+        """Limit a setting to the generator's smallest and the plan's largest [V]."""
         return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
     def forget(self) -> None:
-        """Look again from the next move on."""
+        """Evaluate only later periods."""
         self._scope.forget()
 
     def note(self, note: FeedbackNote) -> None:
-        """Have something noted with the next move."""
+        """Add a note to the next phase."""
         self._notes.append(note)
 
     def ramp_up(self) -> Controller[None]:
-        """Begin to play."""
+        """Start the drive."""
         yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
-        """End the play."""
+        """End the drive."""
         yield from self.run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
-        """Play on for a while, and look."""
+        """Continue the drive for a while, and evaluate it."""
         samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
         first_sample, rows = self._rows.take(samples.first_sample, np.stack(self.channels.rows(samples)))
@@ -187,15 +188,15 @@ class SineLoop:
             self._scope.add(first_sample, *rows)
 
     def say(self) -> Controller[None]:
-        """Have everything noted that is still to be noted."""
+        """Write all pending notes."""
         if self._notes:
-            yield ControlAction(None, self._taken_notes())
+            yield ControlAction(None, self._take_notes())
 
     def run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
-        """Have a phase carried out, with what is to be noted at its first sample."""
-        return (yield ControlAction(phase, self._taken_notes()))
+        """Carry out a phase, with the pending notes at its first sample."""
+        return (yield ControlAction(phase, self._take_notes()))
 
-    def _taken_notes(self) -> tuple[FeedbackNote, ...]:
+    def _take_notes(self) -> tuple[FeedbackNote, ...]:
         notes = tuple(self._notes)
         self._notes.clear()
         return notes
@@ -206,11 +207,11 @@ class SineLoop:
 
 
 _GLIDE_MEMORY_S = 0.5
-"""Over which a glide averages the base's answer [s]."""
+"""Time over which a glide averages the gain of the base [s]."""
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
+    """Ramp up at a frequency: to the level, by the rig's model, or to the plan's setting."""
     setting_vpp = loop.most_vpp
     if level is not None:
         guess_vpp = _bare_vpp(loop, level, frequency_hz)
@@ -221,7 +222,7 @@ def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Contr
 
 
 def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
-    """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
+    """Go to another frequency in steps of at most ``step_hz``: a large step would disturb the motion."""
     begin_hz = loop.setting.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
     estimator = GainEstimator(_GLIDE_MEMORY_S)
@@ -233,18 +234,18 @@ def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz:
 
 
 def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Play another frequency: the setting follows the rig's model from where it is."""
+    """Change the frequency; the setting follows the rig's model from its present value."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
-        setting_vpp /= _modelled_vpp(loop, level)
+        setting_vpp /= _model_vpp(loop, level)
     _change(loop, frequency_hz, setting_vpp, level)
 
 
 def track(
     loop: SineLoop, frequency_hz: float, level: BaseLevel | None, estimator: GainEstimator, duration_s: float
 ) -> None:
-    """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
+    """Play another frequency for ``duration_s``, at the setting predicted for its middle."""
     if level is None or not estimator.is_known:
         move(loop, frequency_hz, level)
         return
@@ -254,7 +255,7 @@ def track(
 
 
 def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
-    """Take what was just heard into the track."""
+    """Add the last samples to the track."""
     if level is None:
         return
     now = loop.setting
@@ -262,12 +263,12 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
         acceleration = abs(complex(np.mean(loop.periods.base)))
         require_answer(loop.rig, now.frequency_hz, now.setting_vpp, acceleration)
     target = level.acceleration_at(now.frequency_hz)
-    modelled = target * now.setting_vpp / _modelled_vpp(loop, level)
+    modelled = target * now.setting_vpp / _model_vpp(loop, level)
     estimator.add(loop.elapsed_s, loop.periods.base, modelled, target)
 
 
-def _modelled_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Return the setting that the bare table needs for the level at the frequency of now [V]."""
+def _model_vpp(loop: SineLoop, level: BaseLevel) -> float:
+    """Return the setting that the bare table needs for the level at the present frequency [V]."""
     return _bare_vpp(loop, level, loop.setting.frequency_hz)
 
 
@@ -276,7 +277,7 @@ def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
-    """Change frequency and setting, the latter by no more than the level allows at once."""
+    """Change frequency and setting; the latter by at most the allowed step of the level."""
     if level is not None:
         now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
@@ -290,7 +291,7 @@ _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Begin quietly, bring m0 to its amplitude at every frequency, record, ramp down."""
+    """Begin with a small drive, bring m0 to its amplitude at every frequency, record, ramp down."""
     passes = tuple(plan.passes())
     loop.change(passes[0][1][0], loop.bounded_vpp(plan.start_share * loop.most_vpp))
     yield from loop.listen_to_silence()
@@ -299,14 +300,14 @@ def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         for frequency_hz in frequencies_hz:
             if frequency_hz != loop.setting.frequency_hz:
                 yield from glide(loop, frequency_hz, None, plan.glide_step_hz)
-            yield from _brought(loop, plan)
+            yield from _bring_to_response(loop, plan)
             yield from _record(loop, plan, frequency_hz, direction)
     yield from loop.ramp_down()
     yield from loop.say()
 
 
-def _brought(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Correct the setting until the response is as asked, or the wait is over."""
+def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
+    """Correct the setting until the response has its target, or the wait is over."""
     frequency_hz, waited_s, in_a_row = loop.setting.frequency_hz, 0.0, 0
     stretch_s = look_s(frequency_hz)
     while in_a_row < _IN_A_ROW and waited_s + stretch_s <= plan.longest_wait_s:
@@ -317,7 +318,7 @@ def _brought(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # The newest look alone: what was before answers another setting.
+        # The newest look alone: earlier ones belong to another setting.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:

@@ -1,4 +1,6 @@
-"""Whether a motion seen once a period has settled: it repeats after k periods, or keeps its statistics."""
+"""Whether a motion sampled once a period has settled: it repeats after k periods, or its statistics are
+steady.
+"""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -12,20 +14,19 @@ from ..excitation.feedback import Settling
 from ..instruments import Samples
 from ..recording import Steadiness
 
-# The motion once a drive period: its Fourier coefficients over each period of the recorded drive.
-#
-# The generator's clock as the converter sees it: where the drive's periods begin, block by block.
+# The motion once a drive period: its Fourier coefficients over each period of the recorded drive. The
+# generator's clock in the converter's time gives the beginning of each drive period.
 
 _MEMORY = 40
-"""Blocks from which the frequency is taken; the line through their phases is then sharp enough."""
+"""Number of blocks for the frequency; a line through their phases is then accurate enough."""
 
 
 class DriveClock:
     """Follows one tone on the recorded drive channel.
 
-    Generator and converter have clocks of their own: some ten parts in a million between them, a
-    tenth of a turn after 40 s at 260 Hz. What was commanded therefore tells the frequency only
-    roughly; the phase of every block is fitted again, and the line through them is the frequency.
+    Generator and converter have separate clocks with a difference of some ten parts in a million: a tenth of
+    a turn after 40 s at 260 Hz. So the commanded frequency is only approximate. The phase of every block is
+    fitted, and a line through the phases gives the frequency.
     """
 
     def __init__(self, near_hz: float, sample_rate_hz: float) -> None:
@@ -34,19 +35,19 @@ class DriveClock:
         self._centres_s: deque[float] = deque(maxlen=_MEMORY)
         self._phases: deque[float] = deque(maxlen=_MEMORY)
         self.frequency_hz = near_hz
-        """Of the drive in the converter's time, as far as it is known [Hz]."""
+        """Frequency of the drive in the converter's time, as far as known [Hz]."""
         self.phase_cycles = 0.0
         """Cycles of the drive's sine at sample 0, modulo 1."""
 
     def follow(self, drive: Samples, first_sample: int) -> None:
-        """Take in the drive of a block, any unit, shape (samples,): two periods at least."""
+        """Add the drive of a block, any unit, shape (samples,): two periods at least."""
         count = len(drive)
         centre_s = (first_sample + 0.5 * (count - 1)) / self._rate_hz
         offset_s = (np.arange(count) - 0.5 * (count - 1)) / self._rate_hz
         angle = 2 * pi * self._near_hz * offset_s
         basis = np.stack([np.sin(angle), np.cos(angle), np.ones(count)], axis=1)
         solution = np.linalg.lstsq(basis, drive)[0]
-        # Cycles of A sin(2 pi (f t + c)) at the block's centre, less what the nominal frequency makes of it.
+        # Cycles of A sin(2 pi (f t + c)) at the block's centre, minus those of the nominal frequency.
         turns = float(np.arctan2(solution[1], solution[0])) / (2 * pi) - self._near_hz * centre_s
         before = self._phases[-1] if self._phases else turns
         turns = before + (turns - before + 0.5) % 1.0 - 0.5
@@ -73,14 +74,15 @@ class DriveClock:
 Phasors = NDArray[np.complex128]
 
 ORDERS = 5
-"""Mean and the first four harmonics of a period: what tells one from the next."""
+"""Mean and the first four harmonics of a period: they distinguish periods."""
 
 
 @dataclass(frozen=True, eq=False)
 class Periods:
-    """One row for each period of the motion, a drive or several of them long.
+    """One row for each period of the motion, of one or several drive periods.
 
-    Phases count from the drive's upward zero crossing (a sine is real): of several, from any one.
+    Phases count from the drive's upward zero crossing (a sine is real), for several drive periods from any
+    one.
     """
 
     base: Phasors
@@ -90,7 +92,7 @@ class Periods:
 
     @property
     def count(self) -> int:
-        """How many periods there are."""
+        """Number of periods."""
         return len(self.base)
 
     def last(self, count: int) -> "Periods":
@@ -99,7 +101,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Cuts blocks into periods as they come; what a block leaves over is kept for the next.
+    """Divides blocks into periods; remaining samples are kept for the next block.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ class Stroboscope:
         self._response: list[Phasors] = []
 
     def add(self, first_sample: int, drive: Samples, base: Samples, response: Samples) -> None:
-        """Take in a block, each channel of shape (samples,), that follows the one before without a gap."""
+        """Add a block, each channel of shape (samples,), which must follow the last one without a gap."""
         block = np.stack([drive, base, response])
         if self._left.size == 0:
             self._first = first_sample
@@ -143,7 +145,7 @@ class Stroboscope:
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
 
     def forget(self) -> None:
-        """Begin again with the next period: what was played has changed."""
+        """Start again with the next period, after a change of the drive."""
         self._base.clear()
         self._response.clear()
 
@@ -161,7 +163,7 @@ class Stroboscope:
 
     def _keep_from(self, start_s: float) -> None:
         self._begun_s = start_s
-        # A sample more than needed: the phase of the next block may shift the start a little to the left.
+        # One sample more: the phase of the next block may shift the start a little to the left.
         keep = max(0, int(start_s * self._rate_hz) - 1 - self._first)
         self._left = self._left[:, keep:]
         self._first += keep
@@ -207,39 +209,41 @@ def _hermite(value: Phasors, slope: Phasors, low: NDArray[np.int64], part: Sampl
 
 _THIRDS = 3
 _FEWEST_TURNS = 2
-"""Repetitions of a long period in each third of the window, so that a third has a mean."""
+"""Repetitions of a long period in each third of the window, needed for a mean."""
 _SURE = 2.0
-"""Standard uncertainties that a figure must stay away from its limit."""
+"""Standard uncertainties that a value must stay away from its limit."""
 _CERTAIN = 5.0
-"""Standard errors of a mean above which it is none of noise."""
+"""Standard errors above which a mean is not noise."""
 _BLOCKS = 12
-"""Stretches that a stationarity test compares."""
+"""Number of blocks that a stationarity test compares."""
 _SIGNIFICANCE = 0.01 / 8
-"""Of one test; eight statistics are tested, so that a steady motion fails once in a hundred times."""
+"""Significance of one test; eight statistics are tested, so a steady motion fails once in a hundred times."""
 _NOISE_MARGIN = 1.5
-"""The noise of a channel is taken that much larger than it was in silence."""
+"""Factor on the noise measured in silence."""
 _SLOWEST = 0.9
-"""Largest ratio of two changes that is extrapolated; slower ones count ninefold."""
+"""Largest ratio of two changes that is extrapolated; at this ratio the remaining change is nine times the
+last.
+"""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a series of periods says about the motion; shares of its rms size."""
+    """What a series of periods shows about the motion; shares of its rms size."""
 
     steadiness: Steadiness
     period: int
-    """After how many drive periods it repeats; 0 when it does not."""
+    """Number of drive periods after which it repeats; 0 when it does not."""
     scatter: float
     """Rms distance of the points from their means, at that period (or at period 1)."""
     scatter_u: float
-    """Standard uncertainty of it."""
+    """Standard uncertainty of the scatter."""
     noise: float
-    """What the channel's own noise makes of the scatter; nothing smaller can be seen."""
+    """Part of the scatter due to the channel's noise; nothing smaller can be seen."""
     remaining: float
-    """How far the means have still to go, extrapolated; for an aperiodic motion how far they went."""
+    """Extrapolated remaining change of the means; for an aperiodic motion their last change."""
 
 
-def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
+def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     """Judge the newest periods of a motion.
 
     Parameters
@@ -271,10 +275,10 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
 
 
 def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
-    """Count the period in drives, of which each of the ``points`` is this many long.
+    """Convert a period to drive periods, when each of the ``points`` is this many long.
 
-    A motion that repeats after one drive has nothing but noise at the orders in between, however weak a
-    subharmonic may be beside the rest. A hum that silence shows as well is noise.
+    A motion that repeats after one drive period has only noise at the orders in between, even if a
+    subharmonic is weak. A hum that is also present in silence is noise.
     """
     between = points[:, np.arange(points.shape[1]) % drives != 0]
     mean = between.mean(axis=0)
@@ -285,7 +289,7 @@ def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> J
 
 
 def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
-    """Measure the clusters that points make which lie a whole number of ``period`` apart."""
+    """Measure the clusters of points that are a multiple of ``period`` apart."""
     turns = len(points) // period
     clusters = points.reshape(turns, period, -1)
     size = sqrt(float(np.mean(np.sum(np.abs(points) ** 2, axis=1))))
@@ -308,7 +312,7 @@ def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
 
 
 def _differ(points: Phasors, period: int, allowed: float) -> bool:
-    """Whether the clusters of a longer period lie further apart than one cluster may be wide."""
+    """Whether the clusters of a longer period are further apart than the allowed width of one."""
     centres = points.reshape(-1, period, points.shape[1]).mean(axis=0)
     away = centres - centres.mean(axis=0)
     size = float(np.mean(np.sum(np.abs(points) ** 2, axis=1)))
@@ -325,20 +329,20 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # The means of thirds differ by chance as well; noise is allowed to them as far as it explains that.
+    # The means of thirds also differ by chance; noise is subtracted as far as it explains that.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
 def _limit(figures: Judgement, tolerance: float) -> float:
-    """Return the scatter up to which a motion repeats as far as can be seen."""
+    """Return the largest scatter of a motion that repeats as far as can be seen."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
-    """Test whether the statistics of blocks keep still: no trend, and no step between the halves."""
+    """Test whether the statistics of blocks are steady: no trend, and no step between the halves."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    # Beside the mean, unless a single order is judged.
+    # Without the mean, unless a single order is judged.
     fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)
@@ -359,7 +363,7 @@ def _has_no_trend(figure: Samples) -> bool:
 
 
 def _halves_agree(figure: Samples) -> bool:
-    """Compare the means of both halves with the spread inside them."""
+    """Compare the means of both halves with the scatter inside them."""
     first, second = np.array_split(figure, 2)
     spread = sqrt((float(first.var(ddof=1)) + float(second.var(ddof=1))) / len(first))
     # Student's t at 0.125 % (two-sided) with ten degrees of freedom.

@@ -1,9 +1,9 @@
 """Real instruments: Tektronix AFG1022 and Keysight 33500B over VISA, inputs and outputs behind NI-DAQmx.
 
-Each keeps the promises of `vibench.acquisition.instruments`: every setting is read back, every refusal
-becomes an error that says what to do, and outputs go off whatever happens. The only place of this package
-that imports pyvisa, nidaqmx and grpc. It knows the rig's configuration, and neither plans nor runs; it
-cannot tell a simulated instrument from a real one.
+Each implements the protocols of `vibench.acquisition.instruments`: every setting is read back, every refusal
+becomes an error with advice, and outputs are switched off whatever happens. No other package here imports
+pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but no plans or runs, and cannot distinguish
+a simulated instrument from a real one.
 """
 
 import lazy_loader

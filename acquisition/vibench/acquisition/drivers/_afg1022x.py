@@ -1,4 +1,4 @@
-"""The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens."""
+"""The Tektronix AFG1022: every setting is read back, and the output is switched off whatever happens."""
 
 import re
 import statistics
@@ -21,7 +21,7 @@ _BURST_CHANNEL = 1
 _QUIET_FREQUENCY_HZ = 1000.0
 _STOP_ATTEMPTS = 2
 _LATENCY_TRIALS = 9
-# High impedance is answered 9.9E+37; anything beyond the largest finite load (10 kohm) means it.
+# The AFG1022 reports high impedance as 9.9E+37; any load above the largest finite one (10 kohm) means it.
 _INFINITE_OHM = 1e6
 _SAME_LOAD = 0.01
 
@@ -29,15 +29,14 @@ _SAME_LOAD = 0.01
 class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
-    Made by `open`, with the output off, 1 kHz sine at the smallest amplitude, no offset. Frequency
-    and amplitude may change while it plays. Nothing is sent that its limits or the bench's
-    ``amplitude_limit_vpp`` forbid (`LimitExceeded`), and no step between two settings is larger than
-    the larger of them.
+    `open` makes it, with the output off, 1 kHz sine at the smallest amplitude, no offset. Frequency and
+    amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp``
+    are refused (`LimitExceeded`), and no step between two settings is larger than the larger of them.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """Maker and model that ``*IDN?`` must answer, and the same for people."""
+    """Maker and model required in the reply to ``*IDN?``, as a pattern and in words."""
     wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
 
@@ -45,9 +44,9 @@ class AFG1022X(ScpiInstrument):
     shape = Word(
         "SOUR{c}:FUNC:SHAP", {Shape.SINE: ("SIN", "SINUSOID"), Shape.EDIT_MEMORY: ("EMEM", "EMEMORY")}
     )
-    # Frequencies are sent to 1 uHz; seven digits are the least that a reply has been seen to carry.
+    # Frequencies are sent to 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp; more than that, or 0.1 %, is another value.
+    # The panel resolves 1 mVpp; a larger difference, or above 0.1 %, is another value.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
@@ -55,11 +54,11 @@ class AFG1022X(ScpiInstrument):
     burst = Word("SOUR{c}:BURS:STAT", SWITCH)
 
     identity: Identity
-    """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
+    """Reply to ``*IDN?``; stored whole, since its last field varies."""
     codes: ArbitraryCodes | None = None
-    """What the memory holds while it is selected."""
+    """Contents of the memory while it is selected."""
     unconfirmed: tuple[Knob, ...] = ()
-    """Settings that could be neither made nor read remotely: the operator must confirm them."""
+    """Settings that could neither be made nor read remotely: the operator must confirm them."""
     _is_known = False
     _is_silent_and_closed = False
 
@@ -98,12 +97,12 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """Smallest and largest amplitude that may be set here, peak to peak [V]."""
+        """Smallest and largest amplitude that this bench allows, peak to peak [V]."""
         return self.model.amplitude_range_vpp(self._config)
 
     @property
     def playing(self) -> Shape:
-        """The shape that the instrument holds; raises InstrumentError when a change has failed."""
+        """The shape that is set; raises InstrumentError when a change has failed."""
         _ = self.panel_vpp
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
@@ -125,15 +124,15 @@ class AFG1022X(ScpiInstrument):
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Put one period in memory, compare the memory with it, and select it. The output keeps its state.
 
-        The mean is taken out, see `GeneratorModel.codes`. While the memory changes, the amplitude is at
-        its minimum.
+        The mean is removed, see `GeneratorModel.codes`. While the memory changes, the amplitude is at its
+        minimum.
 
         Raises
         ------
         SettingRefused
             When the memory reads back differently.
         LimitExceeded
-            When points, repetition or amplitude are outside what instrument or bench allow.
+            When points, repetition or amplitude are outside the limits of instrument or bench.
         """
         codes = self.model.codes(waveform)
         panel_vpp = amplitude_vpp * codes.panel_factor
@@ -144,7 +143,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Before the shape as well: a sine's frequency may be too high for the memory.
+            # Before the shape too: a sine's frequency may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
@@ -156,13 +155,13 @@ class AFG1022X(ScpiInstrument):
         self.model.check_sweep(sweep)
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Change the frequency of what is playing; the phase goes on without a jump."""
+        """Change the frequency during the drive, without a jump of the phase."""
         self.model.check_frequency(self.playing, frequency_hz)
         with self._changing():
             self._set_frequency(frequency_hz)
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Change the peak-to-peak amplitude of what is playing."""
+        """Change the peak-to-peak amplitude during the drive."""
         _ = self.playing  # with unknown settings nothing is sent
         panel_vpp = amplitude_vpp * self._panel_factor
         self.model.check_amplitude(self._config, panel_vpp)
@@ -181,7 +180,7 @@ class AFG1022X(ScpiInstrument):
             self.command("*TRG")
 
     def end_burst(self) -> None:
-        """Play on without a trigger."""
+        """Play continuously, without triggers."""
         if self.channel == _BURST_CHANNEL:
             with self._changing():
                 self.burst = "OFF"
@@ -193,7 +192,7 @@ class AFG1022X(ScpiInstrument):
             self.output = "ON"
 
     def stop(self) -> None:
-        """Turn the output off. Legal at any time; tries again, over a new session too.
+        """Switch the output off. Legal at any time; tries again, also over a new session.
 
         Raises
         ------
@@ -231,9 +230,9 @@ class AFG1022X(ScpiInstrument):
             self.disconnect()
 
     def measured_latency_s(self) -> float:
-        """How long one verified change of amplitude takes: the floor of any emergency stop [s].
+        """Return how long one verified change of amplitude takes: the shortest possible stop [s].
 
-        Median of nine, each setting again the amplitude that is set.
+        Median of nine; each sets the present amplitude again.
         """
         durations_s = []
         for _ in range(_LATENCY_TRIALS):
@@ -279,7 +278,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def _panel_factor(self) -> float:
-        """Panel amplitude per amplitude that was asked for; other than 1 only for an uneven waveform."""
+        """Panel amplitude over requested amplitude; other than 1 only for an uneven waveform."""
         return 1.0 if self.codes is None else self.codes.panel_factor
 
     def _mute(self) -> None:
@@ -298,17 +297,17 @@ class AFG1022X(ScpiInstrument):
             self._to_quiet_sine()
 
     def _to_quiet_sine(self) -> None:
-        """From any state: no modes, no offset, the smallest amplitude, a sine."""
+        """Set a sine of the smallest amplitude, without modes and offset, from any state."""
         # *RST is not used: what it does to the output of this model is not documented.
         self._end_modes()
-        self.offset_v = 0.0  # first: it lowers the peak whatever the amplitude is
+        self.offset_v = 0.0  # first: it lowers the peak at any amplitude
         self._mute()
         self._select(None)
         self._set_frequency(_QUIET_FREQUENCY_HZ)
         self._is_known = True
 
     def _forget(self) -> None:
-        """Treat all settings as unknown: a change was broken off."""
+        """Treat all settings as unknown after an interrupted change."""
         self.held.clear()
         self._is_known = False
 
@@ -326,16 +325,16 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Make the generator expect the load; return what the operator must confirm when it cannot be known.
+        """Set the load that the generator expects; return settings to be confirmed if it cannot be known.
 
-        Sources contradict each other on whether an AFG1022 takes its load remotely (hardware reference
-        1.2), so it is tried. A wrong load is a factor of two at the terminal. Raises SettingRefused when
-        the generator says that it expects another one, and does not let it be changed.
+        Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so it is
+        tried. A wrong load is a factor of two at the terminal. Raises SettingRefused when the generator
+        reports another load that cannot be changed.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves one; the empty answer has already said so
+        self.complaints()  # an unknown query leaves an error; the empty reply has already shown it
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)

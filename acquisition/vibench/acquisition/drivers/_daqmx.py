@@ -1,4 +1,4 @@
-"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved."""
+"""A converter behind NI-DAQmx: continuous, hardware-timed, without gaps, and always released."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -27,8 +27,8 @@ from ..rig import TOKEN_KEY, Channel, ChannelConfig, DaqConfig, Rig, channels_of
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
 from ._overload import overload_ranges
 
-# Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for
-# so long is gone, even if its connection still stands.
+# Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for this time
+# is gone, even if its connection still exists.
 CALL_DEADLINE_S = 60.0
 # A second of four channels at the highest rate is beyond gRPC's default of 4 MB.
 _NO_LIMIT = -1
@@ -39,7 +39,7 @@ _CHANNEL_OPTIONS = (
 
 
 class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Ends every call that takes too long, and carries the token; the DAQmx client itself does neither."""
+    """Ends every call that takes too long, and adds the token; the DAQmx client does neither."""
 
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
         # A namedtuple's _replace is public in spite of its underscore.
@@ -50,7 +50,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
 
 @dataclass(frozen=True)
 class DaqmxSession:
-    """An address and the connection to it; close it after everything that was opened through it."""
+    """An address and its connection; close it after everything that was opened through it."""
 
     server: str | None
     """``"host:port"``; None for the driver on this computer."""
@@ -59,7 +59,7 @@ class DaqmxSession:
 
     @property
     def place(self) -> str:
-        """Where the driver runs, for errors."""
+        """Location of the driver, for errors."""
         return "this computer" if self.server is None else f"the device server at {self.server}"
 
     def system(self) -> System:
@@ -73,7 +73,7 @@ class DaqmxSession:
 
 
 def daqmx_session(server: str | None) -> DaqmxSession:
-    """Prepare the way to a driver; nothing is contacted before the first call."""
+    """Prepare a connection to a driver; nothing is contacted before the first call."""
     if server is None:
         return DaqmxSession(None, None, None)
     channel = grpc.insecure_channel(server, options=_CHANNEL_OPTIONS)
@@ -116,9 +116,9 @@ _TERMINALS = {
 }
 _COUPLINGS = {"AC": Coupling.AC, "DC": Coupling.DC}
 _SAME = 1e-6
-# Beyond this, a scaling is bent or shifted by more than rounding: volts are no multiples of one step.
+# A larger deviation from a straight line is more than rounding: volts are not multiples of one step.
 _LINEAR = 1e-9
-# One count of an int32 marks lost samples in recordings: a 32-bit converter may use it for a voltage.
+# One count of an int32 marks lost samples in recordings; a 32-bit converter may use it for a voltage.
 _MOST_COUNTS = 2**29
 
 
@@ -160,7 +160,7 @@ def _excite(made: AIChannel, channel: Channel) -> None:
             raise _refusal(channel, "sensor current", f"{channel.iepe_current_a:g} A", f"{held_a:g} A")
         return
     try:
-        # A current that an earlier program left on would push the vibrometer's output.
+        # A current that an earlier program left on would shift the vibrometer's output.
         made.ai_excit_src = ExcitationSource.NONE
     except DaqError as error:
         if error.error_type not in NOT_OFFERED:
@@ -173,7 +173,7 @@ def _couple(made: AIChannel, channel: Channel) -> None:
         made.ai_coupling = wanted
         held = made.ai_coupling
     except DaqError as error:
-        # A device that cannot couple otherwise is coupled to DC.
+        # A device without selectable coupling is DC coupled.
         if error.error_type in NOT_OFFERED and wanted is Coupling.DC:
             return
         raise
@@ -184,7 +184,7 @@ def _couple(made: AIChannel, channel: Channel) -> None:
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
     """Step of a converter [V]; None when volts are not simply multiples of one step.
 
-    A calibrated device may scale with an offset or a curve; its volts are then recorded as they come.
+    A calibrated device may scale with an offset or a curve; its volts are then recorded as read.
     ``coefficients`` are those of the polynomial from counts to volts, constant term first.
     """
     if len(coefficients) < 2 or not coefficients[1] * _MOST_COUNTS > range_v:
@@ -202,7 +202,9 @@ def _refusal(channel: Channel, what: str, sent: str, got: str) -> SettingRefused
 
 
 def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
-    """Ask the driver about a device by its name, ``"cDAQ1Mod1"``; raises what the DAQmx client raises."""
+    """Return what the driver reports about a device named ``"cDAQ1Mod1"``; raises the DAQmx client's
+    errors.
+    """
     system = session.system()
     device = system.devices[device_name]
     product, serial = str(device.product_type), f"{device.serial_num:08X}"
@@ -212,30 +214,30 @@ def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
     return Identity("National Instruments", product, serial, driver, reply)
 
 
-# A read is cut into pieces of this length, so that no single call waits long and none needs the whole buffer.
+# A read is divided into pieces of this length, so that no single call waits long or needs the whole buffer.
 LONGEST_READ_S = 2.0
-# Added to the length of a read: how late samples may be before the device counts as dead.
+# Added to the length of a read: a device whose samples are later counts as dead.
 _READ_MARGIN_S = 10.0
-# Sigma-delta modules take the next higher rate of a list; lower, or twice as fast, is another measurement.
+# Sigma-delta modules use the next higher rate of a list; a lower or a twice as high one is refused.
 _MOST_COERCED = 2.0
 
 
 class DaqmxDigitizer:
     """A `Digitizer` on NI-DAQmx, on this computer or behind a gRPC device server.
 
-    Made by `open`, which reserves the device: every setting is checked then, not when a run begins.
+    `open` makes it and reserves the device: every setting is checked then, not when a run begins.
     """
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
         self.session = session
-        """The way to the driver, for an output on the same one."""
+        """Connection to the driver, for an output on the same one."""
         self._config = config
         self._channels = channels
         self._resources = ExitStack()
         self._task: Task | None = None
         self._reader: AnalogUnscaledReader | AnalogMultiChannelReader | None = None
         self.volts_per_count: tuple[float | None, ...] = ()
-        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
+        """Step of the converter for each channel [V]; None where volts are not multiples of one step."""
         self._identity: Identity | None = None
         self.sample_rate_hz = 0.0
         """The rate that the hardware runs at, read back from it."""
@@ -245,12 +247,12 @@ class DaqmxDigitizer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Reserve the converter of a rig with all its inputs, and read back the rate that it takes.
+        """Reserve the converter of a rig with all its inputs, and read back its rate.
 
         Raises
         ------
         InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError, SettingRefused
-            As `_daqmx_errors` tells them apart. Nothing stays reserved then.
+            As `_daqmx_errors` assigns them. Nothing stays reserved then.
         """
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
         with ExitStack() as undo:
@@ -273,7 +275,7 @@ class DaqmxDigitizer:
         return tuple(channel.role.value for channel in self._channels)
 
     def start_trigger(self) -> str:
-        """Terminal on which other tasks see this one start; arm them before `start`."""
+        """Terminal of this task's start trigger; arm other tasks on it before `start`."""
         with daqmx_call(f"asking {self._config.device} for its start trigger"):
             return str(self._open_task().triggers.start_trigger.term)
 
@@ -288,9 +290,9 @@ class DaqmxDigitizer:
         self._next_sample = 0
 
     def read(self, samples: int) -> Block:
-        """Wait for the next ``samples`` of every channel and hand them over.
+        """Wait for the next ``samples`` of every channel and return them.
 
-        After a failure the run cannot go on, since its place in time is lost: stop, and start again.
+        After a failure the run cannot continue, since its sample numbers are lost: stop, and start again.
 
         Raises
         ------
@@ -304,7 +306,9 @@ class DaqmxDigitizer:
         if not self._is_running:
             raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")
         if samples < 1:
-            raise InstrumentError(f"{samples} samples were asked of {self._config.device}; ask for 1 or more")
+            raise InstrumentError(
+                f"{samples} samples were requested from {self._config.device}; request 1 or more"
+            )
         first_sample = self._next_sample
         with daqmx_call(
             f"reading samples {first_sample} to {first_sample + samples - 1} of {self._config.device}"
@@ -318,7 +322,7 @@ class DaqmxDigitizer:
 
     @property
     def waiting_samples(self) -> int:
-        """How many samples of every channel are converted and not read yet."""
+        """Number of converted samples of every channel that are not read yet."""
         if not self._is_running:
             return 0
         with daqmx_call(f"asking {self._config.device} how many samples wait"):
@@ -367,7 +371,7 @@ class DaqmxDigitizer:
         else:
             self._reader = AnalogUnscaledReader(task.in_stream)
             self._steps_v = np.array(self.volts_per_count)[:, np.newaxis]
-        # Every array is made here for the channels of this task; the check would be a call of its own.
+        # Every array here is made for the channels of this task, so the client's check is not needed.
         self._reader.verify_array_shape = False
 
     def _identify(self) -> Identity:
@@ -385,7 +389,7 @@ class DaqmxDigitizer:
         return self._task
 
     def _next_samples(self, samples: int) -> tuple[Samples, Counts | None]:
-        """Read volts, and the counts that they are made of where the converter scales linearly."""
+        """Read volts, and their counts if the converter scales linearly."""
         shape = len(self._channels), samples
         if isinstance(self._reader, AnalogUnscaledReader):
             counts = np.empty(shape, np.int32)
@@ -400,14 +404,14 @@ class DaqmxDigitizer:
         piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self.sample_rate_hz))
         for first in range(0, rows.shape[1], piece):
             count = min(piece, rows.shape[1] - first)
-            # The reader wants C order, which a slice of columns has not: only a long read is copied.
+            # The reader needs C order, which a slice of columns has not: only a long read is copied.
             target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
             read(target, count, count / self.sample_rate_hz + _READ_MARGIN_S)
             if target is not rows:
                 rows[:, first : first + count] = target
 
     def _overloaded_roles(self) -> frozenset[str]:
-        """Channels that the device itself flags: asked while it runs, and not all can tell."""
+        """Return the channels that the device itself flags; read during the run, and not all devices can."""
         if not self._tells_overloads:
             return frozenset()
         stream = self._open_task().in_stream
@@ -423,7 +427,7 @@ class DaqmxDigitizer:
         scales_v = tuple(channel.full_scale_v for channel in self._channels)
         seen = overload_ranges(volts, self.roles, scales_v, first_sample)
         unseen = told - {overload.channel for overload in seen}
-        # A clip too short for the samples to show: the block is all that is known of its time.
+        # A clip too short to show in the samples: only its block is known.
         last_sample = first_sample + volts.shape[1] - 1
         return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))
 

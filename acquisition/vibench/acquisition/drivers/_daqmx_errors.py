@@ -1,7 +1,6 @@
 """What each DAQmx error means for a measurement, and what to do about it: one table.
 
-Numbers and names: ``nidaqmx.error_codes.DAQmxErrors``; meanings: NI-DAQmx help and hardware
-reference 5.3.
+Numbers and names: ``nidaqmx.error_codes.DAQmxErrors``; meanings: NI-DAQmx help and hardware reference 5.3.
 """
 
 from collections.abc import Iterator
@@ -78,7 +77,7 @@ MEANINGS: dict[Code, Meaning] = {
         "find out which program reset it, then open the bench again",
     ),
     Code.PAL_TRANSFER_ABORTED: Meaning(
-        InstrumentLost, "the transfer from the device was broken off", _RECONNECT
+        InstrumentLost, "the transfer from the device was interrupted", _RECONNECT
     ),
     Code.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES: Meaning(DataLost, _UNDERFLOW, _FEED),
     Code.DAC_UNDERFLOW: Meaning(DataLost, _UNDERFLOW, _FEED),
@@ -115,7 +114,7 @@ _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_
 
 @contextmanager
 def daqmx_call(doing: str) -> Iterator[None]:
-    """Turn any failure of the DAQmx client into an error that says what was being done and what to do.
+    """Turn any failure of the DAQmx client into an error with the action and advice.
 
     Parameters
     ----------
@@ -136,7 +135,7 @@ def daqmx_call(doing: str) -> Iterator[None]:
 
 
 def from_code(error: DaqError, doing: str) -> AcquisitionError:
-    """Return the error of ours that a DAQmx error stands for; one that is not in the table keeps its text."""
+    """Return our error for a DAQmx error; one that is not in the table keeps its text."""
     said = " ".join(str(error).split())
     meaning = MEANINGS.get(error.error_type)
     if meaning is None:
@@ -151,4 +150,4 @@ def _from_server(error: RpcError, doing: str) -> InstrumentError:
             f"{doing} failed: the device server does not answer ({error}). Check that it runs and that "
             "daq.server is its address, then open the bench again"
         )
-    return InstrumentError(f"{doing} failed: the device server could not do it ({error}); look into its log")
+    return InstrumentError(f"{doing} failed: the device server reported an error ({error}); read its log")

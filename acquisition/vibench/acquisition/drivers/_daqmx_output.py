@@ -18,19 +18,19 @@ from ._daqmx import DaqmxDigitizer, daqmx_identity
 from ._daqmx_errors import daqmx_call
 
 _WRITE_TIMEOUT_S = 10.0
-# The last of them is what the output holds; some devices want more than one.
+# The output holds the last of these; some devices need more than one.
 _ZERO_SAMPLES = 64
-# Two oscillators of one device differ by nothing; a rate that is off by more is another rate.
+# Two oscillators of one device do not differ; a larger deviation means another rate.
 _SAME_RATE = 1e-6
 
 
 class DaqmxOutput:
     """An `AnalogOutput` on NI-DAQmx, started by the same trigger as the inputs.
 
-    ``open``, ``write`` the first stretch, ``arm``, then start the digitizer: both begin with sample
-    0. Go on writing as fast as samples are played. `stop` goes to zero volts at once; the next
-    ``write`` begins a new stream. A program that dies stops writing: the output then runs dry within
-    ``ahead_s`` and ends by itself.
+    ``open``, ``write`` the first stretch, ``arm``, then start the digitizer: both begin with sample 0.
+    Continue to write as fast as samples are played. `stop` goes to zero volts at once; the next ``write``
+    begins a new stream. A program that dies stops writing: the output then runs empty within ``ahead_s`` and
+    stops.
     """
 
     def __init__(self, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> None:
@@ -42,7 +42,7 @@ class DaqmxOutput:
         self._written = 0
         self._is_open = True
         self.idle = IdleOutput.HELD
-        """What the device does when it runs dry: zero volts where it can be told to, and read back."""
+        """State of the output when it runs empty: zero volts if the device can be set so, as read back."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -67,7 +67,7 @@ class DaqmxOutput:
 
     @property
     def identity(self) -> Identity:
-        """Which module it belongs to, and which of its outputs it is."""
+        """Module of the output, and its name."""
         device, _, _ = self._physical.rpartition("/")
         with daqmx_call(f"identifying {self._physical}"):
             module = daqmx_identity(self._digitizer.session, device)
@@ -75,23 +75,23 @@ class DaqmxOutput:
 
     @property
     def sample_rate_hz(self) -> float:
-        """The rate that the output was asked for, and takes."""
+        """The requested sample rate, which the device accepted."""
         return self._config.sample_rate_hz
 
     @property
     def ahead_samples(self) -> int:
-        """How many samples fit in front of what is being played."""
+        """Largest number of samples ahead of the one being played."""
         return int(self._config.ahead_s * self._config.sample_rate_hz)
 
     def write(self, volts: Samples) -> None:
-        """Put samples behind those that are still to be played; wait for room when there is none.
+        """Add samples behind those still to be played; wait for room if there is none.
 
         Raises
         ------
         LimitExceeded
-            When a sample is past the limit of the bench, or no number. Nothing was written.
+            When a sample is beyond the limit of the bench, or NaN. Nothing was written.
         DataLost
-            When the output ran dry before: it has stopped.
+            When the output ran empty before: it has stopped.
         """
         peak_v = float(np.max(np.abs(volts), initial=0.0))
         if not peak_v <= self._config.limit_v:  # so that a NaN does not pass
@@ -108,7 +108,7 @@ class DaqmxOutput:
         self._written += volts.size
 
     def arm(self) -> None:
-        """Wait for the inputs to start: call it before the digitizer's ``start``."""
+        """Wait for the start of the inputs: call it before the digitizer's ``start``."""
         if self._task is None or self._written == 0:
             raise InstrumentError(f"{self._physical} has nothing to play; write the first stretch, then arm")
         with daqmx_call(f"arming {self._physical}"):
@@ -120,7 +120,7 @@ class DaqmxOutput:
         Raises
         ------
         InstrumentLost
-            When the device or its server is gone: the output then runs dry by itself.
+            When the device or its server is gone: the output then runs empty by itself.
         """
         if self._task is None:
             return
@@ -129,7 +129,7 @@ class DaqmxOutput:
             with ExitStack() as last:
                 last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
                 last.callback(self._release)
-                # An output that ran dry says so once more; it has stopped, which is what is wanted.
+                # An output that ran empty reports it once more; it has stopped, as required.
                 last.enter_context(suppress(DataLost))
                 with daqmx_call(f"stopping {self._physical}"):
                     task.stop()
@@ -151,7 +151,7 @@ class DaqmxOutput:
         with ExitStack() as undo, daqmx_call(f"opening {physical}"):
             undo.callback(self._resources.close)
             task = self._resources.enter_context(Task(grpc_options=self._digitizer.session.options))
-            self.idle = _told_to_idle_at_zero(self._add_channel(task))
+            self.idle = _set_idle_output(self._add_channel(task))
             task.timing.cfg_samp_clk_timing(
                 config.sample_rate_hz,
                 sample_mode=AcquisitionType.CONTINUOUS,
@@ -182,7 +182,7 @@ class DaqmxOutput:
             Task(grpc_options=self._digitizer.session.options) as task,
         ):
             self._add_channel(task)
-            # Clocked, since delta-sigma outputs know no other way.
+            # Clocked, because delta-sigma outputs need it.
             zeros = np.zeros(_ZERO_SAMPLES)
             task.timing.cfg_samp_clk_timing(
                 self._config.sample_rate_hz, sample_mode=AcquisitionType.FINITE, samps_per_chan=zeros.size
@@ -195,9 +195,11 @@ class DaqmxOutput:
         return task.ao_channels.add_ao_voltage_chan(self._physical, min_val=-limit_v, max_val=limit_v)
 
 
-def _told_to_idle_at_zero(channel: AOChannel) -> IdleOutput:
-    """Ask for zero volts when idle, and believe what is read back: many devices hold their last value."""
-    # A device that cannot refuses the setting, and one that does not know it refuses to be asked.
+def _set_idle_output(channel: AOChannel) -> IdleOutput:
+    """Set the idle output to zero volts and return the value read back: many devices hold their last
+    value.
+    """
+    # A device that cannot do this refuses the setting, and one that does not know it refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS
         if channel.ao_idle_output_behavior is AOIdleOutputBehavior.ZERO_VOLTS:

@@ -1,4 +1,4 @@
-"""A recording played back as if it were measured: the whole chain, on samples that are known."""
+"""A recording replayed as if it were measured."""
 
 from pathlib import Path
 from typing import Self
@@ -15,10 +15,10 @@ _SAME_SCALE = 1e-6
 
 
 class FilePlayer:
-    """A `Digitizer` that hands out the volts of a recording, from its first sample at every start.
+    """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` names it. Under the plan that it was made with, check and segments lie where
-    they lay; ``generator.driver = "file"`` takes what that plan commands.
+    ``daq.options.recording`` names it. With the plan of the recording, check and segments have the same
+    places; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
@@ -30,7 +30,9 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError where channels, scales or rate are not the rig's."""
+        """Open the recording; raises ConfigurationError where channels, scales or rate differ from the
+        rig's.
+        """
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -62,14 +64,14 @@ class FilePlayer:
 
     @property
     def identity(self) -> Identity:
-        """The recording, by its id; what it was, it stays."""
+        """The recording's id; real or simulated stays as recorded."""
         made = self._recording
         reply = f"{made.path.name}, recorded {made.started_utc}, {made.origin.value}"
         return Identity("", "recording", made.recording_id, "", reply, origin=made.origin.value)
 
     @property
     def sample_rate_hz(self) -> float:
-        """The recording's."""
+        """Sample rate of the recording."""
         return self._recording.sample_rate_hz
 
     @property
@@ -79,7 +81,7 @@ class FilePlayer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """Steps of the converter that made it, where its counts begin at zero volts [V]."""
+        """Steps of the recording's converter, where count zero is zero volts [V]."""
         heads = (self._recording.channel(role) for role in self.roles)
         return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
 
@@ -92,12 +94,14 @@ class FilePlayer:
         self._is_running, self._next_sample = True, 0
 
     def read(self, samples: int) -> Block:
-        """Hand over the next samples.
+        """Return the next samples.
 
-        Raises InstrumentLost where the recording has no more, DataLost where it has lost them itself.
+        Raises InstrumentLost at the end of the recording, DataLost where it has lost samples.
         """
         if not self._is_running or samples < 1:
-            raise InstrumentError(f"{samples} samples were asked of a recording that does not play; start it")
+            raise InstrumentError(
+                f"{samples} samples were requested from a recording that is not playing; start it"
+            )
         first, last = self._next_sample, self._next_sample + samples
         if last > self._recording.samples:
             self._is_running = False

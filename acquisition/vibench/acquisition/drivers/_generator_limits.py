@@ -1,4 +1,4 @@
-"""What a model of generator can do: ranges and waveforms, checked before anything is sent.
+"""Ranges and waveforms of each model of generator, checked before anything is sent.
 
 Nothing here needs pyvisa: plans are checked without it.
 """
@@ -24,7 +24,7 @@ class Shape(StrEnum):
 
 
 class ArbitraryCodes(NamedTuple):
-    """One period as the generator's memory holds it: free of DC, over the full range of codes.
+    """One period in the generator's memory: without DC, over the full range of codes.
 
     Code 0 is minus, and the model's ``top_code`` plus, half of the panel's peak-to-peak amplitude.
     """
@@ -50,10 +50,10 @@ class GeneratorModel:
     burst_cycles: tuple[int, int]
     usb_ids: tuple[tuple[int, int], ...] = ()
     longest_sweep_s: float = 0.0
-    """Longest sweep that it makes by itself; 0 where its sweep time is no remote command."""
+    """Longest internal sweep; 0 if its sweep time cannot be set remotely."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return what the generator can do into the load that is set."""
+        """Return the generator's abilities at the configured load."""
         lowest, highest = (limit * config.shown_fraction for limit in self.open_range_vpp)
         sine_hz = self.highest_hz[Shape.SINE]
         return GeneratorDescription(
@@ -61,7 +61,7 @@ class GeneratorModel:
         )
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open one; pyvisa is loaded only now."""
+        """Open a generator; pyvisa is loaded only now."""
         driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
         return cast("GeneratorDriver", driver).open(config)
 
@@ -75,7 +75,7 @@ class GeneratorModel:
         _require(frequency_hz, (self.lowest_hz, self.highest_hz[shape]), "Hz", f"{shape} of the {self.name}")
 
     def check_burst(self, cycles: int) -> None:
-        """Raise LimitExceeded for a number of periods that the generator cannot count."""
+        """Raise LimitExceeded for a number of periods that the generator does not support."""
         _require(cycles, self.burst_cycles, "cycles", f"a burst of the {self.name}")
 
     def check_amplitude(self, config: GeneratorConfig, amplitude_vpp: float) -> None:
@@ -90,7 +90,7 @@ class GeneratorModel:
         _require(amplitude_vpp, allowed, "Vpp", reason)
 
     def check_sweep(self, sweep: Sweep) -> None:
-        """Raise LimitExceeded unless the generator makes such a sweep by itself."""
+        """Raise LimitExceeded unless the generator supports this internal sweep."""
         self.check_frequency(Shape.SINE, sweep.start_hz)
         self.check_frequency(Shape.SINE, sweep.stop_hz)
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
@@ -101,10 +101,10 @@ class GeneratorModel:
             )
 
     def codes(self, waveform: Samples) -> ArbitraryCodes:
-        """Turn one period of values into codes of the full range.
+        """Convert one period of values to codes of the full range.
 
-        The mean is removed, since DC would push the shaker off its centre, and the rest is scaled so that
-        its largest magnitude takes an outermost code.
+        The mean is removed, since DC would displace the shaker, and the rest is scaled so that its largest
+        magnitude gets the first or last code.
 
         Raises
         ------
@@ -148,7 +148,7 @@ def _require(value: float, allowed: tuple[float, float], unit: str, reason: str)
 
 AFG1022_MODEL = GeneratorModel(
     # Tektronix AFG1022 specification, as the IVI driver tkafg1k checks it. Drivers and measurements agree on
-    # a peak of 10 V, thus 20 Vpp; the IVI driver allows twice that. The stricter one holds.
+    # a peak of 10 V, thus 20 Vpp; the IVI driver allows twice that. The stricter limit is used.
     name="AFG1022",
     driver="AFG1022X",
     open_range_vpp=(2e-3, 20.0),
@@ -180,18 +180,18 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Stands where a bench has no generator; what it is asked to play is refused, or known to be in a file.
+    """Takes the place of a generator on a bench without one; commands are refused, or known from a file.
 
-    The table ``[generator]`` still says whose volts an output plays: ``connected_ohm``, ``load_ohm``.
+    The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """
 
     name: str
     silently: str = ""
-    """Why it takes commands and plays nothing; empty: it takes none."""
+    """Why it accepts commands and plays nothing; empty: it accepts none."""
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Say that it plays nothing, or that whatever the file was made with is taken."""
+        """Return a description without abilities, or one that accepts everything in the file."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
@@ -202,25 +202,25 @@ class NoGenerator:
 
     @property
     def identity(self) -> Identity:
-        """Nobody."""
+        """No identity."""
         return Identity("", self.name, "", "", f"{self.name}: {self.silently or 'it plays nothing'}")
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Nothing to confirm."""
+        """Return no settings."""
         return ()
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """What may be asked for [V]."""
+        """Accepted amplitudes [V]."""
         return _NOTHING_VPP, self.amplitude_limit_vpp
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take(f"a sine of {frequency_hz:g} Hz at {amplitude_vpp:g} Vpp")
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
@@ -228,30 +228,30 @@ class NoGenerator:
         raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp was asked of {self.name}; nothing plays")
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take(f"{frequency_hz:g} Hz")
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take(f"{amplitude_vpp:g} Vpp")
 
     def arm_burst(self, cycles: int) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take(f"a burst of {cycles} cycles")
 
     def trigger(self) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take("a trigger")
 
     def end_burst(self) -> None:
         """Nothing plays."""
 
     def measured_latency_s(self) -> float:
-        """No time at all [s]."""
+        """Return zero [s]."""
         return 0.0
 
     def start(self) -> None:
-        """Take it silently, or refuse."""
+        """Accept it, or refuse."""
         self._take("its output")
 
     def stop(self) -> None:
@@ -263,7 +263,7 @@ class NoGenerator:
     def _take(self, what: str) -> None:
         if not self.silently:
             raise ConfigurationError(
-                f"{what} was asked of a bench without function generator. Nothing was played; let its "
+                f"{what} was requested from a bench without function generator. Nothing was played; let its "
                 'analogue output play it (daq.output.plays = "tones_and_streams"), or name a generator.driver'
             )
 

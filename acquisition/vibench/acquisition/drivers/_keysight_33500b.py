@@ -1,4 +1,4 @@
-"""The Keysight 33500B: sines, waveforms and bursts as any generator of ours, and sweeps of its own.
+"""The Keysight 33500B: sines, waveforms and bursts like any other generator, and internal sweeps.
 
 Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; nothing was
 compared with an instrument.
@@ -20,11 +20,11 @@ _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2
 _SPACINGS = {Spacing.LINEAR: "LIN", Spacing.LOGARITHMIC: "LOG"}
 _SAME_MEAN = 1e-4
 LONGEST_HOLD_S = 3600.0
-"""How long the stop frequency is held behind a sweep."""
+"""How long the stop frequency is held after a sweep."""
 
 
 class Keysight33500B(AFG1022X):
-    """A 33500B as a `FunctionGenerator`: see `AFG1022X` for what it promises."""
+    """A 33500B as a `FunctionGenerator`; it behaves like `AFG1022X`."""
 
     model: ClassVar[GeneratorModel] = KEYSIGHT_33500B_MODEL
     wanted: ClassVar[str] = "Agilent or Keysight Technologies,335..B"
@@ -77,7 +77,7 @@ class Keysight33500B(AFG1022X):
         self._arm_burst(cycles)
 
     def end_burst(self) -> None:
-        """Play on without a trigger."""
+        """Play continuously, without triggers."""
         with self._changing():
             self.burst = "OFF"
 
@@ -88,7 +88,7 @@ class Keysight33500B(AFG1022X):
         self.output_filter = "OFF"
 
     def _set_frequency(self, frequency_hz: float) -> None:
-        """Set the frequency of the sine, or how often a second the waveform is played."""
+        """Set the frequency of the sine, or the repetition rate of the waveform."""
         if self.codes is None:
             self.frequency_hz = frequency_hz
         else:
@@ -101,7 +101,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Fill the memory; it tells the number of points and their mean, not the points."""
+        """Fill the memory; it reports the number of points and their mean, not the points."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

@@ -1,4 +1,4 @@
-"""Where inputs come near the end of their range."""
+"""Ranges of samples where inputs are near the end of their range."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
 OVERLOAD_FRACTION = 0.95
-# A delta-sigma converter's filter rings about so long after a clip: shorter pauses are no recovery.
+# A delta-sigma converter's filter rings about this long after a clip: shorter pauses are part of it.
 _RECOVERY_SAMPLES = 64
 
 
 def overload_ranges(
     volts: Samples, roles: tuple[str, ...], full_scales_v: tuple[float, ...], first_sample: int
 ) -> tuple[Overload, ...]:
-    """Stretches of a block where a channel reaches 95 % of its full scale.
+    """Return the ranges of a block where a channel reaches 95 % of its full scale.
 
     Parameters
     ----------

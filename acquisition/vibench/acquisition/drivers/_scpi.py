@@ -1,4 +1,6 @@
-"""SCPI instruments: no complaint is lost, every lost connection is named, every setting is read back."""
+"""SCPI instruments: every complaint is read, every lost connection is reported, every setting is read
+back.
+"""
 
 import re
 import threading
@@ -18,12 +20,12 @@ from ._visa_link import Link
 
 Codes = NDArray[np.uint16]
 
-# An error queue holds some tens of entries; more replies than this mean that it is not being emptied.
+# An error queue has some tens of entries; more replies than this mean that it is not being emptied.
 _LONGEST_QUEUE = 64
-# Long enough for a stale reply that is already under way, short enough for an emergency stop [ms].
+# Long enough for an old reply that is under way, short enough for an emergency stop [ms].
 _STALE_REPLY_MS = 100.0
 _LATE = pyvisa.constants.StatusCode.error_timeout
-# pyvisa-py lets the ValueError and OSError of PyUSB through when the device is gone.
+# pyvisa-py passes on the ValueError and OSError of PyUSB when the device is gone.
 _LOST = (ValueError, OSError, pyvisa.errors.InvalidSession)
 _QUEUE_ENTRY = re.compile(r'([+-]?\d+)\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
@@ -32,9 +34,9 @@ _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 class ScpiInstrument:
     """Commands, queries and verified settings over a VISA session.
 
-    A command is followed by reading the error queue until it is empty, which also waits until the
-    instrument has done the command. A dialogue that was broken off (Ctrl-C between question and
-    answer) is cleaned up before the next one, so that no answer is taken for another question's.
+    After a command the error queue is read until it is empty, which also waits until the instrument has
+    carried out the command. After an interrupted query (Ctrl-C) the old reply is removed before the next
+    query.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ class ScpiInstrument:
     channel
         Replaces ``{c}`` in the headers of settings.
     settle_s
-        Pause that the instrument needs after each command [s]; it needs none after an answer.
+        Pause that the instrument needs after each command [s]; none after a reply.
     """
 
     def __init__(
@@ -59,7 +61,7 @@ class ScpiInstrument:
         self.name = name
         self.channel = channel
         self.held: dict[str, Any] = {}
-        """What was read back since the last failure, by header."""
+        """Values read back since the last failure, by header."""
         self._connect = connect
         self._settle_s = settle_s
         self._pause = pause
@@ -76,7 +78,7 @@ class ScpiInstrument:
             )
 
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
-        """Send a command, with 16-bit codes as a big-endian block behind it; return the complaints.
+        """Send a command, with 16-bit codes as a big-endian block after it; return the complaints.
 
         The complaints may be older than the command.
         """
@@ -92,16 +94,16 @@ class ScpiInstrument:
             return self.complaints()
 
     def query(self, message: str) -> str:
-        """Ask, and return the answer without its line end; bytes outside ASCII are kept readable."""
-        # This family marks ohms with the GBK character A6 B8: what is not text must not stop a query.
+        """Return the reply to a query without its line end; bytes outside ASCII are kept readable."""
+        # This family writes ohm as the GBK character A6 B8: invalid text must not stop a query.
         return self._ask(message).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
-        """Ask, and once more when the answer is empty, as the first one after ``*CLS`` may be."""
+        """Return the reply to a query; repeat it once if empty, as the first one after ``*CLS`` may be."""
         return self.query(message) or self.query(message)
 
     def query_number(self, message: str) -> float:
-        """Ask for a number; what follows it in the answer is ignored."""
+        """Return the number in a reply; text after it is ignored."""
         reply = self.query(message)
         found = _LEADING_NUMBER.match(reply)
         if found is None:
@@ -111,7 +113,7 @@ class ScpiInstrument:
         return float(found.group(1))
 
     def query_codes(self, message: str) -> Codes:
-        """Ask for a big-endian binary block of 16-bit codes."""
+        """Return a big-endian binary block of 16-bit codes."""
         reply = self._ask(message)
         try:
             first, length = pyvisa.util.parse_ieee_block_header(reply, len(reply))
@@ -130,7 +132,7 @@ class ScpiInstrument:
         return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
 
     def complaints(self) -> tuple[str, ...]:
-        """Empty the error queue and return what was in it."""
+        """Empty the error queue and return its entries."""
         found: list[str] = []
         for _ in range(_LONGEST_QUEUE):
             reply = self.query_patiently("SYST:ERR?")
@@ -149,7 +151,7 @@ class ScpiInstrument:
         )
 
     def known(self, header: str) -> Any:
-        """Return the setting read back last; raises InstrumentError when a change has failed since."""
+        """Return the setting read back last; raises InstrumentError after a failed change."""
         if header not in self.held:
             raise InstrumentError(
                 f"{self.name} has no known settings since a change failed; load a sine or a waveform first"
@@ -157,11 +159,11 @@ class ScpiInstrument:
         return self.held[header]
 
     def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
-        """End a mode; a mode that the firmware does not know, and answers with nothing, cannot be on."""
+        """End a mode; a mode that the firmware does not know, with an empty reply, cannot be on."""
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves one behind its empty answer
+        self.complaints()  # an unknown query leaves an error after its empty reply
         if reply and reply.strip('"').upper() not in answers:
             raise SettingRefused(
                 f"{self.name}: {header} was set to {word} and still reads {reply!r}; "
@@ -170,11 +172,11 @@ class ScpiInstrument:
 
     def disconnect(self) -> None:
         """Close the session. Legal at any time, also when the connection is lost."""
-        with self._lock, self._naming_losses("closing the session"):
+        with self._lock, self._report_losses("closing the session"):
             self._link.close()
 
     def reconnect(self) -> None:
-        """Open another session, whatever became of the one before."""
+        """Open another session, whatever the state of the last one."""
         try:
             self.disconnect()
         except InstrumentError as error:
@@ -193,11 +195,11 @@ class ScpiInstrument:
 
     @contextmanager
     def _dialogue(self, message: str) -> Iterator[None]:
-        """Exchange messages, after reading away the answer to a question that was broken off."""
+        """Exchange messages, after discarding the reply to an interrupted query."""
         with self._lock:
             if self._reply_due:
                 self._reply_due = False
-                with self._naming_losses("resuming the dialogue"):
+                with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
                         self._link.read_raw()
@@ -206,11 +208,11 @@ class ScpiInstrument:
                             raise
                     finally:
                         self._link.timeout = usual_ms
-            with self._naming_losses(message):
+            with self._report_losses(message):
                 yield
 
     @contextmanager
-    def _naming_losses(self, doing: str) -> Iterator[None]:
+    def _report_losses(self, doing: str) -> Iterator[None]:
         LOG.debug("%s: %s", self.name, doing)
         try:
             yield
@@ -226,14 +228,14 @@ class ScpiInstrument:
             ) from error
 
 
-# Settings as declarations: assigning one sends it, reads it back, and keeps what the instrument holds.
-# This family answers a value out of range with a silent default (Tektronix AFG1000 programmer manual,
-# general syntax), so that a command without a complaint proves nothing.
+# Settings as declarations: assigning one sends it, reads it back, and keeps the instrument's value. This
+# family replaces a value out of range by a default (Tektronix AFG1000 programmer manual, general syntax), so
+# a command without a complaint proves nothing.
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number, sent as ``form`` says; read back within the resolution of the instrument, or refused."""
+    """A number, formatted by ``form``; read back within the resolution of the instrument, or refused."""
 
     header: str
     """``{c}`` stands for the channel."""
@@ -255,7 +257,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Word:
-    """One of several words, each with every answer that means it (upper case)."""
+    """One of several words, each with all its replies (upper case)."""
 
     header: str
     answers: Mapping[str, tuple[str, ...]]

@@ -1,8 +1,8 @@
-"""A sound card as converter and analogue output, over PortAudio: what any laboratory has, once calibrated.
+"""A sound card as converter and analogue output, over PortAudio, once calibrated.
 
-A sound card tells no volts and passes no constant: both are measured once and written in ``daq.options``
-(docs/instruments.md), and without them nothing opens. Inputs and output are one stream, so that they begin
-together except for the card's own delay.
+A sound card does not report volts and passes no DC: its full scale is measured once and written in
+``daq.options`` (docs/instruments.md); without it nothing opens. Inputs and output are one stream, so they
+begin together except for the card's delay.
 """
 
 from collections import deque
@@ -28,14 +28,14 @@ from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges
 
 _LATEST_S = 10.0
-"""How late samples may be before the card counts as dead."""
+"""A card whose samples are later than this counts as dead."""
 _SAME_RATE = 1e-6
 
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
 
 
 def _sounddevice() -> Any:
-    """Load the library; MissingLibrary where it, or the PortAudio of the system, is not installed."""
+    """Load the library; MissingLibrary if it, or the system's PortAudio, is not installed."""
     need_extra("sound")
     try:
         return import_module("sounddevice")
@@ -70,14 +70,14 @@ class _Card:
         )
 
     def begin(self) -> None:
-        """Forget what was heard, and start."""
+        """Discard old samples, and start."""
         with self.changed:
             self.blocks.clear()
             self.waiting, self.failure = 0, ""
         self.stream.start()
 
     def drop(self) -> None:
-        """Forget what is still to be played."""
+        """Discard samples still to be played."""
         with self.changed:
             self.queued.clear()
             self.unplayed, self.is_armed, self.ran_dry = 0, False, False
@@ -88,7 +88,7 @@ class _Card:
         with self.changed:
             if status.input_overflow or self.waiting > self.most_waiting:
                 self.failure = "samples were overwritten before they were read"
-            if not self.failure:  # what nobody reads is not kept
+            if not self.failure:  # without a reader, samples are discarded
                 self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
                 self.waiting += heard.shape[0]
             self.changed.notify_all()
@@ -164,14 +164,14 @@ class SoundCardDigitizer:
 
     @property
     def identity(self) -> Identity:
-        """Which card, by which PortAudio, and when it was calibrated."""
+        """Card, version of PortAudio, and calibration."""
         version = _sounddevice().get_portaudio_version()[1]
         reply = f"{self._device}, {version}, {', '.join(f'{key} {self.options[key]}' for key in _NEEDED)}"
         return Identity("", self._device, "", version, reply)
 
     @property
     def sample_rate_hz(self) -> float:
-        """As PortAudio says that it runs."""
+        """The rate that PortAudio reports."""
         return float(self.card.stream.samplerate)
 
     @property
@@ -181,11 +181,11 @@ class SoundCardDigitizer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """None: PortAudio hands over numbers, not counts."""
+        """None: PortAudio returns numbers, not counts."""
         return (None,) * len(self._channels)
 
     def start(self) -> None:
-        """Begin sampling, and playing what an output was armed with."""
+        """Begin sampling, and playing an armed output."""
         if not self._is_open or self._is_running:
             raise InstrumentError(f"{self._device} is closed, or samples already; open it, or stop it first")
         self._next_sample = 0
@@ -197,7 +197,7 @@ class SoundCardDigitizer:
         """Wait for the next samples; DataLost when some were overwritten, InstrumentLost when none come."""
         if not self._is_running or samples < 1:
             raise InstrumentError(
-                f"{samples} samples were asked of {self._device}, which does not sample; start it"
+                f"{samples} samples were requested from {self._device}, which is not sampling; start it"
             )
         card = self.card
         with card.changed:
@@ -222,7 +222,7 @@ class SoundCardDigitizer:
 
     @property
     def waiting_samples(self) -> int:
-        """How many samples are heard and not read yet."""
+        """Number of samples that are not read yet."""
         return self.card.waiting
 
     def stop(self) -> None:
@@ -256,7 +256,7 @@ class SoundCardOutput:
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: SoundCardDigitizer) -> Self:
-        """Take the output of the stream; ConfigurationError for another rate, or a limit past its own."""
+        """Open the output of the stream; ConfigurationError for another rate, or a limit beyond its own."""
         output = cls(physical, config, digitizer)
         if config.sample_rate_hz != digitizer.sample_rate_hz or config.limit_v > output._full_scale_v:
             raise ConfigurationError(
@@ -268,7 +268,7 @@ class SoundCardOutput:
 
     @property
     def identity(self) -> Identity:
-        """The card's, and which of its outputs."""
+        """The card's, and the name of its output."""
         card = self._digitizer.identity
         return Identity(card.maker, card.model, "", card.firmware, f"{self._physical} of {card.reply}")
 
@@ -279,11 +279,11 @@ class SoundCardOutput:
 
     @property
     def ahead_samples(self) -> int:
-        """How many samples fit in front of what is being played."""
+        """Largest number of samples ahead of the one being played."""
         return int(self._config.ahead_s * self.sample_rate_hz)
 
     def write(self, volts: Samples) -> None:
-        """Put samples behind those still to be played, waiting for room; as `AnalogOutput.write` raises."""
+        """Add samples behind those still to be played, waiting for room; raises as `AnalogOutput.write`."""
         peak_v = float(np.max(np.abs(volts), initial=0.0))
         if not peak_v <= self._config.limit_v:
             raise LimitExceeded(
@@ -299,7 +299,7 @@ class SoundCardOutput:
             )
             if card.ran_dry or not there_is_room:
                 raise DataLost(
-                    f"{self._physical} ran dry, or stands still: what it played has ended; begin anew"
+                    f"{self._physical} ran empty or stopped, and its signal has ended; begin again"
                 )
             card.queued.append(np.asarray(volts, dtype=np.float64) / self._full_scale_v)
             card.unplayed += needed
@@ -325,7 +325,7 @@ class SoundCardOutput:
 
 @contextmanager
 def _portaudio(doing: str) -> Iterator[None]:
-    """Say what PortAudio's errors mean here."""
+    """Translate PortAudio's errors."""
     try:
         yield
     except _sounddevice().PortAudioError as error:
@@ -336,7 +336,7 @@ def _require_calibration(rig: Rig) -> None:
     needed = (*_NEEDED, "output_full_scale_v") if rig.daq.output is not None else _NEEDED
     if missing := [key for key in needed if key not in rig.daq.options]:
         raise ConfigurationError(
-            f"a sound card tells no volts and passes no constant: daq.options lacks {', '.join(missing)}. "
+            f"a sound card does not report volts and passes no DC: daq.options lacks {', '.join(missing)}. "
             "Nothing was opened; play a known sine into it, measure what its output gives at full scale, and "
             "enter them (docs/instruments.md)"
         )
@@ -349,7 +349,7 @@ def _require_calibration(rig: Rig) -> None:
 
 
 def _input(channel: Channel, rig: Rig) -> int:
-    """Return the number of a card's input; raises ConfigurationError for what no card can do."""
+    """Return the number of a card's input; raises ConfigurationError for settings that no card supports."""
     name = channel.physical.rpartition("/")[2]
     full_scale_v = float(rig.daq.options["input_full_scale_v"])
     if (
@@ -371,6 +371,6 @@ def _number(name: str, side: str) -> int:
     number = name.removeprefix(side)
     if number == name or not number.isdecimal():
         raise ConfigurationError(
-            f"physical = {name!r} is nothing of a sound card; inputs are in0, in1, ..., outputs ao0, ao1, ..."
+            f"physical = {name!r} is not on a sound card; inputs are in0, in1, ..., outputs ao0, ao1, ..."
         )
     return int(number)

@@ -1,4 +1,4 @@
-"""Opening a VISA resource: the one place that makes pyvisa sessions, and says why one cannot be made."""
+"""Opening VISA resources, with the reason if one cannot be opened."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from pyvisa.resources import MessageBasedResource
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
 from ..host.shipped import shipped
 
-# A reply later than this is a failure. The slowest known: the read-back of 8192 points.
+# A later reply is a failure. The slowest known one is the read-back of 8192 points.
 TIMEOUT_S = 3.0
 UDEV_RULES = "hardware_configs/70-vibench.rules"
 USB_DEVICES = Path("/sys/bus/usb/devices")
@@ -46,31 +46,32 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
                 f"{resource} is held by another program; close that program and open the bench again"
             ) from error
         raise _absent(resource, error) from error
-    except (ValueError, OSError) as error:  # pyvisa-py reports an absent or dead USB device so
+    except (ValueError, OSError) as error:  # pyvisa-py reports an absent or unresponsive USB device this way
         raise _absent(resource, error) from error
     message_link = cast("Link", link)
     message_link.timeout = timeout_s * _MS_PER_S
     message_link.write_termination = "\n"
-    if resource.upper().endswith("::SOCKET"):  # a stream does not tell where a reply ends, USB does
+    if resource.upper().endswith("::SOCKET"):  # a serial stream does not show where a reply ends, USB does
         message_link.read_termination = "\n"
     return message_link
 
 
 def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
-    """Resource names of everything that the VISA library can see now.
+    """Return the resource names of everything that the VISA library finds now.
 
     pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
     """
     with warnings.catch_warnings():
-        # On its search of the network pyvisa-py advises to install more, and forgets a socket: not ours.
+        # When it searches the network, pyvisa-py advises to install more and leaves a socket open; both are
+        # ignored.
         warnings.simplefilter("ignore", UserWarning)
         warnings.simplefilter("ignore", ResourceWarning)
         return tuple(_manager(visa_library).list_resources("?*"))
 
 
 def _manager(visa_library: str) -> pyvisa.ResourceManager:
-    # One manager a library lives as long as the process: pyvisa shares it, and closing it would
-    # close every session that anybody has opened.
+    # One manager for each library lasts as long as the process: pyvisa shares it, and closing it would close
+    # every open session.
     try:
         return pyvisa.ResourceManager(visa_library)
     except (OSError, ValueError) as error:
@@ -81,7 +82,7 @@ def _manager(visa_library: str) -> pyvisa.ResourceManager:
 
 
 def _absent(resource: str, error: Exception) -> InstrumentLost:
-    # What else the bus shows would help, but listing scans the network for seconds: not in an emergency.
+    # A list of other devices would help, but the search of the network takes seconds: not in an emergency.
     if _is_locked_out(resource):
         return InstrumentLost(
             f"{resource} is on the USB bus, and this account may not use it ({error}). Copy "
@@ -95,7 +96,7 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
 
 
 def _is_locked_out(resource: str) -> bool:
-    """Whether Linux shows a USB device that this account may not write to: libusb calls it absent."""
+    """Whether Linux shows a USB device that this account may not write to: libusb reports it as absent."""
     named = _USB.match(resource)
     if named is None:
         return False
@@ -104,7 +105,7 @@ def _is_locked_out(resource: str) -> bool:
         try:
             found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))
             bus, number = (int((device / each).read_text()) for each in ("busnum", "devnum"))
-        except (OSError, ValueError):  # a hub's port, or one that was just pulled out
+        except (OSError, ValueError):  # a hub's port, or one that was just unplugged
             continue
         if found == wanted and not os.access(USB_NODES / f"{bus:03d}" / f"{number:03d}", os.W_OK):
             return True

@@ -111,9 +111,7 @@ def the_engine(pid: int | None) -> Announcement:
     wanted = "no engine is running" if pid is None else f"no engine runs as process {pid}"
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
-        raise EngineError(
-            f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'"
-        )
+        raise EngineError(f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'")
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
         "one of another user, or with another VIBENCH_STATE_DIR, is stopped from there"
