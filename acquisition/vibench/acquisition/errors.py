@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 class AcquisitionError(Exception):
-    """Base of everything that can go wrong between a plan and its recording.
+    """Base of all errors between a plan and its recording.
 
     The text is one or two sentences for the person at the bench: what happened (with the value
     that was given and what is allowed), what was done about it, and what to do next.
@@ -12,18 +12,18 @@ class AcquisitionError(Exception):
 
 
 class ConfigurationError(AcquisitionError, ValueError):
-    """A configuration, plan or campaign file says something that is not allowed.
+    """A configuration, plan or campaign file contains something that is not allowed.
 
     Raised before any instrument is touched. The text names file, key, what was given, what is allowed.
     """
 
 
 class MissingLibrary(AcquisitionError, ImportError):
-    """A library is not installed, as a plain installation leaves it out; the text names its extra."""
+    """A library is missing that only an extra installs; the text names the extra."""
 
 
 class InstrumentError(AcquisitionError):
-    """An instrument refused a command, answered nonsense, or answered nothing in time."""
+    """An instrument refused a command, sent an invalid reply, or did not reply in time."""
 
 
 class InstrumentLost(InstrumentError, ConnectionError):
@@ -35,7 +35,7 @@ class InstrumentBusy(InstrumentError):
 
 
 class BrokenPromise(InstrumentError):
-    """A plug-in raised an error of its own kind, or gave something else than its protocol says."""
+    """A plug-in raised an unexpected error, or violated its protocol."""
 
 
 class SettingRefused(InstrumentError):
@@ -43,7 +43,7 @@ class SettingRefused(InstrumentError):
 
 
 class DriveLate(AcquisitionError):
-    """The generator takes longer for a setting than the plan leaves it: what it plays lags behind."""
+    """The generator takes longer for a setting than the plan allows, so the drive lags behind."""
 
 
 class RunStalled(AcquisitionError):
@@ -51,32 +51,32 @@ class RunStalled(AcquisitionError):
 
 
 class DataLost(AcquisitionError):
-    """Samples were overwritten before they were read: the record has a hole and ends here."""
+    """Samples were overwritten before they were read: the recording has a gap and ends here."""
 
 
 @dataclass(frozen=True)
 class LimitTrip:
-    """The numbers of a limit that the running measurement has passed."""
+    """The numbers of a limit that a running measurement has exceeded."""
 
     channel: str
-    """Role of the channel that showed it: ``"base_acceleration"``."""
+    """Role of the channel: ``"base_acceleration"``."""
     quantity: str
-    """What passed its limit: ``"stroke"``."""
+    """Quantity that exceeded its limit: ``"stroke"``."""
     value: float
     """Largest magnitude of the block, in ``unit``."""
     limit: float
     unit: str
     sample: int
-    """The first sample past the limit, counted from the first of the run."""
+    """The first sample above the limit, counted from the first of the run."""
     time_s: float
     """The same, in seconds of the converter's clock."""
 
 
 class LimitExceeded(AcquisitionError):
-    """A plan, or the running measurement, goes past a limit of shaker, amplifier or specimen.
+    """A plan, or the running measurement, exceeds a limit of shaker, amplifier or specimen.
 
-    The text names the quantity, its value, the limit, and where the limit comes from. ``trip`` holds
-    the numbers when a running measurement was stopped; it is None for a plan that was refused.
+    The text names the quantity, its value, the limit, and the source of the limit. ``trip`` contains the
+    numbers when a running measurement was stopped; it is None for a plan that was refused.
     """
 
     def __init__(self, text: str, trip: LimitTrip | None = None) -> None:
@@ -89,7 +89,7 @@ class CheckFailed(AcquisitionError):
 
 
 class CheckStopped(CheckFailed):
-    """Somebody ended the bench check before it was through: it says nothing about the bench."""
+    """Somebody stopped the bench check before its end: it has no result."""
 
 
 class RecordingError(AcquisitionError, OSError):

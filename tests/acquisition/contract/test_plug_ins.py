@@ -73,7 +73,7 @@ def test_every_row_of_ours_names_something_that_is_there():
 
 
 def test_a_name_that_nobody_offers_is_refused_with_those_that_there_are():
-    with pytest.raises(ConfigurationError, match=r"'afg' is no instrument of vibench\.generators: afg1022x"):
+    with pytest.raises(ConfigurationError, match=r"'afg' is not a name of vibench\.generators: afg1022x"):
         plug_in(PlugInKind.GENERATOR, "afg")
 
 
@@ -162,7 +162,7 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         ((), "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"),
         (
             ("--vibench-instrument=unknown",),
-            "'unknown' is no installed instrument; install its package first",
+            "'unknown' is not an installed instrument; install its package first",
         ),
         (("--vibench-instrument=afg1022x", "--vibench-bench=nowhere.toml"), "nowhere.toml: cannot be read"),
         (
@@ -171,7 +171,7 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         ),
         (
             ("--vibench-instrument=plain_python", "--vibench-bench=BENCH"),
-            "'plain_python' is no installed instrument",
+            "'plain_python' is not an installed instrument",
         ),
         (
             ("--vibench-instrument=file", "--vibench-bench=BENCH"),

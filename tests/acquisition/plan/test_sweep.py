@@ -196,11 +196,11 @@ class TestChains:
         ),
         (
             {"frequency_hz": [200], "amplitude_vpp": [1], "continue_from_previous": "repetition"},
-            "no axis to go along",
+            "is not an axis for a chain",
         ),
         (
             {"frequency_hz": [200], "amplitude_vpp": [1], "direction": ["up"]},
-            "says nothing to the excitation 'dwell'",
+            "does not apply to the excitation 'dwell'",
         ),
         (
             {

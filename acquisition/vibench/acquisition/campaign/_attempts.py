@@ -183,7 +183,6 @@ class Attempts:
         self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
-        """Pause before another attempt; after a stop there is none."""
         self.pause_before(point.name)
         if self._switch.request is not None:
             raise failed

@@ -123,7 +123,6 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
 
 
 def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
-    """Return the lowest and highest frequency of an excitation, from its plan."""
     grid, listed = excitation.get("grid"), excitation.get("frequencies_hz")
     tables = (excitation, grid) if isinstance(grid, dict) else (excitation,)
     named = [table.get(key) for table in tables for key in _FREQUENCIES]

@@ -318,10 +318,7 @@ class JournalPoint:
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     """Read a journal, also while its campaign runs; changes nothing.
 
-    Raises
-    ------
-    RecordingError
-        When there is no journal, or it is not one.
+    Raises RecordingError when there is no journal, or it is not one.
     """
     if not path.is_file():
         raise RecordingError(f"{path} does not exist, or is no file; give the path of a campaign's journal.")

@@ -89,7 +89,6 @@ class CampaignLog(ClosedOnLeaving):
             ) from error
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Write one event."""
         utc = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = {"utc": utc, "event": event.kind.value, "text": event.text, **event.facts}
         with suppress(OSError):
@@ -138,7 +137,6 @@ class StatusLine(ClosedOnLeaving):
         self._beside = Beside("campaign status")
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Write an event."""
         match event.kind:
             case CampaignEventKind.POINT_DONE:
                 self._counts["done"] += 1
@@ -263,10 +261,7 @@ class CommandMessenger:
     def of(cls, command: str) -> "CommandMessenger":
         """Split a command line as a shell does, without variables, wildcards and pipes.
 
-        Raises
-        ------
-        ConfigurationError
-            When it is empty, a quotation mark is missing, or there is no such program.
+        Raises ConfigurationError when it is empty, a quotation mark is missing, or there is no such program.
         """
         try:
             arguments = tuple(shlex.split(command))
@@ -313,7 +308,6 @@ class Notifier:
         self._say = say
 
     def __call__(self, event: CampaignEvent) -> None:
-        """Send an event, if it is one to report."""
         if event.kind not in TOLD_OF:
             return
         notice = {

@@ -160,10 +160,8 @@ def planned_recordings(
 ) -> tuple[PlannedRecording, ...]:
     """Return which recordings are to be made and which exist; changes nothing.
 
-    Raises
-    ------
-    RecordingError
-        When recordings exist and ``existing`` refuses that, or a complete one was made by another plan.
+    Raises RecordingError when recordings exist and ``existing`` refuses that, or a complete one was made by
+    another plan.
     """
     points = campaign.points()
     match existing:

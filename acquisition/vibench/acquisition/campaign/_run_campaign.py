@@ -121,7 +121,6 @@ class CampaignRunner:
         return tuple(self._results)
 
     def _name_damaged(self) -> None:
-        """Report the points whose recordings are no longer valid."""
         for point in self._coming:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
                 text = f"{point.name} is made again: {point.reason}"
@@ -329,10 +328,7 @@ class ReconnectingBench:
     def reopen(self) -> Bench:
         """Close the bench and open it again; knobs keep their confirmed settings.
 
-        Raises
-        ------
-        AcquisitionError
-            When an instrument is still not there. The bench is closed then; reopen again.
+        Raises AcquisitionError when an instrument is still not there. The bench is closed then; reopen again.
         """
         before, self._bench = self._bench, None
         if before is not None:
@@ -428,14 +424,9 @@ def estimate_campaign(
 ) -> CampaignEstimate:
     """Estimate the time and space of a campaign; open no instrument and write nothing.
 
-    Raises
-    ------
-    RecordingError
-        When the folder holds recordings of the campaign and ``existing`` refuses that.
-    ConfigurationError
-        When the rig lacks what a measurement is played with.
-    LimitExceeded
-        When feedback on it does not hold the motions that one asks for.
+    Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that;
+    ConfigurationError when the rig lacks what a measurement is played with; LimitExceeded when feedback on it
+    does not hold the motions that one asks for.
     """
     for each in campaign.measurements:
         require_played(each, rig)

@@ -14,13 +14,13 @@ from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
 
 LEVEL = 0.02
-"""Part of the bench's amplitude limit: what is played."""
+"""Level of the tests, as a share of the bench's amplitude limit."""
 SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
 def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
-    """List which plug-ins a hardware configuration names; kinds of measurement stand in none."""
+    """Return the plug-ins that a hardware configuration names, without kinds of measurement."""
     return {each: set[str]() for each in PlugInKind} | {
         PlugInKind.GENERATOR: {rig.generator.driver},
         PlugInKind.DIGITIZER: {rig.daq.driver},
@@ -31,7 +31,7 @@ def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Read the bench that was given, or the first shipped virtual one that names the instrument."""
+    """Read the given bench, or the first shipped virtual one that names the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in named_in(rig)[kind] else None
@@ -46,14 +46,14 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in that has the name, or refuse what no test could use."""
+    """Return a bench for each kind of plug-in with this name; refuse a name that no test can use."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
         )
     kinds = [each for each in PlugInKind if name in plug_in_names(each)]
     if not kinds:
-        raise pytest.UsageError(f"{name!r} is no installed instrument; install its package first")
+        raise pytest.UsageError(f"{name!r} is not an installed instrument; install its package first")
     try:
         found = {kind: chosen_rig(name, given, kind) for kind in kinds}
     except ConfigurationError as error:
@@ -64,14 +64,14 @@ def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | N
 
 
 def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
-    """Say that no bench names the instrument."""
+    """Return the error that no bench names the instrument."""
     who = "no shipped virtual bench names" if given is None else f"{given} does not name"
     kinds_in_words = " or ".join(each.value for each in kinds)
     return f"{who} {name!r} as one of {kinds_in_words}; give a bench that does with --vibench-bench"
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
-    """Say once, and before the first test, what is wrong with the command."""
+    """Report an error of the command once, before the first test."""
     config.stash[_RIGS] = chosen_rigs(
         config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
     )
@@ -79,7 +79,7 @@ def pytest_collection_modifyitems(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="module")
 def rig(request: pytest.FixtureRequest) -> Rig:
-    """Return the bench's configuration; the module under way says of which kind its instrument is."""
+    """Return the bench's configuration; the test module determines the kind of instrument."""
     name, kind = request.config.getoption("--vibench-instrument"), request.module.KIND
     rigs = request.config.stash[_RIGS]
     if kind not in rigs:
@@ -92,21 +92,21 @@ def rig(request: pytest.FixtureRequest) -> Rig:
 
 @pytest.fixture
 def bench(rig: Rig) -> Iterator[Bench]:
-    """Open the bench again for every test; who runs this has looked at its knobs."""
+    """Open the bench again for every test; the user has checked its knobs."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
 
 
 @contextmanager
 def refused() -> Iterator[None]:
-    """Demand a refusal in the words of an instrument, and not whatever its code happens to raise."""
+    """Require an error of an instrument, not any exception."""
     with pytest.raises(AcquisitionError) as told:
         yield
     assert not isinstance(told.value, BrokenPromise), str(told.value)
 
 
 def heard_v(bench: Bench, duration_s: float) -> Samples:
-    """Read so long, and give the volts at the generator's terminal, the first moments left out."""
+    """Read for a time, and return the volts at the generator's terminal, without the beginning."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)
@@ -115,7 +115,7 @@ def heard_v(bench: Bench, duration_s: float) -> Samples:
 
 
 def line_v(volts: Samples, frequency_hz: float, rate_hz: float) -> float:
-    """Amplitude of one sine in a stretch, by least squares [V]."""
+    """Return the amplitude of one sine in a stretch, by least squares [V]."""
     angle = 2 * np.pi * frequency_hz * np.arange(len(volts)) / rate_hz
     basis = np.stack((np.cos(angle), np.sin(angle), np.ones_like(angle)), axis=1)
     found, *_ = np.linalg.lstsq(basis, volts)

@@ -1,4 +1,4 @@
-"""What every converter must do: sample without a gap, count from zero, and say what it cannot."""
+"""Requirements of every converter: sample without gaps, count from zero, and refuse what it cannot do."""
 
 import numpy as np
 

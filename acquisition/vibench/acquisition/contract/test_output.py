@@ -1,4 +1,6 @@
-"""What every analogue output must do: begin with the converter, play what was written, and end at zero."""
+"""Requirements of every analogue output: start with the converter, play the written samples, and end at
+zero.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,7 +34,7 @@ def level_v(bench: Bench) -> float:
 
 @contextmanager
 def playing(bench: Bench) -> Iterator[None]:
-    """Play a tone for as long as a second lasts."""
+    """Play a tone for a second."""
     output = output_of(bench)
     stretch = output.ahead_samples // 2
     output.write(tone(output, level_v(bench), 0, stretch))

@@ -1,4 +1,4 @@
-"""What every sensor must tell: how its quantity becomes volts."""
+"""Requirements of every sensor: how its quantity becomes volts."""
 
 from math import isfinite
 

@@ -49,8 +49,6 @@ _MOST_BRACKETS = 4
 
 
 class _Return(Enum):
-    """Result of the return to the branch."""
-
     BACK = auto()
     NOT_FOUND = auto()
     LEFT = auto()
@@ -66,8 +64,6 @@ class _Pace(Enum):
 
 @dataclass
 class _JumpSearch:
-    """State of the search."""
-
     branch: list[SettledPoint]
     """Points on the branch before the jump, in the order of the pass."""
     after: SettledPoint
@@ -75,11 +71,9 @@ class _JumpSearch:
 
     @property
     def bracket(self) -> LocatedJump:
-        """The present bracket of the jump."""
         return LocatedJump(self.branch[-1], self.after)
 
     def narrow(self, point: SettledPoint) -> None:
-        """Use a point between the two ends."""
         self.here = side(point, self.branch[-1], self.after)
         match self.here:
             case JumpSide.BEFORE:

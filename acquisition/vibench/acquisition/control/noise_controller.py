@@ -61,10 +61,7 @@ class Equaliser:
     def waveform(self, number: int, level_db: float) -> Waveform:
         """Return the next period of the drive for the present gains.
 
-        Raises
-        ------
-        LimitExceeded
-            When it needs more than the plan's largest setting.
+        Raises LimitExceeded when it needs more than the plan's largest setting.
         """
         plan = self._plan
         density = self.target * 10 ** (level_db / 10) / self._gain
@@ -82,10 +79,7 @@ class Equaliser:
     def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
         """Update the gains with the densities of a realisation.
 
-        Raises
-        ------
-        LimitExceeded
-            When a density is past its abort line, or the base hardly answers.
+        Raises LimitExceeded when a density is past its abort line, or the base hardly answers.
         """
         heard = MeasuredDensities(
             self._density(drive), self._density(base), self._density(response), _kurtosis(base)

@@ -191,7 +191,6 @@ def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float
 def _search(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
 ) -> Controller[TrackedPlace]:
-    """Search the resonance at one level in settled motion, and record there."""
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
         # Its motion settles slowly: unsettled tries would give a wrong slope of the phase.
@@ -277,7 +276,6 @@ def _flanks(
 
 
 def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
-    """Fit the mode to all points near it."""
     reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
     near = [each for each in states if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
     return fit_mode(

@@ -214,7 +214,6 @@ class SettlingController:
         return self.level.acceleration_at(self.loop.setting.frequency_hz)
 
     def _correct_level(self) -> bool:
-        """Change the setting if the level needs it; return whether it did."""
         if self.level is None or self.loop.periods.count < LOOK_PERIODS:
             return False
         now = self.loop.setting

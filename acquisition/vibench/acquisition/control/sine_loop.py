@@ -307,7 +307,6 @@ def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Correct the setting until the response has its target, or the wait is over."""
     frequency_hz, waited_s, in_a_row = loop.setting.frequency_hz, 0.0, 0
     stretch_s = look_s(frequency_hz)
     while in_a_row < _IN_A_ROW and waited_s + stretch_s <= plan.longest_wait_s:

@@ -289,7 +289,6 @@ def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> J
 
 
 def _clusters(points: Phasors, period: int, noise: float) -> Judgement:
-    """Measure the clusters of points that are a multiple of ``period`` apart."""
     turns = len(points) // period
     clusters = points.reshape(turns, period, -1)
     size = sqrt(float(np.mean(np.sum(np.abs(points) ** 2, axis=1))))
@@ -363,7 +362,6 @@ def _has_no_trend(figure: Samples) -> bool:
 
 
 def _halves_agree(figure: Samples) -> bool:
-    """Compare the means of both halves with the scatter inside them."""
     first, second = np.array_split(figure, 2)
     spread = sqrt((float(first.var(ddof=1)) + float(second.var(ddof=1))) / len(first))
     # Student's t at 0.125 % (two-sided) with ten degrees of freedom.

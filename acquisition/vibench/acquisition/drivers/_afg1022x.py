@@ -127,12 +127,8 @@ class AFG1022X(ScpiInstrument):
         The mean is removed, see `GeneratorModel.codes`. While the memory changes, the amplitude is at its
         minimum.
 
-        Raises
-        ------
-        SettingRefused
-            When the memory reads back differently.
-        LimitExceeded
-            When points, repetition or amplitude are outside the limits of instrument or bench.
+        Raises SettingRefused when the memory reads back differently, and LimitExceeded when points,
+        repetition or amplitude are outside the limits of instrument or bench.
         """
         codes = self.model.codes(waveform)
         panel_vpp = amplitude_vpp * codes.panel_factor
@@ -194,10 +190,8 @@ class AFG1022X(ScpiInstrument):
     def stop(self) -> None:
         """Switch the output off. Legal at any time; tries again, also over a new session.
 
-        Raises
-        ------
-        InstrumentLost
-            When the generator could not be reached: the output may be ON, and the operator must act.
+        Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
+        must act.
         """
         if self._is_silent_and_closed:
             return
@@ -244,7 +238,6 @@ class AFG1022X(ScpiInstrument):
     # Steps that differ between models of generators
 
     def _end_modes(self) -> None:
-        """End sweep, burst, modulation and frequency lock."""
         self.end_if_known("SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
         bursts = ("BURS",) if self.channel == _BURST_CHANNEL else ()
         for node in (*bursts, "AM", "FM", "PM", "FSK", "PWM", "ASK", "PSK"):
@@ -252,11 +245,9 @@ class AFG1022X(ScpiInstrument):
         self.end_if_known("SOUR{c}:FREQ:CONC", "OFF", SWITCH["OFF"])
 
     def _set_frequency(self, frequency_hz: float) -> None:
-        """Set the frequency of the sine, or the repetition rate of the memory."""
         self.frequency_hz = frequency_hz
 
     def _select(self, codes: ArbitraryCodes | None) -> None:
-        """Play the memory, which holds ``codes``, or a sine."""
         self.shape = Shape.SINE if codes is None else Shape.EDIT_MEMORY
         self.codes = codes
 

@@ -84,12 +84,8 @@ def daqmx_session(server: str | None) -> DaqmxSession:
 def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:
     """List the devices of the driver on this computer, or of a device server at ``"host:port"``.
 
-    Raises
-    ------
-    InstrumentLost
-        When the server does not answer.
-    InstrumentError
-        When this computer has no driver.
+    Raises InstrumentLost when the server does not answer, and InstrumentError when this computer has no
+    driver.
     """
     session = daqmx_session(server)
     try:
@@ -125,12 +121,8 @@ _MOST_COUNTS = 2**29
 def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | None:
     """Add one input to a task, named by its role; return its volts per count where these scale linearly.
 
-    Raises
-    ------
-    SettingRefused
-        When coupling or sensor current read back differently.
-    DaqError
-        When the device refuses a setting.
+    Raises SettingRefused when coupling or sensor current read back differently, and DaqError when the device
+    refuses a setting.
     """
     task.ai_channels.add_ai_voltage_chan(
         channel.physical,
@@ -294,14 +286,8 @@ class DaqmxDigitizer:
 
         After a failure the run cannot continue, since its sample numbers are lost: stop, and start again.
 
-        Raises
-        ------
-        DataLost
-            When samples were overwritten before they were read.
-        InstrumentLost
-            When the device or its server is gone.
-        InstrumentError
-            When the samples do not come in time, or nothing is running.
+        Raises DataLost when samples were overwritten before they were read; InstrumentLost when the device or
+        its server is gone; InstrumentError when the samples do not come in time, or nothing is running.
         """
         if not self._is_running:
             raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")

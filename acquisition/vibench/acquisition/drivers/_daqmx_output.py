@@ -117,10 +117,7 @@ class DaqmxOutput:
     def stop(self) -> None:
         """Stop playing and go to zero volts at once. Legal at any time.
 
-        Raises
-        ------
-        InstrumentLost
-            When the device or its server is gone: the output then runs empty by itself.
+        Raises InstrumentLost when the device or its server is gone: the output then runs empty by itself.
         """
         if self._task is None:
             return

@@ -106,10 +106,8 @@ class GeneratorModel:
         The mean is removed, since DC would displace the shaker, and the rest is scaled so that its largest
         magnitude gets the first or last code.
 
-        Raises
-        ------
-        LimitExceeded
-            When the waveform has too few or too many points, is not finite, leaves -1 to 1, or is constant.
+        Raises LimitExceeded when the waveform has too few or too many points, is not finite, leaves -1 to 1,
+        or is constant.
         """
         values = np.asarray(waveform, dtype=np.float64)
         fewest, most = self.memory_points

@@ -88,7 +88,6 @@ class Keysight33500B(AFG1022X):
         self.output_filter = "OFF"
 
     def _set_frequency(self, frequency_hz: float) -> None:
-        """Set the frequency of the sine, or the repetition rate of the waveform."""
         if self.codes is None:
             self.frequency_hz = frequency_hz
         else:

@@ -70,14 +70,12 @@ class _Card:
         )
 
     def begin(self) -> None:
-        """Discard old samples, and start."""
         with self.changed:
             self.blocks.clear()
             self.waiting, self.failure = 0, ""
         self.stream.start()
 
     def drop(self) -> None:
-        """Discard samples still to be played."""
         with self.changed:
             self.queued.clear()
             self.unplayed, self.is_armed, self.ran_dry = 0, False, False
@@ -325,7 +323,6 @@ class SoundCardOutput:
 
 @contextmanager
 def _portaudio(doing: str) -> Iterator[None]:
-    """Translate PortAudio's errors."""
     try:
         yield
     except _sounddevice().PortAudioError as error:
@@ -367,7 +364,6 @@ def _input(channel: Channel, rig: Rig) -> int:
 
 
 def _number(name: str, side: str) -> int:
-    """Return the number of an input or output, counted from 0."""
     number = name.removeprefix(side)
     if number == name or not number.isdecimal():
         raise ConfigurationError(

@@ -28,14 +28,8 @@ Link = MessageBasedResource
 def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:
     """Open a VISA resource for messages that end in a newline.
 
-    Raises
-    ------
-    InstrumentLost
-        When no such instrument answers.
-    InstrumentBusy
-        When another program holds it.
-    InstrumentError
-        When the VISA library itself cannot be used.
+    Raises InstrumentLost when no such instrument answers; InstrumentBusy when another program holds it;
+    InstrumentError when the VISA library itself cannot be used.
     """
     manager = _manager(visa_library)
     try:

@@ -49,7 +49,6 @@ class _Program:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the system has stopped it."""
         return self._state in STOPPED
 
     @property

@@ -60,10 +60,7 @@ class Announcement(Program):
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
     """Let `announced_engines` find this engine inside the context; ``press`` carries out stops from files.
 
-    Raises
-    ------
-    AcquisitionError
-        When the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: nobody could stop what cannot be found.
     """
     told = Announcement.model_validate({**facts_of_this_process(what), "address": address})
     with announce_program(press, told):
@@ -299,12 +296,8 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
     ) -> "EngineClient":
         """Connect to a running engine, to watch or to attend its run.
 
-        Raises
-        ------
-        EngineSilent
-            When no answer comes within ``patience_s`` [s], now or later.
-        EngineGone
-            When nobody listens there.
+        Raises EngineSilent when no answer comes within ``patience_s`` [s], now or later, and EngineGone when
+        nobody listens there.
         """
         return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 

@@ -240,7 +240,6 @@ def _may_end_by_change(campaign: Campaign) -> bool:
 
 
 def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
-    """Return one line on the result of a campaign."""
     counts = {
         result: sum(point_result.outcome is result for point_result in point_results)
         for result in PointOutcome

@@ -296,10 +296,7 @@ def address_line(address: EngineAddress) -> str:
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
     """Serve a request handler at ``host``; ``what`` describes the engine to other programs.
 
-    Raises
-    ------
-    AcquisitionError
-        When the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: nobody could stop what cannot be found.
     """
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))

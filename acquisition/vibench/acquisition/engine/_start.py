@@ -110,10 +110,7 @@ class EngineProcess(ClosedOnLeaving):
 def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> EngineProcess:
     """Start an engine of this installation, with no bench open.
 
-    Raises
-    ------
-    EngineGone
-        When it does not start.
+    Raises EngineGone when it does not start.
     """
     supervision = chosen(Supervision, supervision)
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's

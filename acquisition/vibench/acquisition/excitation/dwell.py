@@ -1,4 +1,4 @@
-"""One sine, held: for the long look at one frequency."""
+"""One sine at a constant frequency and level."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
@@ -10,15 +10,15 @@ from .plan import Family, FixedSine, LeadIn
 from .steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
-"""Tones that may be passed on the way to one dwell."""
+"""Largest number of tones in the lead-in of one dwell."""
 
 
 class Dwell(FixedSine):
     """A sine at one frequency, recorded after it has settled.
 
-    An impacting specimen may have several motions at one frequency, and which of them it takes depends
-    on where it comes from. ``lead_in`` brings it there along a path: tone after tone, without a break
-    in phase, recorded as a segment of its own that no result is taken from.
+    An impacting specimen may have several motions at one frequency; the earlier motion decides which one it
+    takes. ``lead_in`` leads to it along a path: tone after tone, without a break in phase, recorded as a
+    separate segment that gives no result.
     """
 
     family: ClassVar[Family] = Family.DWELL
@@ -30,12 +30,12 @@ class Dwell(FixedSine):
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
-    """Tones passed before, in the order of time; none to begin at the dwell itself."""
+    """Earlier tones, in the order of time; none to begin at the dwell itself."""
     lead_s: PositiveFloat = 0.5
     """Time at each tone of ``lead_in`` [s]."""
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
-        """Plan the dwell to which this one leads: the specimen comes through this one, along its branch."""
+        """Return a dwell after this one: the specimen first passes through this one, along its branch."""
         changed = {
             "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,
@@ -44,7 +44,7 @@ class Dwell(FixedSine):
         return type(self).model_validate(self.model_dump() | changed)
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn]:
-        """Lead the specimen through a way to this dwell, in place of the way of its own."""
+        """Return this dwell with another lead-in, and its own tone for the next lead-in."""
         return self.model_copy(update={"lead_in": way, "lead_s": lead_s}), self._tone
 
     @property
@@ -58,12 +58,12 @@ class Dwell(FixedSine):
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The highest frequency on the way, or the dwell's own [Hz]."""
+        """The highest frequency of lead-in and dwell [Hz]."""
         return max(self.frequency_hz, *(tone.frequency_hz for tone in self.lead_in), 0.0)
 
     @property
     def highest_amplitude_vpp(self) -> float:
-        """The highest setting on the way, or the dwell's own [V]."""
+        """The highest setting of lead-in and dwell [V]."""
         return max(self.amplitude_vpp, *(tone.amplitude_vpp for tone in self.lead_in), 0.0)
 
     @property
@@ -72,7 +72,7 @@ class Dwell(FixedSine):
         return self.lead_in_s + self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """List the tones of the lead-in, as one segment, then the dwell."""
+        """Yield the tones of the lead-in, as one segment, then the dwell."""
         way = Segment(SegmentLabel.LEAD_IN, {"tones": len(self.lead_in)})
         for tone in self.lead_in:
             level = tone.amplitude_vpp / self.amplitude_vpp

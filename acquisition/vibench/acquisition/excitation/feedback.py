@@ -1,4 +1,4 @@
-"""What an excitation asks of its feedback: when a motion is settled, which level of the base is held."""
+"""Settings of feedback: when a motion is settled, and which level of the base is held."""
 
 from math import pi
 from typing import Annotated, Self
@@ -10,7 +10,7 @@ from ..host.toml_file import FrozenModel
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
-"""Below what any sensor shows, and beyond what any shaker's stroke allows, a unit was mistaken [m]."""
+"""Smaller displacements than any sensor shows, or larger than any shaker's stroke, are a wrong unit [m]."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
 """Likewise; no shaker reaches ten thousand times gravity [m/s2]."""
 
@@ -18,19 +18,19 @@ HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
 class Settling(FrozenModel):
     """When the motion of the specimen counts as settled.
 
-    It is seen once in each period of the recorded drive, as amplitude and phase of its first four
-    harmonics. It is settled with period k when these repeat after k drive periods, or when it does
-    not repeat and yet its statistics stay what they are.
+    The motion is measured once in each period of the recorded drive, as amplitude and phase of its first
+    four harmonics. It is settled with period k when these repeat after k drive periods, or when it does not
+    repeat and its statistics are constant.
     """
 
     tolerance: Share = 0.01
     """How closely the motion must repeat, over its rms size."""
     periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
-    """For how many drive periods it must repeat."""
+    """Number of drive periods for which it must repeat."""
     longest_period: int = Field(default=8, ge=1, le=32)
-    """Longest period that is looked for, in drive periods."""
+    """Longest period to search for, in drive periods."""
     aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
-    """Over how many drive periods a motion that does not repeat must keep its statistics."""
+    """Number of drive periods over which a motion that does not repeat must have constant statistics."""
     shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
     """Wait at least this long at every frequency [s]."""
     longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
@@ -47,10 +47,10 @@ class Settling(FrozenModel):
 
 
 class BaseLevel(FrozenModel):
-    """A level of the base's motion that the generator's setting is made to follow.
+    """A level of the base's motion that feedback holds by the generator's setting.
 
-    Held is the fundamental: what impacts add at other frequencies is not counted. The setting of
-    the plan, ``amplitude_vpp``, is then the largest that may be used.
+    The level is that of the fundamental, without motion that impacts add at other frequencies. The setting
+    of the plan, ``amplitude_vpp``, is then the largest that may be used.
     """
 
     acceleration_m_per_s2: HeldMetresPerS2 | None = None
@@ -58,9 +58,9 @@ class BaseLevel(FrozenModel):
     displacement_m: HeldMetres | None = None
     """Peak of the base's fundamental [m], the same at every frequency; or give ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
-    """How far the measured level may lie from it, as a share."""
+    """Allowed relative deviation of the measured level."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """The setting changes by at most this factor at once."""
+    """Largest factor of one change of the setting."""
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
@@ -70,7 +70,7 @@ class BaseLevel(FrozenModel):
 
     @property
     def quantity(self) -> str:
-        """The motion that is held: ``"acceleration"`` or ``"displacement"``."""
+        """The quantity that is held: ``"acceleration"`` or ``"displacement"``."""
         return "acceleration" if self.displacement_m is None else "displacement"
 
     @property
@@ -89,11 +89,11 @@ class BaseLevel(FrozenModel):
 
 
 class JumpSearch(FrozenModel):
-    """When two steps of a pass lie on different branches, and how closely the jump between is found."""
+    """When a change between two steps is a jump, and how closely it is located."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
     """A change of Response II (fundamental of m0 over the base's) by more than this is a jump."""
     resolution_hz: PositiveFloat = 0.25
-    """The two frequencies around a jump are brought this close together [Hz]."""
+    """Largest distance between the two frequencies around a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
-    """How many changes of one pass are looked into; some may prove to be steep only."""
+    """Largest number of changes in one pass that are searched; some may be steep only."""

@@ -1,4 +1,4 @@
-"""One sine, held, with the base kept at a level while the specimen does what it likes."""
+"""One sine, with the base held at a level."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal
@@ -12,7 +12,7 @@ from .steps import Segment, Step, Tone
 
 
 class HeldDwell(FixedSine, AbstractFeedback):
-    """A dwell whose base motion is measured and held, before the recording and while it lasts."""
+    """A dwell whose base motion is measured and held, before and during the recording."""
 
     family: ClassVar[Family] = Family.DWELL
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
@@ -24,7 +24,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     update_s: PositiveFloat = 1.0
-    """How often the level is looked at, and corrected if need be, while recording [s]."""
+    """How often the level is measured, and corrected if needed, during the recording [s]."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
@@ -38,7 +38,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
 
     @property
     def segment(self) -> Segment:
-        """What the recorded part is called."""
+        """The segment of the recorded part."""
         return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:

@@ -1,4 +1,4 @@
-"""Noise whose spectrum at the base is given: equalised from the measured response, average by average."""
+"""Noise with a given spectrum of the base: equalised from the measured response, average by average."""
 
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -28,7 +28,7 @@ Spectrum = Annotated[tuple[SpectrumPoint, ...], Field(min_length=1, max_length=1
 
 
 def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Samples:
-    """Return the densities of a spectrum; beyond its corners they go on as they are."""
+    """Return the densities of a spectrum; constant beyond its first and last corner."""
     corners_hz, densities = zip(*((each.frequency_hz, each.density) for each in spectrum), strict=True)
     return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(corners_hz), np.log(densities))))
 
@@ -36,10 +36,10 @@ def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Sample
 class HeldNoise(PeriodicNoise, AbstractFeedback):
     """Noise with a given acceleration spectrum at the base, white or shaped.
 
-    Every realisation has phases of its own, as that of `WhiteNoise`, and a drive that follows from the
-    gains measured before. The first ``equalisations`` of them, at levels that rise from ``start_db``, are not
-    kept as results. ``amplitude_vpp`` is the largest setting that may be used; limits of the bench are
-    checked beforehand for flat noise at that setting.
+    Every realisation has its own phases, like those of `WhiteNoise`, and a drive computed from the gains
+    measured before. The first ``equalisations`` of them, at levels that rise from ``start_db``, give no
+    results. ``amplitude_vpp`` is the largest setting that may be used; limits of the bench are checked
+    beforehand for flat noise at that setting.
     """
 
     family: ClassVar[Family] = Family.NOISE
@@ -47,14 +47,14 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     spectrum: Spectrum
     """Density of the base's acceleration [(m/s2)2/Hz], corner by corner."""
     tolerance_db: Decibels = 3.0
-    """How far the measured density may lie from it."""
+    """Allowed deviation of the measured density."""
     abort_db: Decibels = 6.0
-    """How far above it any density ends the run."""
+    """Deviation above the spectrum that ends the run."""
     response_limits: tuple[SpectrumPoint, ...] = ()
-    """Density of the velocity of m0 that is not to be passed [(m/s)2/Hz]: the base is lowered (notched) where
-    it would be; corner by corner, none at all without."""
+    """Largest density of the velocity of m0 [(m/s)2/Hz]: the base is lowered (notched) where it would be
+    exceeded; corner by corner; absent: no limit."""
     resolution_hz: PositiveFloat = 4.0
-    """Width over which densities are averaged before they are judged, and gains before they are used [Hz]."""
+    """Width for averaging densities before they are judged, and gains before they are used [Hz]."""
     equalisations: int = Field(default=4, ge=1, le=100)
     """Realisations before the first that is kept."""
     start_db: float = Field(default=-12.0, ge=-60, le=0)
@@ -84,25 +84,25 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def rms_m_per_s2(self) -> float:
-        """What the spectrum amounts to over the lines of the band."""
+        """Rms acceleration of the spectrum over the lines of the band."""
         return float(np.sqrt(np.sum(self.density) * self.repetition_hz))
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """None: it is no sine that is held."""
+        """None: no sine is held."""
         return ()
 
     @property
     def level_text(self) -> str:
-        """The level with the setting that it may take."""
+        """The level, and the largest setting."""
         return f"base held at {self.rms_m_per_s2:.3g} m/s² rms, at most {self.amplitude_vpp:g} Vpp"
 
     @property
     def stretches(self) -> int:
-        """One for every realisation, those that equalise among them."""
+        """One for every realisation, including those that equalise."""
         return self.equalisations + self.realisations
 
     @property
     def playing_s(self) -> float:
-        """Settling and listening of all of them [s]."""
+        """Settling and recording of all of them [s]."""
         return self.stretches * (self.settle_s + self.periods / self.repetition_hz)

@@ -1,4 +1,4 @@
-"""Sines one after the other, the response's amplitude held at each: response-controlled stepped sines."""
+"""Sines one after the other with a constant response: response-controlled stepped sines."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal
@@ -16,12 +16,12 @@ from .steps import Segment, Step, Tone
 
 
 class HeldResponse(FrequencySteps, AbstractFeedback):
-    """A stepped sine whose setting is corrected until m0 moves as far as asked, at every frequency.
+    """A stepped sine whose setting is corrected until m0 has a given amplitude, at every frequency.
 
-    Where the base's level has several answers, a response has one level of the base: curves of
-    constant response are single-valued, and a set of them gives those of constant level, unstable parts
-    included (Karaagacli and Ozguven, Vibration 3 (2020) 19). What can be held is what the chain's own motion
-    under the voltage leaves stable, or grows slower than feedback acts.
+    One level of the base may have several responses, but a response has one level of the base. So curves of
+    constant response are single-valued, and a set of them gives those of constant level, including unstable
+    parts (Karaagacli and Ozguven, Vibration 3 (2020) 19). Motions can be held that are stable under constant
+    voltage, or that grow more slowly than feedback acts.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
@@ -29,26 +29,26 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     response_m: HeldMetres
     """Amplitude of m0's fundamental to be held [m]."""
     response_of: PhaseReference = PhaseReference.RELATIVE
-    """Which motion of m0 that is: the one against the base, or the absolute one."""
+    """Motion of m0 that is meant: relative to the base, or absolute."""
     tolerance: Share = 0.01
-    """How far it may be from that, as a share, twice in a row."""
+    """Allowed relative deviation, twice in a row."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """The setting changes by at most this factor at once."""
+    """Largest factor of one change of the setting."""
     start_share: Share = 0.02
-    """Setting from which the first frequency is started, over ``amplitude_vpp``."""
+    """Setting at the start of the first frequency, over ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
     """Wait no longer than this; the step is then recorded and flagged [s]."""
     glide_step_hz: PositiveFloat = 0.5
-    """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
+    """Largest frequency step of the tone between two frequencies of the list [Hz]."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """None: the base follows."""
+        """None: the base follows the response."""
         return ()
 
     @property
     def level_text(self) -> str:
-        """The response, and the setting that it may take."""
+        """The response, and the largest setting."""
         words = f"{self.response_of.value} motion of m0 held at {1e6 * self.response_m:g} µm"
         return f"{words}, at most {self.amplitude_vpp:g} Vpp"
 
@@ -61,7 +61,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
         return passes * (steps_s + glides * GLIDE_TONE_S)
 
     def segment(self, frequency_hz: float, direction: str) -> Segment:
-        """Name the recording of a step."""
+        """Return the segment of a step."""
         return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
 
     def steps(self) -> Iterator[Step]:

@@ -1,4 +1,4 @@
-"""A sine sweep that keeps the measured motion of the base at a level."""
+"""A sine sweep with the measured motion of the base held at a level."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -12,17 +12,17 @@ from .steps import Segment, Step, Tone
 
 
 class HeldSweep(MovingSine, AbstractFeedback):
-    """A sweep whose setting is corrected after every step by what the base did in it.
+    """A sweep whose setting is corrected after every step from the motion of the base.
 
-    A sweep does not wait: where the base's answer changes within a few steps, the level is off for as
-    long, and the recording says where.
+    A sweep does not wait: if the gain of the base changes within a few steps, the level is off for that
+    time, and the recording notes it.
     """
 
     kind: Literal["held_sweep"] = "held_sweep"
     base_level: BaseLevel
     """Level of the base to be held."""
     average_s: PositiveFloat = 0.5
-    """Chance is averaged away, and the level judged, over this time; a trend is followed faster [s]."""
+    """Averaging time for random errors and for the check of the level; a trend is followed faster [s]."""
     settling: Settling = Settling()
     """When the sweep begins to move."""
 
@@ -38,7 +38,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
 
     @property
     def segment(self) -> Segment:
-        """What the sweep is called."""
+        """The segment of the sweep."""
         return self.segment_with(f"measured {self.base_level.quantity}")
 
     def steps(self) -> Iterator[Step]:

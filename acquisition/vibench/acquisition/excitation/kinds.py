@@ -1,4 +1,4 @@
-"""All kinds of excitation, told apart by the word ``kind`` in a file."""
+"""All kinds of excitation, selected by the key ``kind`` in a file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ _LACKING: dict[str, str] = {}
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:
-    """Load the kinds that installed packages add; one that cannot be used does not stop the others."""
+    """Load the kinds that installed packages add; a broken package does not affect the others."""
     taken = {word for plan in get_args(_Ours) for word in _words(plan)}
     for name in plug_in_names(PlugInKind.EXCITATION):
         try:
@@ -62,14 +62,13 @@ def _of_packages() -> Iterator[type[AbstractExcitation]]:
 
 
 def _words(plan: type[AbstractExcitation]) -> tuple[str, ...]:
-    """Return what a file may give as ``kind``, earlier words too."""
     kind = plan.model_fields.get("kind")
     words = () if kind is None else get_args(kind.annotation)
     return words if kind is not None and kind.default in words else ()
 
 
 def _require_installed(given: Any) -> Any:
-    """Refuse a kind of a package that is missing, or cannot be used, with a sentence that names it."""
+    """Refuse a kind whose package is missing or broken, with a sentence that names it."""
     word = given.get("kind") if isinstance(given, dict) else None
     if isinstance(word, str) and word not in EXCITATION_KINDS:
         reason = _LACKING.get(word) or missing_package(word)
@@ -92,18 +91,18 @@ _GROUPS = {Family.STEPPED: "steps"}
 
 @dataclass(frozen=True)
 class ExcitationKind:
-    """How files name a kind of excitation, and what they may say of it."""
+    """Names and texts of a kind of excitation."""
 
     plan: type[AbstractExcitation]
 
     @property
     def word(self) -> str:
-        """What a file gives as ``kind``."""
+        """The value of ``kind`` in a file."""
         return str(self.plan.model_fields["kind"].default)
 
     @property
     def label(self) -> str:
-        """What a person reads."""
+        """Name for people."""
         return self.word.replace("_", " ")
 
     @property
@@ -118,7 +117,7 @@ class ExcitationKind:
 
     @property
     def title(self) -> str:
-        """The label where a sentence or a figure begins with it."""
+        """The label with a capital letter, for the start of a sentence or a figure's title."""
         return self.label.capitalize()
 
     @property
@@ -171,7 +170,7 @@ def rows_by_kind(
 
 
 class _RowsOfPackages(Mapping[str, Row]):
-    """Rows by kind; those of packages are loaded when they are asked for, and may import what is above."""
+    """Rows by kind; those of packages are loaded on first use, because they may import higher layers."""
 
     def __init__(self, rows: Mapping[str, Row], group: PlugInKind) -> None:
         self._rows, self._group = rows, group
@@ -188,5 +187,5 @@ class _RowsOfPackages(Mapping[str, Row]):
 
 
 def excitation_text(excitation: Excitation) -> str:
-    """Say in words what is played, and how strongly."""
+    """Return the signal and its level in words."""
     return f"{EXCITATION_KINDS[excitation.kind].label}, {excitation.level_text}"

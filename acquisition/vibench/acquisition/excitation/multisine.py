@@ -1,4 +1,4 @@
-"""The arithmetic of a multisine in a generator's memory: lines, hold, phases, crest factor."""
+"""Multisines in a generator's memory: lines, hold, phases, crest factor."""
 
 from functools import lru_cache
 
@@ -9,15 +9,17 @@ from ..errors import ConfigurationError
 from .steps import Samples
 
 USUAL_POINTS = 8192
-"""Points of one period, where a plan names none."""
+"""Number of points of one period if the plan does not name it."""
 FEWEST_POINTS, MOST_POINTS = 64, 65_536
-"""Of a plan; the generator's description says what its memory takes."""
+"""Limits of a plan; the generator's description gives those of its memory."""
 CANDIDATES = 20
-"""Sets of random phases that are tried; the one with the lowest crest factor is played. Twenty bring
-the crest factor of a thousand lines from about 3.8 to about 3.3, and further ones hardly more."""
+"""Sets of random phases that are tried; the one with the lowest crest factor is played. Twenty lower the
+crest factor of a thousand lines from about 3.8 to about 3.3, and more hardly lower it further.
+"""
 NEAREST_IMAGE_RATIO = 2.0
-"""The first image of a held waveform must lie above this multiple of the band's upper edge: nearer, an
-analogue low-pass could no longer tell them apart."""
+"""The first image of a held waveform must be above this multiple of the band's upper edge: otherwise an
+analogue low-pass could not separate them.
+"""
 
 Lines = NDArray[np.int64]
 
@@ -56,22 +58,21 @@ def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
 def flat_periods(
     lines: Lines, realisations: int, seed: int, points: int = USUAL_POINTS
 ) -> tuple[Samples, ...]:
-    """One period for every realisation: flat lines with random phases, all of one rms value.
+    """Return one period for every realisation: flat lines with random phases, all of one rms value.
 
-    Every line is divided by the droop of the hold, so that it is the played spectrum that is flat.
-    Of ``CANDIDATES`` sets of phases the one with the lowest crest factor is taken. The realisation
-    with the highest peak reaches 1; the others stay below, because a nonlinear specimen must see
-    the same level in each.
+    Every line is divided by the droop of the hold, so that the played spectrum is flat. Of ``CANDIDATES``
+    sets of phases the one with the lowest crest factor is used. The realisation with the highest peak
+    reaches 1; the others stay below, because a nonlinear specimen needs the same level in each.
 
     Returns
     -------
     tuple of arrays
-        ``realisations`` arrays of shape (points,), read-only: who asks again is given the same.
+        ``realisations`` arrays of shape (points,), read-only; equal arguments return the same arrays.
     """
     return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
 
 
-# Limits, preview and playing ask for the waveforms of a plan in turn; all its levels have the same.
+# Limits, preview and run need the waveforms of a plan one after another; all its levels have the same.
 @lru_cache(maxsize=1)
 def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: int) -> tuple[Samples, ...]:
     excited = np.array(lines, dtype=np.int64)
@@ -84,7 +85,8 @@ def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: 
 
 
 def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisation: int) -> Samples:
-    """One period whose held lines have given amplitudes (peak), of the phases with the lowest crest factor.
+    """Return one period whose held lines have given amplitudes (peak), with the phases of lowest crest
+    factor.
 
     Returns
     -------
@@ -110,7 +112,7 @@ def _period(
 
 
 def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None:
-    """Refuse a band whose first image comes too near; what passes lies below half the playback rate.
+    """Refuse a band whose first image is too near; images below half the playback rate cannot be filtered.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None
 
 
 def require_lines(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
-    """Refuse a band in which no line lies; raises ConfigurationError."""
+    """Refuse a band without lines; raises ConfigurationError."""
     if len(lines) == 0:
         raise ConfigurationError(
             f"no harmonic of {repetition_hz:g} Hz lies in the band up to {stop_hz:g} Hz; "

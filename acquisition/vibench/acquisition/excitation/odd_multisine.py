@@ -1,4 +1,6 @@
-"""A multisine that shows where nonlinearity goes: odd lines only, and some of them left out on purpose."""
+"""A multisine that separates nonlinearities: odd lines only, with some of them left out as detection
+lines.
+"""
 
 from typing import Annotated, Literal, Self
 
@@ -9,7 +11,7 @@ from .multisine import Lines
 from .periodic_noise import MOST_REALISATIONS, PeriodicNoise
 
 GROUP = 4
-"""Of every four odd lines one, chosen at random, is left out as a detection line."""
+"""Of every four odd lines one, chosen at random, is a detection line."""
 DETECTION_KEY = 0x0DD
 """Keeps the choice of detection lines independent of the phases, which use the same seed."""
 
@@ -17,17 +19,17 @@ DETECTION_KEY = 0x0DD
 class OddMultisine(PeriodicNoise):
     """An odd random-phase multisine with random detection lines.
 
-    Even nonlinearity answers on even lines, odd nonlinearity on the odd lines that were left out;
-    both are empty in the drive (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    Even nonlinearity responds on even lines, odd nonlinearity on the odd detection lines; both are empty in
+    the drive (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["odd_multisine"] = "odd_multisine"
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
-    """Waveforms with phases of their own, all on the same lines."""
+    """Waveforms with different phases, all on the same lines."""
     excited_lines: tuple[PositiveInt, ...] = ()
-    """Harmonics of ``repetition_hz`` that are played; left empty, they are drawn from the seed."""
+    """Harmonics of ``repetition_hz`` that are played; if empty, they are drawn from the seed."""
     detection_lines: tuple[PositiveInt, ...] = ()
-    """Odd harmonics left out; left empty, all odd lines of the band that are not played."""
+    """Odd harmonics left out; if empty, all odd lines of the band that are not played."""
 
     @model_validator(mode="after")
     def _lines_fit_the_band(self) -> Self:
@@ -46,7 +48,7 @@ class OddMultisine(PeriodicNoise):
                 "detection_lines must be the odd lines of the band that are not excited; "
                 "leave them out to have them filled in"
             )
-        # The drawn lines are part of the plan, so that its file says them without our code.
+        # The drawn lines are part of the plan, so that other programs can read them from its file.
         object.__setattr__(self, "excited_lines", tuple(sorted(excited)))
         object.__setattr__(self, "detection_lines", silent)
         return self
@@ -59,7 +61,7 @@ class OddMultisine(PeriodicNoise):
 
     @property
     def lines(self) -> Lines:
-        """Those of them that are played."""
+        """The odd harmonics that are played."""
         return np.array(self.excited_lines, dtype=np.int64)
 
     def _drawn(self) -> set[int]:

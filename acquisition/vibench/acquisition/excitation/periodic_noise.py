@@ -1,4 +1,4 @@
-"""What all noise out of the generator's memory shares: flat lines of a band, new phases for every average."""
+"""Periodic noise from the generator's memory: flat lines in a band, new phases for every average."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -53,7 +53,7 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Of one measurement: all their waveforms, of 8 bytes a point, are of one level and made together."""
+"""Largest number of one measurement: all their waveforms are computed together, for equal levels."""
 
 
 class PeriodicNoise(BandNoise):
@@ -63,11 +63,11 @@ class PeriodicNoise(BandNoise):
     repetition_hz: PositiveFloat = 1.0
     """Periods per second, and the distance of the harmonics [Hz]."""
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
-    """Waveforms with phases of their own, all on the same lines."""
+    """Waveforms with different phases, all on the same lines."""
     periods: PositiveInt = 2
     """Periods recorded of each realisation; two or more show the noise of the sensors."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
-    """Points of one period in the generator's memory; what it takes is checked against them beforehand."""
+    """Points of one period in the generator's memory; checked against its size beforehand."""
     settle_s: NonNegativeFloat = 3.0
     """Wait after each change of waveform until the transient has died out [s]."""
     seed: int = Field(default=1, ge=0)

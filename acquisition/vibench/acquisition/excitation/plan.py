@@ -1,4 +1,6 @@
-"""What every excitation is: a frozen plan with an amplitude setting that lists the steps of the generator."""
+"""Base classes of all excitations: a frozen plan with an amplitude setting that lists the generator's
+steps.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
@@ -32,7 +34,7 @@ from .steps import (
 
 @dataclass(frozen=True, eq=False)
 class SignalPreview:
-    """The voltage that the generator's panel promises, as samples and in figures."""
+    """The voltage according to the generator's panel, as samples and as numbers."""
 
     time_s: Samples
     """Shape (samples,) [s]."""
@@ -45,7 +47,7 @@ class SignalPreview:
     rms_v: float
     peak_v: float
     duration_s: float
-    """Time that the whole excitation takes, settling included, ramps not [s]."""
+    """Duration of the whole excitation, including settling, without ramps [s]."""
 
     @property
     def crest_factor(self) -> float:
@@ -60,7 +62,7 @@ def signal_preview(
     highest_frequency_hz: float,
     duration_s: float,
 ) -> SignalPreview:
-    """Sample ``steps`` one after the other; a tone takes up the phase where the one before it ended."""
+    """Sample ``steps`` one after the other; a tone continues the phase of the one before it."""
     if sample_rate_hz <= 2 * highest_frequency_hz:
         raise ConfigurationError(
             f"a preview at {sample_rate_hz:g} samples/s cannot show {highest_frequency_hz:g} Hz; "
@@ -104,8 +106,8 @@ def _values(play: Play, since_s: Samples, first: int, sample_rate_hz: float, cyc
         case Tone(frequency_hz, level):
             return np.asarray(level * np.sin(2 * np.pi * (frequency_hz * since_s + cycles)))
         case Waveform(values, repetition_hz):
-            # A sample that falls on the edge between two held values belongs to the later one: the
-            # small shift keeps rounding from handing it to the earlier one.
+            # A sample on the edge between two held values belongs to the later one: the small shift prevents
+            # rounding to the earlier one.
             edge = 1e-9
             position = np.floor(since_s * repetition_hz * len(values) + edge).astype(np.int64)
             return np.asarray(values[position % len(values)])
@@ -124,34 +126,34 @@ def _cycles_of(play: Play) -> float:
 
 
 AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
-"""What the generator takes, its description says; beyond the upper bound a unit was mistaken."""
+"""The generator's description gives its limits; a value above the upper bound is a wrong unit."""
 HIGHEST_FREQUENCY_HZ = 1e5
-"""Beyond what any shaker follows [Hz]."""
+"""Higher than any shaker can follow [Hz]."""
 FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
 
 
 class Family(StrEnum):
-    """What kinds of excitation have in common: their analysis, their pictures."""
+    """Families of kinds with the same analysis and pictures."""
 
     NOISE = "noise"
     """A whole band at once."""
     SWEEP = "sweep"
     """A sine that moves through a band."""
     DWELL = "dwell"
-    """A sine that stays."""
+    """A sine of constant frequency."""
     STEPPED = "stepped"
-    """Sines one after the other, each recorded by itself."""
+    """Sines one after the other, each recorded separately."""
 
 
 class LeadIn(FrozenModel):
-    """A tone that is passed on the way to a dwell."""
+    """A tone before a dwell."""
 
     frequency_hz: FrequencyHz
     amplitude_vpp: AmplitudeVpp
 
 
 def around(frequency_hz: float) -> tuple[float, float]:
-    """Return the band in which a single sine is looked at: an octave to either side [Hz]."""
+    """Return the band for a single sine: an octave to either side [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
 
@@ -160,52 +162,54 @@ class AbstractExcitation(FrozenModel, ABC):
 
     family: ClassVar[Family]
     result_labels: ClassVar[tuple[SegmentLabel, ...]]
-    """Segments of the recording that results are taken from."""
+    """Segments of the recording that give results."""
     wishes: ClassVar[tuple[str, ...]] = ()
-    """Results that a recording of it may last until, see `vibench.acquisition.plan.Until`."""
+    """Results that a recording can wait for, see `vibench.acquisition.plan.Until`."""
 
     amplitude_vpp: AmplitudeVpp
     """Setting of the generator, peak to peak [V], as its panel shows it."""
 
     @abstractmethod
     def steps(self) -> Iterator[Step]:
-        """List what the generator does, in the order of time."""
+        """Yield the steps of the generator, in the order of time."""
 
     def loudest_steps(self) -> Iterator[Step]:
-        """List what limits are checked against: the steps themselves, unless feedback may be louder."""
+        """Yield the steps that limits are checked with: the steps themselves, unless feedback may be
+        louder.
+        """
         return self.steps()
 
     @property
     def highest_amplitude_vpp(self) -> float:
-        """The highest setting there is on the way, peak to peak [V]."""
+        """The highest setting, including lead-ins, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property
     def period_points(self) -> int | None:
-        """Points of a waveform in the generator's memory; None where it needs none."""
+        """Points of a waveform in the generator's memory; None without a waveform."""
         return None
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """The lowest setting there is on the way, ramps apart, peak to peak [V]."""
+        """The lowest setting, without ramps, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property
     def level_text(self) -> str:
-        """How strongly the base is driven, in words."""
+        """Level of the drive or of the base, in words."""
         return f"{self.amplitude_vpp:g} Vpp"
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return what decides the motion of the base while a frequency of the band is played: the setting."""
+        """Return what determines the motion of the base at a frequency of the band: the setting."""
         del frequency_hz
         return RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """List frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
+        """Yield frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
         return iter(())
 
     def require_holdable(self, rig: Rig) -> None:
-        """Refuse motions that feedback on a rig would not hold; what is played without has nothing to hold.
+        """Refuse motions that feedback on a rig could not hold; plans without feedback accept every rig.
 
         Raises ConfigurationError or LimitExceeded. Nothing was played.
         """
@@ -213,59 +217,61 @@ class AbstractExcitation(FrozenModel, ABC):
     @property
     @abstractmethod
     def band_hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency that is played; around a single one an octave to either side [Hz]."""
+        """Lowest and highest frequency; for a single one an octave to either side [Hz]."""
 
     @property
     def approach(self) -> Approach:
-        """How the specimen comes to each frequency: led by what moves through them, and else from rest."""
+        """Start of the motion at each frequency: from the neighbour for moving frequencies, otherwise from
+        rest.
+        """
         return Approach.REST
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at one frequency, where the drive moves on without a pause [s]; None where it does not."""
+        """Time at one frequency, if the drive continues without a pause [s]; otherwise None."""
         return None
 
     @property
     def own_sweep_s(self) -> float | None:
-        """Time of a sweep that the generator makes by itself [s]; None where it makes none."""
+        """Time of a sweep that the generator makes by itself [s]; otherwise None."""
         return None
 
     @property
     def lead_in_s(self) -> float:
-        """Time on the way to what is to be measured, along a branch [s]."""
+        """Time of the lead-in along a branch [s]."""
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the same excitation in this direction; None where its kind has no direction, or not this."""
+        """Return the same excitation in this direction; None if its kind does not have it."""
         del direction
         return None
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Give the same at the end of a way, and the tone that goes on it for the next; None without ways."""
+        """Return the same after a lead-in, and its own tone for the next; None if its kind has no lead-in."""
         del way, lead_s
         return None
 
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Time of all steps, settling included, ramps not [s]; with feedback the longest it may take."""
+        """Time of all steps, including settling, without ramps [s]; with feedback the longest possible."""
 
     @property
     def stretches(self) -> int:
-        """How often the drive rises out of silence: once for sines, once for every waveform of noise."""
+        """How often the drive starts from silence: once for sines, once for every waveform of noise."""
         return 1
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
+        """The highest intended frequency, which the converter must be able to follow [Hz]."""
         return self.band_hz[1]
 
     def shown_steps(self) -> Iterator[Step]:
-        """List what a preview shows: all steps, unless less says as much."""
+        """Yield the steps for a preview: all, unless fewer show the same."""
         return self.steps()
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Show what will be played, before anything moves.
+        """Compute the signal, before anything moves.
 
         Raises ConfigurationError when ``sample_rate_hz`` is too low to show the highest frequency.
         """
@@ -279,7 +285,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
 
 class FixedSine(AbstractExcitation):
-    """A sine whose frequency stays."""
+    """A sine of constant frequency."""
 
     frequency_hz: FrequencyHz
     """Frequency of the sine [Hz]."""
@@ -296,31 +302,31 @@ class FixedSine(AbstractExcitation):
 
 
 class AbstractFeedback(AbstractExcitation):
-    """An excitation whose next step depends on what was measured: `vibench.acquisition.control` conducts it.
+    """An excitation whose next step depends on measured values; `vibench.acquisition.control` carries it out.
 
-    Its ``steps`` are what it is expected to play, waits left out: for previews and for code that lists
-    what will be recorded. ``amplitude_vpp`` is the largest setting that it may use.
+    Its ``steps`` are the expected ones, without waits: for previews and for lists of the segments.
+    ``amplitude_vpp`` is the largest setting that it may use.
     """
 
     @property
     @abstractmethod
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; none to play ``amplitude_vpp`` as it is."""
+        """Levels of the base to be held, in the order played; none to play ``amplitude_vpp`` unchanged."""
 
     @property
     def level_text(self) -> str:
-        """The levels, and the setting that they may take."""
+        """The levels, and the largest setting."""
         most = super().level_text
         words = [level.text for level in self.held_levels]
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return the highest level that is held; without one the setting is played."""
+        """Return the highest level that is held; without one, the setting."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Yield the highest level at every sine that it is expected to play."""
+        """Yield the highest level for every expected sine."""
         for step in self.steps():
             match step.play:
                 case Tone(frequency_hz):

@@ -1,4 +1,4 @@
-"""Sines one after the other, each recorded when its motion has settled, whatever kind of motion that is."""
+"""Sines one after the other, each recorded when its motion has settled."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
@@ -12,29 +12,29 @@ from .stepped_sine import FrequencySteps
 from .steps import Segment, Step, Tone
 
 MOST_SETTLED_STEPS = 600
-"""Four events a step, and as many again for searches, fit into a recording's table."""
+"""Largest number of steps: four events a step, and as many for searches, fit into a recording's table."""
 GLIDE_TONE_S = 0.1
-"""Time at each tone that is only passed on the way to the next frequency [s]."""
+"""Time at each tone between two frequencies of the list [s]."""
 
 
 class SettledSine(FrequencySteps, AbstractFeedback):
-    """A stepped sine that waits as long as the motion needs, keeps to its branch and localises jumps.
+    """A stepped sine that waits for settled motion, stays on its branch and locates jumps.
 
-    The phase goes on from one frequency to the next. What is found at each step (period or none,
-    waiting time, level of the base, where the branch came from) stands in the recording beside it.
+    The phase continues from one frequency to the next. The recording contains the result of each step:
+    period, waiting time, level of the base, and origin of the branch.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None
-    """Level of the base to be held; without it ``amplitude_vpp`` is played as it is."""
+    """Level of the base to be held; if absent, ``amplitude_vpp`` is played unchanged."""
     jumps: JumpSearch | None = None
-    """Look for jumps between steps, and localise them; without it they are only crossed."""
+    """Locate jumps between steps; if absent, jumps are passed without a search."""
     glide_step_hz: PositiveFloat = 0.5
-    """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
+    """Largest frequency step of the tone between two frequencies of the list [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
-    """Longest time spent on one jump; what is bracketed by then is kept [s]."""
+    """Longest time spent on one jump; the interval found by then is kept [s]."""
 
     @model_validator(mode="after")
     def _events_have_room(self) -> Self:

@@ -1,4 +1,4 @@
-"""A sine whose frequency moves slowly through a band, in steps too small to notice."""
+"""A sine whose frequency moves slowly through a band, in very small steps."""
 
 from collections.abc import Iterator
 from enum import StrEnum
@@ -14,18 +14,18 @@ from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 
 
 class Hold(StrEnum):
-    """Which motion of the base stays about constant along a sweep, on a shaker that drives a mass.
+    """Motion of the base that is about constant along a sweep, on a shaker that drives a mass.
 
-    Above its suspension resonance a shaker turns voltage into acceleration. What is held is only as
-    constant as that: what the base really did is in the recording.
+    Above its suspension resonance a shaker turns voltage into acceleration. The motion is only as constant
+    as this assumption; the recording contains the real motion of the base.
     """
 
     ACCELERATION = "acceleration"
-    """The amplitude setting stays as it is."""
+    """The amplitude setting is constant."""
     VELOCITY = "velocity"
     """The setting grows in proportion to frequency."""
     DISPLACEMENT = "displacement"
-    """The setting grows with the square of frequency: the base displacement of the paper's model."""
+    """The setting grows with the square of frequency: constant displacement, as in the paper's model."""
 
     @property
     def power(self) -> int:
@@ -34,12 +34,12 @@ class Hold(StrEnum):
 
 
 class SweptBy(StrEnum):
-    """What moves the frequency."""
+    """Source of the frequency changes."""
 
     COMPUTER = "computer"
-    """In steps, on any generator."""
+    """In steps by the computer, on any generator."""
     GENERATOR = "generator"
-    """Its own sweep, without steps, where it makes one; it begins with a trigger."""
+    """The generator's own sweep, without steps, if it has one; a trigger starts it."""
 
 
 MOST_SWEEP_STEPS = 1_000_000
@@ -47,11 +47,10 @@ MOST_SWEEP_STEPS = 1_000_000
 
 
 class MovingSine(AbstractExcitation):
-    """A sine sweep, up or down, that the computer steps through.
+    """A sine sweep, up or down, in steps by the computer.
 
-    Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
-    step the phase is the ideal sweep's. What the generator really played, and when, is in the
-    recorded drive.
+    Each step plays the mean frequency of the ideal sweep over its time, so that the phase at the end of
+    every step is that of the ideal sweep. The recorded drive shows what the generator really played.
     """
 
     family: ClassVar[Family] = Family.SWEEP
@@ -63,7 +62,7 @@ class MovingSine(AbstractExcitation):
     duration_s: PositiveFloat
     """Time from start to stop [s]."""
     spacing: Spacing = Spacing.LINEAR
-    """How the frequency moves with time."""
+    """Frequency over time."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]; the last step may be shorter."""
 
@@ -103,7 +102,7 @@ class MovingSine(AbstractExcitation):
         return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self | None:
-        """Go from the lower end to the upper one, or back; a sweep does not turn on its way."""
+        """Return the sweep from the lower end to the upper one, or back; a sweep cannot turn."""
         low_hz, high_hz = self.band_hz
         match direction:
             case Direction.UP:
@@ -124,7 +123,8 @@ class MovingSine(AbstractExcitation):
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
         """Yield mean frequency [Hz] and duration [s] of each step, in the order of time."""
-        # 1e-9 keeps a duration that is a whole number of steps, except for rounding, from growing a sliver.
+        # 1e-9 prevents an additional tiny step if the duration is a whole number of steps except for
+        # rounding.
         count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         for number in range(count):
             begin_s = number * self.step_s
@@ -132,7 +132,7 @@ class MovingSine(AbstractExcitation):
             yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
 
     def segment_with(self, held: str) -> Segment:
-        """Name the recorded sweep, and what is held along it."""
+        """Return the segment of the sweep, with the quantity held along it."""
         numbers = self.model_dump(include={"start_hz", "stop_hz", "duration_s", "step_s"})
         return Segment(SegmentLabel.SWEEP, {**numbers, "spacing": self.spacing.value, "hold": held})
 
@@ -142,11 +142,11 @@ class SineSweep(MovingSine):
 
     kind: Literal["sine_sweep"] = "sine_sweep"
     hold: Hold = Hold.ACCELERATION
-    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    """Constant quantity; ``amplitude_vpp`` is then the setting at the highest frequency."""
     settle_s: NonNegativeFloat = 3.0
     """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
     swept_by: SweptBy = SweptBy.COMPUTER
-    """What moves the frequency; ``step_s`` is the computer's."""
+    """Source of the frequency changes; ``step_s`` applies to the computer."""
 
     @model_validator(mode="after")
     def _generator_holds_its_setting(self) -> Self:
@@ -159,12 +159,12 @@ class SineSweep(MovingSine):
 
     @property
     def own_sweep_s(self) -> float | None:
-        """Time of a sweep that the generator makes [s]; None where the computer steps."""
+        """Time of the generator's own sweep [s]; None if the computer steps."""
         return self.duration_s if self.swept_by is SweptBy.GENERATOR else None
 
     @property
     def glide_step_s(self) -> float | None:
-        """The step of the sweep [s]; a generator's own has none."""
+        """The step of the sweep [s]; None for the generator's own sweep."""
         return self.step_s if self.swept_by is SweptBy.COMPUTER else None
 
     @property
@@ -177,7 +177,7 @@ class SineSweep(MovingSine):
         return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
 
     def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Return the setting, as it follows the frequency."""
+        """Return the setting at a frequency."""
         return RelativeSetting(self.level(frequency_hz))
 
     @property
@@ -193,7 +193,7 @@ class SineSweep(MovingSine):
         return self.loudest_steps()
 
     def loudest_steps(self) -> Iterator[Step]:
-        """One step for every ``step_s``, whatever moves the frequency."""
+        """One step for every ``step_s``, also for the generator's own sweep."""
         segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():
@@ -201,5 +201,5 @@ class SineSweep(MovingSine):
             settle_s = 0.0
 
     def shown_steps(self) -> Iterator[Step]:
-        """Show the whole sweep, without the wait before it."""
+        """Yield the whole sweep, without the wait before it."""
         return (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())

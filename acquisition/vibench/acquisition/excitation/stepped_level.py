@@ -1,4 +1,4 @@
-"""One frequency, level after level, up and down: where an impacting motion sets in, and where it ends."""
+"""One frequency, level after level, up and down: where impacts begin, and where they end."""
 
 from collections.abc import Iterator
 from math import floor
@@ -15,18 +15,18 @@ from .steps import Direction, Segment, Step, Tone
 class SteppedLevel(FixedSine):
     """A sine whose level goes up and down in steps; each is played until it has settled, then recorded.
 
-    The phase goes on from one level to the next, so that the specimen keeps to its branch: the level at
-    which it jumps up and the one at which it falls back are two, with both motions possible in between.
-    ``amplitude_vpp`` is the highest level.
+    The phase continues from one level to the next, so that the specimen stays on its branch: it jumps up at
+    one level and falls back at another, and between them both motions are possible. ``amplitude_vpp`` is the
+    highest level.
     """
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["stepped_level"] = "stepped_level"
     lowest_vpp: AmplitudeVpp
-    """The lowest level, if the steps down from ``amplitude_vpp`` land on it [V]."""
+    """The lowest level, if whole steps down from ``amplitude_vpp`` reach it [V]."""
     step_vpp: PositiveFloat
-    """From one level to the next; a small one, for each is a small blow as well [V]."""
+    """Difference of neighbouring levels; small, because each change also disturbs the motion [V]."""
     direction: Direction = Direction.UP_THEN_DOWN
     settle_s: NonNegativeFloat = 3.0
     """Wait at every level until the transient has died out [s]."""
@@ -55,13 +55,13 @@ class SteppedLevel(FixedSine):
 
     @property
     def rising_vpp(self) -> tuple[float, ...]:
-        """All levels, rising, the last one being ``amplitude_vpp`` [V]."""
+        """All levels, rising, up to ``amplitude_vpp`` [V]."""
         return tuple(
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )
 
     def turned(self, direction: Direction) -> Self:
-        """Go through the levels in a direction."""
+        """Return the same levels in a direction."""
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     @property
@@ -70,11 +70,11 @@ class SteppedLevel(FixedSine):
         return self._steps() * (self.settle_s + self.record_s)
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each way through the levels: its direction, and its levels in the order played [V]."""
+        """Yield each pass through the levels: its direction, and its levels in the order played [V]."""
         return self.direction.ways(self.rising_vpp)
 
     def steps(self) -> Iterator[Step]:
-        """One step for every level, in the order of time."""
+        """Yield one step for every level, in the order of time."""
         for direction, levels_vpp in self.passes():
             for level_vpp in levels_vpp:
                 numbers: dict[str, int | float | str] = {
@@ -86,10 +86,10 @@ class SteppedLevel(FixedSine):
                 yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
 
     def _steps(self) -> int:
-        # Counted before any list of them is made: a wrong step could ask for millions.
+        # Counted before a list of them is made: a wrong step could give millions.
         ways = sum(1 for _ in self.direction.ways(()))
         return ways * self._count()
 
     def _count(self) -> int:
-        # 1e-9: a lowest level that the steps reach except for rounding belongs to them.
+        # 1e-9: a lowest level that the steps reach except for rounding is included.
         return floor((self.amplitude_vpp - self.lowest_vpp) / self.step_vpp + 1e-9) + 1

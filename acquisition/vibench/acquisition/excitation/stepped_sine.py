@@ -1,4 +1,4 @@
-"""Sines one after the other, each settled before it is recorded: the slow, exact way through a band."""
+"""Sines one after the other, each settled before it is recorded."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -13,7 +13,7 @@ from .plan import AbstractExcitation, Family, FrequencyHz, around
 from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
-"""What the table of segments of one recording holds, with room for the ramps and the check."""
+"""Largest number of segments in one recording's table, without ramps and check."""
 
 
 class FrequencyGrid(FrozenModel):
@@ -21,7 +21,7 @@ class FrequencyGrid(FrozenModel):
 
     start_hz: FrequencyHz
     stop_hz: FrequencyHz
-    """The last frequency, if the steps land on it [Hz]."""
+    """The last frequency, if whole steps reach it [Hz]."""
     step_hz: PositiveFloat
 
     @model_validator(mode="after")
@@ -33,7 +33,7 @@ class FrequencyGrid(FrozenModel):
             )
         steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
         if steps > 2 * MOST_STEPS:
-            # Before any list of them is made: a wrong step could ask for millions.
+            # Before a list of them is made: a wrong step could give millions.
             raise ValueError(
                 f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
                 "split the measurement"
@@ -43,13 +43,13 @@ class FrequencyGrid(FrozenModel):
     @property
     def values_hz(self) -> tuple[float, ...]:
         """The frequencies, rising [Hz]."""
-        # 1e-9: a stop that the steps reach except for rounding belongs to the grid.
+        # 1e-9: a stop that the steps reach except for rounding is included.
         count = floor((self.stop_hz - self.start_hz) / self.step_hz + 1e-9) + 1
         return tuple(self.start_hz + number * self.step_hz for number in range(count))
 
 
 class FrequencySteps(AbstractExcitation):
-    """A list of frequencies and the way through it; each is recorded as its own segment."""
+    """A list of frequencies and its order; each is recorded as a separate segment."""
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
@@ -86,18 +86,18 @@ class FrequencySteps(AbstractExcitation):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """The first and the last of the list, or an octave to either side of its only one [Hz]."""
+        """The first and the last of the list, or an octave to either side of a single one [Hz]."""
         low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
         return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
 
     @property
     def approach(self) -> Approach:
-        """From the side on which the first way through the list begins."""
+        """From the first direction of the list."""
         first, _ = next(self.passes())
         return Approach.UP if first == Direction.UP.value else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self:
-        """Go through the list in a direction."""
+        """Return the same list in a direction."""
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     @property
@@ -106,15 +106,15 @@ class FrequencySteps(AbstractExcitation):
         return self.rising_hz[-1]
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each way through the list: its direction, and its frequencies in the order played [Hz]."""
+        """Yield each pass through the list: its direction, and its frequencies in the order played [Hz]."""
         return self.direction.ways(self.rising_hz)
 
 
 class SteppedSine(FrequencySteps):
-    """A list of frequencies; each is played until it has settled, then recorded as its own segment.
+    """A list of frequencies; each is played until it has settled, then recorded as a separate segment.
 
-    The phase goes on from one frequency to the next and the amplitude stays, so that the specimen
-    keeps to its branch.
+    The phase continues from one frequency to the next and the amplitude is constant, so that the specimen
+    stays on its branch.
     """
 
     wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
@@ -132,7 +132,6 @@ class SteppedSine(FrequencySteps):
         """One step for every frequency, in the order of time."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
-                # The direction keeps the turning point of a way up and down
-                # from being one segment.
+                # The direction separates the segments of the turning point of an up and down pass.
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)

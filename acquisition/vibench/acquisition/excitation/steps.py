@@ -1,4 +1,4 @@
-"""What the generator does, step by step: the language between an excitation and the run that plays it."""
+"""The generator's steps, as an excitation lists them and a run plays them."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,26 +20,26 @@ class Tone:
 
     frequency_hz: float
     level: float = 1.0
-    """Its amplitude as a fraction of the amplitude setting: above 0, and at most 1 except for a lead-in."""
+    """Fraction of the amplitude setting: above 0, and at most 1 except for a lead-in."""
 
 
 @dataclass(frozen=True)
 class LoopTone(Tone):
-    """A sine that a real-time controller plays, with all that holds the motion."""
+    """A sine that a real-time controller plays, with the law that holds the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """One period of anything, repeated, as a generator holds it: each value lasts until the next."""
+    """One period, repeated, as in a generator's memory: each value lasts until the next."""
 
     values: Samples
-    """From -1 to 1, the full range being the amplitude setting. The largest magnitude may be below 1:
-    realisations of one noise share their rms value, and only the sharpest of them reaches 1."""
+    """From -1 to 1; the full range is the amplitude setting. The largest magnitude may be below 1:
+    realisations of one noise share their rms value, and only the one with the highest peak reaches 1."""
     repetition_hz: float
 
 
 class SampleSource(Protocol):
-    """A Gaussian signal that never repeats, made on demand."""
+    """A Gaussian signal that never repeats, computed on demand."""
 
     @property
     def band_start_hz(self) -> float:
@@ -69,16 +69,16 @@ Play: TypeAlias = Tone | Waveform | Stream | Sweep
 
 @dataclass(frozen=True)
 class Segment:
-    """A named stretch of the recording that belongs together in the analysis."""
+    """A named range of the recording for the analysis."""
 
     label: SegmentLabel
     numbers: Mapping[str, int | float | str] = field(default_factory=dict)
-    """What the analysis must know: ``realisation``, ``repetition_hz``, ``frequency_hz``, ``start_hz`` ..."""
+    """Values for the analysis: ``realisation``, ``repetition_hz``, ``frequency_hz``, ``start_hz`` ..."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Play one thing: wait until it has settled, then record.
+    """Play one signal: wait until it has settled, then record.
 
     Steps that follow each other with an equal segment and no settling are recorded as one segment.
     """
@@ -95,7 +95,7 @@ class Step:
 
 
 class Direction(StrEnum):
-    """Which way through the steps: an impacting specimen may answer differently on the way back."""
+    """Order of the steps: an impacting specimen may respond differently on the way back."""
 
     UP = "up"
     DOWN = "down"
@@ -103,7 +103,9 @@ class Direction(StrEnum):
     DOWN_THEN_UP = "down_then_up"
 
     def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Yield each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
+        """Yield each pass through rising values: ``"up"`` or ``"down"``, and the values in the order
+        played.
+        """
         up = (Direction.UP.value, rising)
         down = (Direction.DOWN.value, rising[::-1])
         match self:
@@ -118,17 +120,17 @@ class Direction(StrEnum):
 
 
 class Approach(StrEnum):
-    """Where the motion at each frequency begins; with several motions at one frequency it decides which."""
+    """Start of the motion at each frequency, which decides between several motions."""
 
     REST = "from rest"
     UP = "led upwards"
-    """From the state and the phase in which the next lower frequency ended."""
+    """From the final state and phase of the next lower frequency."""
     DOWN = "led downwards"
 
 
 @dataclass(frozen=True)
 class HeldAcceleration:
-    """Feedback holds the base's fundamental, whatever setting that takes."""
+    """Feedback holds the base's fundamental, with any setting up to the largest."""
 
     amplitude_m_per_s2: float
     """Peak."""
@@ -137,7 +139,7 @@ class HeldAcceleration:
 
 @dataclass(frozen=True)
 class RelativeSetting:
-    """A sine at a setting: the base does what the shaker makes of it."""
+    """A sine at a setting; the shaker determines the motion of the base."""
 
     share: float
     """Share of the plan's ``amplitude_vpp``."""
@@ -146,7 +148,7 @@ class RelativeSetting:
 
 @dataclass(frozen=True)
 class RmsSetting:
-    """Noise at the plan's setting: no sine is played, so that one of the same rms stands for it."""
+    """Noise at the plan's setting, represented by a sine of the same rms."""
 
     basis: ClassVar[str] = "a sine of the same rms base displacement"
 

@@ -1,4 +1,4 @@
-"""Gaussian noise that never repeats, made on demand for an analogue output."""
+"""Gaussian noise that never repeats, computed on demand for an analogue output."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,22 +13,24 @@ from .periodic_noise import BandNoise
 from .steps import Samples, Segment, Step, Stream
 
 CREST_FACTOR = 4.5
-"""Half the amplitude setting over the rms value. A Gaussian value passes 4.5 standard deviations about
-seven times in a million; those few are cut to the range, which no spectrum shows."""
+"""Half the amplitude setting over the rms value. A Gaussian value exceeds 4.5 standard deviations about
+seven times in a million; these few are clipped, with no visible effect on the spectrum.
+"""
 CHUNK = 4096
-"""Random numbers drawn with one key: small enough to start anywhere, large enough to be quick."""
+"""Random numbers drawn with one key: few enough to start anywhere, many enough to be fast."""
 TRANSITION_WIDTH = 0.5
 """Width of the filter's edges over the band's lower edge; the -6 dB points are the band's edges."""
 HAMMING_WIDTH = 3.3
 """Taps times transition width over sample rate of a Hamming-windowed filter (Oppenheim and Schafer,
-Discrete-Time Signal Processing, 3rd ed., table 7.2)."""
+Discrete-Time Signal Processing, 3rd ed., table 7.2).
+"""
 PREVIEW_S = 10.0
-"""How much of a long noise a preview shows [s]."""
+"""Length of a preview of long noise [s]."""
 
 
 @dataclass(frozen=True)
 class GaussianBand:
-    """A stationary Gaussian signal between two frequencies whose every sample follows from a seed."""
+    """A stationary Gaussian signal between two frequencies that a seed determines sample by sample."""
 
     band_start_hz: float
     band_stop_hz: float
@@ -40,12 +42,12 @@ class GaussianBand:
         return CREST_FACTOR
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
-        """Make samples ``first`` to ``first + count - 1``, -1 to 1: the same however they are asked for."""
+        """Return samples ``first`` to ``first + count - 1``, -1 to 1; the same in any order of calls."""
         from scipy.signal import oaconvolve  # noqa: PLC0415 - half a second, which `vibench stop` need not wait
 
         taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)
-        # White noise runs ahead of the first sample by the length of the filter, so that the signal
-        # is stationary from its first sample on.
+        # White noise starts before the first sample by the length of the filter, so that the signal is
+        # stationary from its first sample on.
         white = self._white(first, count + len(taps) - 1)
         shaped = np.asarray(oaconvolve(white, taps, mode="valid"))
         return np.clip(shaped / CREST_FACTOR, -1.0, 1.0)
@@ -68,12 +70,12 @@ def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> S
     from scipy.signal import firwin  # noqa: PLC0415 - as above
 
     taps = firwin(2 * half + 1, band, pass_zero=False, fs=sample_rate_hz, window="hamming")
-    # White noise of variance 1 comes out with the sum of squares of the taps: make that 1.
+    # The filter multiplies variance 1 by the sum of squares of the taps: normalise this to 1.
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))
 
 
 class StreamedNoise(BandNoise):
-    """Band-limited Gaussian noise of any length, by an analogue output beside the generator.
+    """Band-limited Gaussian noise of any length, on an analogue output.
 
     The rms value is the amplitude setting over twice the crest factor of 4.5. Edges are -6 dB points.
     """
@@ -89,7 +91,7 @@ class StreamedNoise(BandNoise):
 
     @property
     def source(self) -> GaussianBand:
-        """The signal itself."""
+        """The signal."""
         return GaussianBand(self.band_start_hz, self.band_stop_hz, self.seed)
 
     @property
@@ -98,11 +100,11 @@ class StreamedNoise(BandNoise):
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """One step."""
+        """Yield the one step."""
         band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
         yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
 
     def shown_steps(self) -> Iterator[Step]:
-        """Show the first seconds of it."""
+        """Yield the first seconds of it."""
         for step in self.steps():
             yield Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)

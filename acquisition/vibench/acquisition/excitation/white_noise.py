@@ -1,4 +1,4 @@
-"""Band-limited white noise out of the generator's memory: a random-phase multisine, new for every average."""
+"""Band-limited white noise from the generator's memory: a random-phase multisine, new for every average."""
 
 from typing import Literal
 
@@ -11,10 +11,9 @@ from .periodic_noise import PeriodicNoise
 class WhiteNoise(PeriodicNoise):
     """White noise between two frequencies, as whole periods of flat lines with random phases.
 
-    A periodic signal needs no window and has no leakage, but averaging its periods averages the
-    sensors' noise only. Every realisation therefore has its own phases: it is the average over
-    realisations that stands for noise (Pintelon and Schoukens, System Identification, 2nd ed.,
-    section 4.3).
+    A periodic signal needs no window and has no leakage, but averaging its periods reduces only the sensors'
+    noise. Every realisation therefore has different phases: the average over realisations corresponds to
+    noise (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["white_noise", "multisine_noise"] = "white_noise"

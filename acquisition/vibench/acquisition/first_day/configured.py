@@ -1,4 +1,4 @@
-"""A configuration from a template and answers: asked one by one, looked up where the computer can see."""
+"""A configuration from a template and answers, with proposals from the connected instruments."""
 
 import errno
 import json
@@ -32,7 +32,7 @@ from ..stopping.stop import StopSwitch
 
 
 class Found(Enum):
-    """What the computer can see by itself."""
+    """Kinds of instruments that the computer can find."""
 
     GENERATORS = auto()
     """VISA resources."""
@@ -45,7 +45,7 @@ class Question:
     """One value of the configuration."""
 
     key: str
-    """``"amplifier.gain_db"``; of a channel ``"daq.channels.m0_velocity.physical"``."""
+    """``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
     found: Found | None = None
 
@@ -99,16 +99,16 @@ _CHANNEL = "daq.channels."
 
 
 def value_in(text: str, key: str) -> str:
-    """Return what the template holds, as it is written; empty where it says nothing of the key."""
+    """Return the template's value as text; empty if it has none for the key."""
     found = _place(text, key)
     return "" if found is None else found.group("value")
 
 
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
-    """Put an answer in the place of what the template holds, with a note who gave it.
+    """Replace a value of the template by an answer, with a note on its source.
 
-    Raises ConfigurationError when it is of another kind than what stands there (a word for a number, no
-    date), or the template has no such table.
+    Raises ConfigurationError when the answer has another type than the value (a word for a number, no date),
+    or the template has no such table.
     """
     found = _place(text, key)
     if found is not None:
@@ -132,7 +132,7 @@ def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
 
 
 def _guess_type(answer: str) -> str:
-    """Write an answer to what the template says nothing of: a number where it reads as one."""
+    """Write an answer without a value in the template: as a number if possible, otherwise as text."""
     try:
         return _as_toml(answer)
     except ValueError:
@@ -140,7 +140,7 @@ def _guess_type(answer: str) -> str:
 
 
 def _as_toml(number: str) -> str:
-    """Write a number as TOML does, which has no .5 and no 010; raises ValueError where it is none."""
+    """Write a number in TOML, which allows no .5 and no 010; raises ValueError if it is not a number."""
     value = float(number)
     try:
         tomllib.loads(f"number = {number}")
@@ -156,7 +156,7 @@ def _place(text: str, key: str) -> re.Match[str] | None:
 
 
 def _table(text: str, key: str) -> tuple[int, int, str]:
-    """Find the stretch of text in which a key stands, and its name there."""
+    """Find the table of a key in the text, and the key's name there."""
     if key.startswith(_CHANNEL):
         role, _, name = key.removeprefix(_CHANNEL).partition(".")
         begins = [found.start() for found in re.finditer(r"^\[\[daq\.channels\]\]$", text, re.MULTILINE)]
@@ -178,7 +178,6 @@ def _end(text: str, begin: int) -> int:
 
 
 def _literal(held: str, answer: str, key: str, note: str) -> str:
-    """Write an answer in the kind of what it takes the place of."""
     value: Any = tomllib.loads(f"value = {held}")["value"]
     match value:
         case str() if "/" in value:  # a sensitivity with its unit
@@ -191,7 +190,9 @@ def _literal(held: str, answer: str, key: str, note: str) -> str:
             try:
                 return date.fromisoformat(answer).isoformat()
             except ValueError as error:
-                raise ConfigurationError(f"{key}: {answer!r} is no date; give one as 2026-02-10") from error
+                raise ConfigurationError(
+                    f"{key}: {answer!r} is not a date; give one as 2026-02-10"
+                ) from error
         case _:
             return _number(answer, key)
 
@@ -202,16 +203,18 @@ def _number(answer: str, key: str) -> str:
     except ValueError as error:
         if "/" in answer:  # a sensitivity with its unit
             return json.dumps(answer, ensure_ascii=False)
-        raise ConfigurationError(f"{key}: {answer!r} is no number; give one, such as 0.1 or 2e-3") from error
+        raise ConfigurationError(
+            f"{key}: {answer!r} is not a number; give one, such as 0.1 or 2e-3"
+        ) from error
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Asks a question, with what was found for it and what the template holds; empty: as it is."""
+"""Asks a question, with proposals and the template's value; an empty answer keeps the value."""
 Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise what is wrong: nobody is there who could be asked again."""
+    """Raise the error of an answer: nobody can be asked again."""
     raise error
 
 
@@ -220,7 +223,7 @@ _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECA
 
 
 def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
-    """Return what the computer sees for a question."""
+    """Return the instruments that the computer finds for a question."""
     match question.found:
         case Found.GENERATORS:
             return seen.visa_resources
@@ -239,19 +242,21 @@ def configure(
     questions: Sequence[Question] = QUESTIONS,
     refuse: Refuse = refuse_at_once,
 ) -> Rig:
-    """Ask everything, write the configuration, and read it back.
+    """Ask all questions, write the configuration, and read it back.
 
-    Comments of ``template`` say CONFIRM where nobody has looked yet. ``note`` says who answers, and when; it
-    stands behind each answer. ``refuse`` receives what is wrong with an answer, or with all together; when it
-    returns, they are asked again.
+    Comments of ``template`` say CONFIRM for unchecked values. ``note``, with name and time, is added to each
+    answer. ``refuse`` receives the error of an answer, or of all together; when it returns, they are asked
+    again.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
     if target.exists():
-        raise ConfigurationError(f"{target} is there already, and nothing is overwritten; give another name")
+        raise ConfigurationError(f"{target} exists already, and nothing is overwritten; give another name")
     if not target.absolute().parent.is_dir():
-        raise ConfigurationError(f"{target.absolute().parent} is no folder; make it, or give another place")
-    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is that of the template
+        raise ConfigurationError(
+            f"{target.absolute().parent} is not a folder; make it, or give another place"
+        )
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is the template's
     for question in questions:
         if len(choices := found_choices(question, seen)) == 1:
             text = with_answer(text, question.key, choices[0], "the only one seen")
@@ -271,7 +276,7 @@ def configure(
 def _valid_answer(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
-    """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
+    """Ask until the answer has its type and is within its bounds; answers are compared at the end."""
     while answer := ask(question, choices, _default_answer(text, question.key)):
         try:
             _require_text(answer, question.key)
@@ -290,7 +295,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Show what the template holds; of a number with its source, the number."""
+    """Return the template's value; for a number with its source, the number."""
     written = value_in(text, key)
     match tomllib.loads(f"held = {written}")["held"] if written else None:
         case {"value": number}:
@@ -323,14 +328,12 @@ def _write(target: Path, text: str) -> None:
 
 
 def _with_product(text: str, seen: InstrumentList, note: str) -> str:
-    """Enter the product of the device that was chosen."""
     device = value_in(text, "daq.device").strip('"')
     product = next((each.product for each in seen.daq_devices if each.name == device), "")
     return with_answer(text, "daq.product", product, note) if product else text
 
 
 def _with_driver(text: str, note: str) -> str:
-    """Enter the driver whose instruments have the address that was chosen."""
     resource = value_in(text, "generator.resource").strip('"')
     driver = _driver_of(resource)
     if driver is None:
@@ -349,14 +352,14 @@ def _driver_of(resource: str) -> str | None:
     ids = int(found.group(1), 0), int(found.group(2), 0)
     for name in plug_in_names(PlugInKind.GENERATOR):
         config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
-        with suppress(AcquisitionError):  # a broken package of somebody's is no answer
+        with suppress(AcquisitionError):  # a broken package gives no driver
             if ids in generator_driver(config).describe(config).usb_ids:
                 return name
     return None
 
 
 FIRST_VPP = 5e-3
-"""The first that plays on a new bench, peak to peak [V]."""
+"""Level of the first signal on a new bench, peak to peak [V]."""
 _FROM = {
     Role.DRIVE_VOLTAGE: "T-piece at the output of the generator",
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, beside the shaker",
@@ -364,7 +367,7 @@ _FROM = {
     Role.M0_VELOCITY: "velocity output of the vibrometer",
 }
 Confirmed = Callable[[str], str]
-"""Asks for a pair of ends to be wired; the answer stands in the page, and an empty one stops the day."""
+"""Asks for the wiring of two ends; the answer is written on the page, and an empty one ends the procedure."""
 
 
 @dataclass(frozen=True)
@@ -374,7 +377,7 @@ class DayPage:
     text: str
     """Markdown."""
     verdict: Verdict
-    """The worst that was found."""
+    """The worst verdict."""
 
 
 def first_day(
@@ -384,12 +387,8 @@ def first_day(
 
     The check at its usual level plays only when nothing at 5 mV forbids it. The end is silence.
 
-    Raises
-    ------
-    CheckFailed
-        When a pair of wires is not confirmed; nothing has played then.
-    InstrumentError
-        When an instrument fails.
+    Raises CheckFailed when a pair of wires is not confirmed; nothing has played then, and InstrumentError
+    when an instrument fails.
     """
     folder = config.absolute().parent
     again = f"begin again with --from {in_a_command(config)} and the name of a new one"
@@ -397,7 +396,7 @@ def first_day(
     first = bench_report(bench, folder, switch, FIRST_VPP)
     pages += _chapter(f"Noise floor, and the first {1e3 * FIRST_VPP:g} mVpp", first)
     if first.verdict is Verdict.FAIL:
-        pages.append(f"The bench check was not played: mend what FAILs above, and {again}.")
+        pages.append(f"The bench check was not played: correct each FAIL above, and {again}.")
         return DayPage("\n".join(pages) + "\n", Verdict.FAIL)
     checked = check_bench(bench, folder, switch=switch)
     pages += _chapter("The bench check, at two per cent of the amplitude limit", checked.report)
@@ -406,7 +405,7 @@ def first_day(
 
 
 def in_a_command(path: Path) -> str:
-    """Write a path as any shell takes it."""
+    """Return a path quoted for a shell."""
     return f'"{path}"' if " " in str(path) else str(path)
 
 
@@ -451,7 +450,7 @@ def _chapter(title: str, report: BenchReport) -> Iterator[str]:
 def _next_steps(rig: Rig, checked: CheckResult, config: Path) -> Iterator[str]:
     bench = in_a_command(config)
     if checked.verdict is Verdict.FAIL:
-        yield "\nDo not energise: mend what FAILs, and check again with"
+        yield "\nDo not energise: correct each FAIL, and check again with"
         yield f"\n    vibench bench check --bench {bench}"
         return
     yield f"\nThe bench may be armed for {rig.check_valid_h:g} h. Record a first sweep with"

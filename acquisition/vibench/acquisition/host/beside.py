@@ -1,4 +1,4 @@
-"""Threads beside the main one that may hang or must end it, and things that a ``with`` closes."""
+"""Helper threads for work that may hang or must end the process, and objects closed by a ``with``."""
 
 import os
 from abc import ABC, abstractmethod
@@ -15,7 +15,7 @@ from ..stopping.stop import MEMORY_RESERVE
 
 
 class Beside:
-    """Runs jobs in order in one thread, which is started before anything drives.
+    """Runs jobs in order in one thread, which is started before any drive.
 
     CPython waits forever for a new thread that runs out of memory while it starts.
     """
@@ -25,7 +25,7 @@ class Beside:
         self.is_busy = self._is_closing = False
         """Whether a job is running or queued."""
         self._changed = Condition()
-        with suppress(RuntimeError):  # the system gives no more threads: the jobs are left out
+        with suppress(RuntimeError):  # the system gives no more threads: jobs are not done
             Thread(target=self._run, name=name, daemon=True).start()
 
     def do(self, job: Callable[[], None]) -> None:
@@ -66,11 +66,11 @@ class Beside:
 
 
 class ClosedOnLeaving(ABC):
-    """Something that must be closed, and is, at the end of a ``with``."""
+    """Base of objects that are closed at the end of a ``with``."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of what is held. Legal at any time."""
+        """Release all resources. Legal at any time."""
 
     def __enter__(self) -> Self:
         return self
@@ -82,10 +82,10 @@ class ClosedOnLeaving(ABC):
 
 
 def follow_parent() -> None:
-    """End this process as soon as the one that spawned it is gone.
+    """End this process as soon as its parent process has gone.
 
-    For the workers of a pool, which never notice: each of them holds both ends of the pipe that it
-    waits on. A worker has nothing to lose; what it was to give would reach nobody.
+    Needed for the workers of a pool, which do not notice: each of them holds both ends of the pipe on which
+    it waits. A worker has no state to save.
     """
     parent = parent_process()
     if parent is not None:

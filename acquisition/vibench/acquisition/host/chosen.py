@@ -1,4 +1,4 @@
-"""One of a few: wherever a member of an enum is asked for, its word is accepted."""
+"""Functions that expect a member of an enum also accept its value."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], given: Choice | str) -> Choice:
-    """Return the member that was given, or whose word was; an unknown word raises ConfigurationError.
+    """Return the given member, or the one with the given value; another value raises ConfigurationError.
 
     >>> from enum import StrEnum
     >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])
@@ -22,12 +22,12 @@ def chosen(kind: type[Choice], given: Choice | str) -> Choice:
         return kind(given)
     except ValueError as unknown:
         raise ConfigurationError(
-            f"{given!r} is no {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
+            f"{given!r} is not a {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
         ) from unknown
 
 
 @dataclass(frozen=True)
 class ChosenFrom:
-    """Mark a text of a model, in its ``Annotated`` type, as one that is mostly chosen from a list."""
+    """Mark a text field of a model, in its ``Annotated`` type, as one usually chosen from a list."""
 
     texts: Callable[[], Iterable[str]]

@@ -1,4 +1,4 @@
-"""What a command needs of the installation and the computer, and the sentence where it is not there."""
+"""Requirements of a command, and the error if the installation or the computer does not meet them."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -15,22 +15,22 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "gui": ("PySide6", "pyqtgraph"),
     }
 )
-"""Extra of `pyproject.toml`: what it brings, by the names that are imported."""
+"""Extra of `pyproject.toml`, with the modules that it installs."""
 
 
 def need_extra(extra: str) -> None:
-    """Make sure that the libraries of an extra can be imported; imports none of them.
+    """Require that the libraries of an extra can be imported; import none of them.
 
     Raises MissingLibrary when one is not installed. ``extra`` is its word in `pyproject.toml`.
     """
     for library in EXTRAS[extra]:
-        # The parent first: finding a submodule of what is missing raises.
+        # The parent first: finding a submodule of a missing module raises.
         if find_spec(library.partition(".")[0]) is None or find_spec(library) is None:
             raise _missing(library, extra)
 
 
 def need_space(megabytes: int, advice: str = "") -> None:
-    """Require address space for the libraries and their threads: they hang or abort where it runs out.
+    """Require address space for the libraries and their threads: without it they hang or abort.
 
     ``megabytes`` is the space [MB]. Raises ConfigurationError where the limit is lower; its last sentence is
     ``advice``.
@@ -48,7 +48,7 @@ def need_space(megabytes: int, advice: str = "") -> None:
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
-    """Wrap the ``__getattr__`` of a face whose names need an extra: the error names the extra.
+    """Wrap the ``__getattr__`` of a public API whose names need an extra: the error names the extra.
 
     ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the word in `pyproject.toml`. What is
     returned raises MissingLibrary when a library of the extra is not installed.

@@ -3,11 +3,11 @@
 from unicodedata import category
 
 LONGEST_CLAUSE = 400
-"""Letters; a value that stands in a fault may be as long as its file."""
+"""Letters; a value in an error may be as long as its file."""
 
 
 def printable(text: str) -> str:
-    r"""Write what would move a cursor, reorder text or be invisible as an escape: one line comes of it.
+    r"""Return one line in which characters that move the cursor, reorder text or are invisible are escaped.
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb
@@ -26,7 +26,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
-    """Cut the middle out of a text that is too long to be read.
+    """Replace the middle of a long text by three dots.
 
     >>> shortened("0123456789", 7)
     '01...89'

@@ -1,7 +1,7 @@
-"""JSON Schemas of the TOML files that people write, for editors: what may stand where, as they are typed.
+"""JSON Schemas of the TOML files that people write, for editors that complete keys.
 
-Draft 4, since taplo, the language server of most editors for TOML, knows no later one. A schema is wider than
-its model where a file may leave out what its defaults or the specimen that it names say; never narrower.
+Draft 4, because taplo, the language server of most editors for TOML, supports no later one. A schema allows
+more than its model where defaults or a named specimen may supply values; never less.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,9 +16,9 @@ from pydantic import BaseModel
 from ..errors import ConfigurationError
 
 VERSION = 1
-"""Version of all schemas; the next one comes with a change that an old file does not survive."""
+"""Version of all schemas; it changes when old files become invalid."""
 FORMAT = "format_version"
-"""Key by which a file may say which version it was written for; the present one if absent."""
+"""Key for the version of a file; if absent, the present version."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
 _SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this one starts from."}
 _RANGE = {
@@ -31,7 +31,7 @@ Json = dict[str, Any]
 
 
 def _with_defaults(schema: Json) -> None:
-    """Let ``[defaults]`` and templates say what measurements and their excitations leave out."""
+    """Make keys optional that ``[defaults]`` and templates can supply."""
     parts = schema["definitions"]
     kinds = [
         part["$ref"].rpartition("/")[2] for part in parts["Measurement"]["properties"]["excitation"]["oneOf"]
@@ -59,7 +59,7 @@ def _with_defaults(schema: Json) -> None:
 
 
 def _with_a_base(schema: Json) -> None:
-    """Let a specimen start from a named one; a name alone is that one."""
+    """Allow a specimen that starts from a named one, or is only a name."""
     for name, part in schema["definitions"].items():
         if "masses_kg" in part.get("properties", {}):
             _starts_from_another(part)
@@ -67,7 +67,7 @@ def _with_a_base(schema: Json) -> None:
 
 
 def _starts_from_another(part: Json) -> None:
-    """Let a specimen leave out what the one that it names says, and have a stop on one side."""
+    """Make keys optional that a named specimen supplies, and allow a stop on one side only."""
     part["properties"]["model"] = _SPECIMEN
     part.pop("required", None)
     for side in part["properties"]["gap_m"]["anyOf"][1]["items"]:
@@ -75,7 +75,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Let frequencies be ranges, numbers, and lists of both; a specimen's former key still stands for it."""
+    """Allow ranges, numbers, and lists of both for frequencies, and a former key for the specimen."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
@@ -84,8 +84,6 @@ def _with_ranges(schema: Json) -> None:
 
 @dataclass(frozen=True)
 class _Kind:
-    """One kind of file: where its model stands, and what its files may leave to others."""
-
     face: str
     model: str
     widen: Callable[[Json], None]
@@ -105,7 +103,7 @@ SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
         "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
     }
 )
-"""Word of a kind of file: what it is. Loaded by name: the models stand in higher rooms."""
+"""Kinds of files by word. Models are loaded by name, because they are in higher packages."""
 
 
 def json_schema(kind: str) -> Json:
@@ -123,12 +121,12 @@ def json_schema(kind: str) -> Json:
 
 
 def schema_name(kind: str) -> str:
-    """Name of the file that comes with vibench, below its folder ``schemas``."""
+    """Return the name of the shipped schema file, in the folder ``schemas``."""
     return f"{kind}-{VERSION}.schema.json"
 
 
 def schema_line(model: BaseModel, schemas: Path) -> str:
-    """Return the line that tells an editor the schema of a file that holds ``model``, empty if there is none.
+    """Return the line that names the schema of a file of ``model`` for an editor; empty if there is none.
 
     ``schemas`` is the folder of the schemas, as ``shipped_folder("schemas")`` gives it.
     """
@@ -138,7 +136,7 @@ def schema_line(model: BaseModel, schemas: Path) -> str:
 
 
 def _draft_4(part: Any) -> Any:
-    """Say in draft 4 what pydantic says in draft 2020-12, without what TOML has not: null."""
+    """Convert pydantic's draft 2020-12 to draft 4, without null, which TOML does not have."""
     match part:
         case list():
             return [_draft_4(each) for each in part]
@@ -171,6 +169,6 @@ def _older(part: Json) -> Json:
         part["anyOf"] = kept
         if part.get("default", ...) is None:
             del part["default"]
-    if "$ref" in part and len(part) > 1:  # its neighbours would not be read
+    if "$ref" in part and len(part) > 1:  # draft 4 ignores other keys beside it
         part["allOf"] = [{"$ref": part.pop("$ref")}]
     return part

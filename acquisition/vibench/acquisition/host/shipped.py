@@ -1,4 +1,4 @@
-"""Where vibench's own configurations, campaigns, studies and examples lie."""
+"""Paths of the shipped configurations, campaigns, studies and examples."""
 
 import re
 from importlib.metadata import version
@@ -16,7 +16,7 @@ SUFFIX = ".toml"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file shipped with vibench, by ``name``: ``"hardware_configs/virtual_rig.toml"``.
+    """Return the path of a shipped file, by ``name``: ``"hardware_configs/virtual_rig.toml"``.
 
     Raises ConfigurationError when this installation has no such file.
     """
@@ -28,7 +28,7 @@ def shipped(name: str) -> Path:
 
 
 def shipped_folder(folder: str) -> Path:
-    """Path of a ``folder`` that comes with vibench: campaigns, hardware_configs, studies, examples.
+    """Return the path of a shipped ``folder``: campaigns, hardware_configs, studies, examples.
 
     Raises ConfigurationError when this installation has no such folder.
     """
@@ -39,24 +39,24 @@ def shipped_folder(folder: str) -> Path:
 
 
 def all_shipped(folder: str) -> tuple[Path, ...]:
-    """Every TOML file that comes with vibench in a ``folder`` such as ``"campaigns"``, by name."""
+    """Return every shipped TOML file in a ``folder`` such as ``"campaigns"``, sorted by name."""
     return tuple(sorted(shipped_folder(folder).glob(f"*{SUFFIX}")))
 
 
 def named(given: Path | str, folder: str) -> Path:
-    """Path of a user's file, or of the file in a shipped folder that a bare name like ``"quick"`` stands for.
+    """Return the path of a user's file, or of the shipped file with a bare name like ``"quick"``.
 
     Parameters
     ----------
     given
-        A path, or a name without folder and suffix; a file of the user that has this very name comes first.
+        A path, or a name without folder and suffix; a user's file with exactly this name has priority.
     folder
-        Where shipped ones lie, ``"campaigns"`` for example.
+        Folder of the shipped files, for example ``"campaigns"``.
 
     Raises
     ------
     ConfigurationError
-        When a bare name is neither; it lists the names that there are.
+        When a bare name is neither; it lists the existing names.
     """
     path = Path(given).expanduser()
     if path.suffix or path.name != str(path) or path.is_file():
@@ -71,15 +71,15 @@ def named(given: Path | str, folder: str) -> Path:
 
 
 def built_site() -> Path:
-    """Folder of the site that ``vibench docs`` builds for this version; it need not exist yet."""
+    """Return the folder of the site that ``vibench docs`` builds for this version; it may not exist yet."""
     return state_folder() / "documentation" / version("vibench")
 
 
 def documentation_page(page: str = "index") -> Path:
-    """Path of a page of the documentation on this computer, without the network.
+    """Return the path of a page of the documentation on this computer, without the network.
 
-    ``page`` is its name in ``docs`` without ``.md``: ``"gui"``, ``"campaigns"``. The page is HTML where the
-    site has been built (``vibench docs``), else the Markdown behind it.
+    ``page`` is its name in ``docs`` without ``.md``: ``"gui"``, ``"campaigns"``. The page is HTML if the
+    site has been built (``vibench docs``), otherwise Markdown.
 
     Raises ConfigurationError when there is no such page.
     """

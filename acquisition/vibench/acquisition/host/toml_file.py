@@ -1,4 +1,6 @@
-"""TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
+"""TOML files: read and validated, or refused with file, key and allowed values; written so that they read
+back.
+"""
 
 import json
 import reprlib
@@ -27,14 +29,12 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
-    """Read a TOML file as ``model``; what it names by a path is looked for beside it.
+    """Read a TOML file as ``model``; paths in it are relative to its folder.
 
-    Validators find the file's folder as ``folder`` in their context.
+    Validators get the file's folder as ``folder`` in their context.
 
-    Raises
-    ------
-    ConfigurationError
-        When the file is missing, is not TOML, or says something the model does not allow.
+    Raises ConfigurationError when the file is missing, is not TOML, or contains something that the model does
+    not allow.
     """
     try:
         content = toml_table(path)
@@ -44,19 +44,19 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
 
 def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
-    """Read what stands, or will stand, in a TOML file as ``model``; see `load_toml`."""
+    """Read the content of a TOML file as ``model``; see `load_toml`."""
     content = migrate(content, model.__name__, str(path))
     return validated(content, model, str(path), path.absolute().parent)
 
 
 MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""Name of a model, version of a file: how its content becomes that of the next version."""
+"""By name of a model and version of a file: the conversion of its content to the next version."""
 
 
 def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
-    """Bring the content of a file that says its version up to the present one.
+    """Convert the content of a file with a version to the present one.
 
-    Raises ConfigurationError when a later vibench wrote it, or what stands there is no version.
+    Raises ConfigurationError when a later vibench wrote it, or the value is not a version.
     """
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
@@ -86,7 +86,7 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 
 
 MOST_CLAUSES = 5
-"""Faults that one sentence names; further ones are counted."""
+"""Number of faults that one sentence names; further ones are counted."""
 MOST_KEYS = 12
 LONGEST_SENTENCE = 1600
 
@@ -95,16 +95,16 @@ Place = tuple[str | int, ...]
 
 
 def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
-    """Say in a clause each what a model did not allow; keys of one fault share theirs.
+    """Return a clause for each fault that a model found; keys with the same fault share one.
 
     Parameters
     ----------
     error
-        What the model said.
+        Error of the model.
     content
-        What it was given: it tells keys of the file from the model's names of kinds of value.
+        Content of the file, which distinguishes its keys from pydantic's names of types.
     within
-        Where to look; nothing is said of the rest.
+        Path to report; faults elsewhere are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
@@ -121,10 +121,10 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:
-    """Return what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
+    """Return each fault once: for a key of several types, only those of the most probable type.
 
-    A value that would be derived from a key with a fault is no fault of its own, nor is a list too short
-    without an item with a fault.
+    A value derived from a key with a fault is not reported, nor is a list that is too short without an item
+    with a fault.
     """
     said = error.errors()
     meant: dict[Place, dict[Place, list[Any]]] = {}
@@ -142,17 +142,19 @@ def _faults(error: ValidationError, content: object) -> list[Any]:
 
 
 def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
-    """Yield the faults of one kind, by the keys of the file; a single kind is one that the file names."""
+    """Yield the faults of the nearest type, by the keys of the file; a single type is one that the file
+    names.
+    """
     if len(kinds) == 1:
         return (each for each, _ in kinds[0])
     return (by_keys for _, by_keys in max(kinds, key=_nearness))
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
-    """Return which parts of a fault's place are keys of the file; the rest are kinds of value.
+    """Return which parts of a fault's path are keys of the file; the others are types.
 
-    pydantic names a kind after the key that may hold several: ``frequency_hz``, ``Range``, ``step``. A key
-    of the user's own may have the same name.
+    pydantic adds a type after a key with several: ``frequency_hz``, ``Range``, ``step``. A user's key may
+    have the same name.
     """
     place, found = fault["loc"], []
     for number, part in enumerate(place):
@@ -169,7 +171,9 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Return how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
+    """Return how near a value is to a type: a fault inside it, or in its size, is nearer than a wrong
+    type.
+    """
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
@@ -199,7 +203,7 @@ def _complaint(detail: Any) -> str:
 
 def _shown(value: object) -> str:
     longest = 60
-    # Written whole, a list of a million numbers would take longer than all else.
+    # Written as a whole, a list of a million numbers would take too long.
     match value:
         case list() | tuple() | dict():
             text = reprlib.repr(value)
@@ -218,7 +222,7 @@ Table = Mapping[str, Value]
 
 
 def toml_text(model: BaseModel) -> str:
-    """Write ``model`` as TOML: tables for models, arrays of tables for tuples of models.
+    """Return ``model`` as TOML: tables for models, arrays of tables for tuples of models.
 
     Absent values (None) are left out, as TOML has none; floats keep every digit.
     """
@@ -227,12 +231,9 @@ def toml_text(model: BaseModel) -> str:
 
 
 def save_toml(model: BaseModel, path: Path) -> None:
-    """Write ``model`` to a file, in folders that are made where they are missing.
+    """Write ``model`` to a file, and create missing folders.
 
-    Raises
-    ------
-    ConfigurationError
-        When the file cannot be written.
+    Raises ConfigurationError when the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -276,7 +277,7 @@ def _is_nested(value: Value) -> bool:
 def _value(value: Value) -> str:
     match value:
         case str():
-            # JSON's escapes are TOML's, except for DEL, which only TOML wants escaped.
+            # JSON's escapes are TOML's, except for DEL, which only TOML requires to be escaped.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case bool():
             return "true" if value else "false"

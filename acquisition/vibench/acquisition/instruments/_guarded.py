@@ -1,7 +1,6 @@
-"""Guard for foreign instruments: an exception or value against the protocol becomes an error in words.
+"""Guard for plug-ins: an exception or value that violates the protocol becomes one sentence.
 
-Our own drivers are not guarded: what they raise beyond their promises is a mistake of ours, and its traceback
-is what mends it.
+Our own drivers are not guarded: an unexpected exception is our error and needs its traceback.
 """
 
 import sys
@@ -20,7 +19,7 @@ from ._protocols import Digitizer
 
 
 class PlugInKind(StrEnum):
-    """What a plug-in is; the value is the group of its entry point."""
+    """Kind of a plug-in; the value is the group of its entry point."""
 
     GENERATOR = "vibench.generators"
     DIGITIZER = "vibench.digitizers"
@@ -28,21 +27,21 @@ class PlugInKind(StrEnum):
     CONTROLLER = "vibench.controllers"
     SENSOR = "vibench.sensors"
     EXCITATION = "vibench.excitations"
-    """The plan of a kind of measurement; its name here and below is the word in a plan."""
+    """The plan of a kind of measurement; its name, here and below, is the ``kind`` in a plan."""
     FEEDBACK = "vibench.feedback"
     """The controller of a kind of measurement with feedback."""
     ANALYSIS = "vibench.analyses"
     DRAWING = "vibench.drawings"
     DRIVE = "vibench.drives"
-    """What plays in the generator's place, by the table of the hardware configuration."""
+    """A source that plays instead of the generator, by its table in the hardware configuration."""
     VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
-    """The simulation of such a drive, by the same table."""
+    """The simulation of such a source, by the same table."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
-# Rows here, and not of our own installed metadata: a checkout whose instruments change needs no new
-# installation (docs/decisions/0053-instruments-by-plug-in.md).
+# Rows here instead of our own metadata: a checkout with other instruments needs no new installation
+# (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
     EntryPoint(name, target, kind)
     for kind, name, target in (
@@ -65,11 +64,11 @@ OURS = tuple(
 FOUND_IN: Mapping[str, str] = MappingProxyType(
     dict.fromkeys(("branch_continuation", "controller", "lines"), "fast_loop")
 )
-"""Names of what our own extensions offer: each with its folder in ``extensions``."""
+"""Names that our extensions provide, each with its folder in ``extensions``."""
 
 
 def missing_package(name: str) -> str | None:
-    """Return the sentence that names our package for something that is not installed.
+    """Return the sentence that names our package for a name that is not installed.
 
     Parameters
     ----------
@@ -78,7 +77,7 @@ def missing_package(name: str) -> str | None:
 
     Returns
     -------
-    The sentence; None where no package of ours offers that name.
+    The sentence; None if no package of ours provides that name.
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -91,7 +90,7 @@ def missing_package(name: str) -> str | None:
 
 
 def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
-    """Names that a hardware configuration may give, ours and those of installed packages.
+    """Return the names that a hardware configuration may use, ours and those of installed packages.
 
     Parameters
     ----------
@@ -102,25 +101,25 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
 
 
 def plug_in(kind: PlugInKind, name: str) -> Any:
-    """Load what an entry point names.
+    """Load the object of an entry point.
 
     Parameters
     ----------
     kind
         Group of entry points.
     name
-        Word of the hardware configuration.
+        Name in the hardware configuration.
 
     Raises
     ------
     ConfigurationError
-        When no package offers the name, two do, or the package that does cannot be imported.
+        When no package provides the name, two do, or the package cannot be imported.
     """
     found = {row.value: row for row in _rows(kind) if row.name == name}
     if not found:
         raise ConfigurationError(
             missing_package(name)
-            or f"{name!r} is no instrument of {kind.value}: {', '.join(plug_in_names(kind))} are installed. "
+            or f"{name!r} is not a name of {kind.value}: {', '.join(plug_in_names(kind))} are installed. "
             "Correct the driver in the hardware configuration, or install the package that offers it"
         )
     if len(found) > 1:
@@ -130,7 +129,7 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     (row,) = found.values()
     try:
         return row.load()
-    except Exception as error:  # a stranger's module may raise whatever it likes
+    except Exception as error:  # a plug-in's module may raise anything
         raise ConfigurationError(
             f"{name!r} of {kind.value} is {row.value}, which cannot be loaded "
             f"({type(error).__name__}: {error}); install what its package needs, or correct its entry point"
@@ -143,22 +142,22 @@ def _rows(kind: PlugInKind) -> tuple[EntryPoint, ...]:
 
 @lru_cache(maxsize=1)
 def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
-    """Read what installed packages offer, once for a path: each channel asks, and a look takes 6 ms."""
+    """Read the entry points of installed packages, once for each path, because it takes 6 ms."""
     offered = entry_points()
     return {kind: tuple(offered.select(group=kind.value)) for kind in PlugInKind}
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
-    """Load a driver; one that is not ours is held to what it promises.
+    """Load a driver, with a guard if it is not ours.
 
     Parameters
     ----------
     kind
         Group of entry points.
     name
-        Word of the hardware configuration.
+        Name in the hardware configuration.
     promise
-        Protocol of what the entry point names.
+        Protocol of the entry point's object.
 
     Raises
     ------
@@ -172,16 +171,16 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
 
 _SILENCING = {"stop", "close", "silence"}
 _ADVICE = (
-    "Have its package mended and run its contract tests (docs/instruments.md), or name another driver in the "
+    "Correct its package and run its contract tests (docs/instruments.md), or name another driver in the "
     "hardware configuration"
 )
 
 
 class Guarded:
-    """Stands before an instrument, or a driver, and lets through what its protocol promises."""
+    """Wraps an instrument or a driver, and returns only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
-        """``name`` is for sentences: ``"'plain_scpi' of vibench.generators"``."""
+        """``name`` for errors: ``"'plain_scpi' of vibench.generators"``."""
         self._held = held
         self._promise = promise
         self._name = name
@@ -192,11 +191,10 @@ class Guarded:
         return self._let_through(member)
 
     def __call__(self, *given: Any) -> Any:
-        """Ask a plug-in that is a function."""
         return self._let_through("__call__")(*given)
 
     def bare(self) -> Any:
-        """Return what is guarded."""
+        """Return the wrapped object."""
         return self._held
 
     def _let_through(self, member: str) -> Any:
@@ -213,7 +211,7 @@ class Guarded:
             return attempt()
         except AcquisitionError:
             raise
-        except (Exception, SystemExit) as error:  # a stranger's code may raise whatever it likes
+        except (Exception, SystemExit) as error:  # a plug-in's code may raise anything
             raise self._broken(member, f"{type(error).__name__}: {error}") from error
 
     def _as_promised(self, member: str, hint: Any, found: Any) -> Any:
@@ -234,7 +232,7 @@ class Guarded:
 
 
 def _taken(hint: Any, value: Any) -> Any:
-    """Take a value as its type, a data class of ours field by field; raises TypeError or ValueError."""
+    """Convert a value to its type, a data class of ours field by field; raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
         return _taken_part(name, hint, value)
@@ -256,7 +254,6 @@ def _taken_part(name: str, hint: Any, value: object) -> Any:
 
 @cache
 def _return_types(promise: type) -> dict[str, Any]:
-    """Return what each member of a protocol returns."""
     members = {name: getattr(promise, name) for name in dir(promise) if name == "__call__" or name[0] != "_"}
     functions = {name: each.fget if isinstance(each, property) else each for name, each in members.items()}
     return {name: _hints(each).get("return", Any) for name, each in functions.items()}
@@ -277,5 +274,5 @@ def _adapter(hint: Any) -> TypeAdapter[Any]:
 
 
 def _bare(given: Any) -> Any:
-    """Return an instrument to its own package as it is."""
+    """Return an instrument without its guard, for its own package."""
     return given.bare() if isinstance(given, Guarded) else given

@@ -1,4 +1,4 @@
-"""What a bench needs of its instruments: the promises that every driver keeps."""
+"""Protocols of a bench's instruments, which every driver implements."""
 
 from dataclasses import dataclass
 from datetime import date
@@ -19,16 +19,16 @@ Counts = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Identity:
-    """Who an instrument says it is, kept with every recording."""
+    """Identity that an instrument reports, stored with every recording."""
 
     maker: str
     model: str
     serial: str
     firmware: str
     reply: str
-    """The whole reply, as it came."""
+    """The whole reply, unchanged."""
     origin: str = ""
-    """``"simulated"`` or ``"imported"`` where the instrument knows that its numbers are; else empty."""
+    """``"simulated"`` or ``"imported"`` if the instrument knows that its numbers are; otherwise empty."""
 
 
 class Knob(FrozenModel):
@@ -41,7 +41,7 @@ class Knob(FrozenModel):
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """A converter that was found."""
+    """A converter found by a search."""
 
     name: str
     """For ``daq.device``."""
@@ -49,13 +49,13 @@ class FoundDevice:
     """For ``daq.product``."""
     serial: str
     inputs: tuple[str, ...]
-    """For ``daq.channels.physical``, the part behind the slash."""
+    """For ``daq.channels.physical``, the part after the slash."""
     outputs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Overload:
-    """An input past 95 % of its range: which channel, and which samples of the run."""
+    """An input above 95 % of its range: its channel, and the samples of the run."""
 
     channel: str
     """Role of the channel, ``"m0_velocity"`` for example."""
@@ -66,7 +66,7 @@ class Overload:
 
 @dataclass(frozen=True)
 class Block:
-    """Samples handed over at once, for all channels, without a gap to the block before."""
+    """Samples of all channels from one read, without a gap to the block before."""
 
     first_sample: int
     """Position of the first sample in the run."""
@@ -74,8 +74,8 @@ class Block:
     """Shape (channels, samples) [V] at the converter's input."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
-    """The converter's own numbers, where volts are these times `Digitizer.volts_per_count`: recorded as they
-    are. None where the converter gives volts only."""
+    """The converter's integers, if volts are these times `Digitizer.volts_per_count`: recorded unchanged.
+    None if the converter gives only volts."""
 
 
 def _not_zero(units: float) -> float:
@@ -89,7 +89,7 @@ class SensorFacts:
     """How a sensor turns its quantity into volts."""
 
     quantity: str
-    """``"voltage"``, ``"acceleration"`` or ``"velocity"``: what the role of its channel records."""
+    """``"voltage"``, ``"acceleration"`` or ``"velocity"``: the quantity of the channel's role."""
     unit: str
     """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: Annotated[float, AfterValidator(_not_zero)]
@@ -98,7 +98,7 @@ class SensorFacts:
     name: str
     serial: str = ""
     delay_s: Annotated[float, Field(ge=0)] = 0.0
-    """How much later its volts are than the quantity [s]."""
+    """Delay of its volts after the quantity [s]."""
     calibrated: date | None = None
 
 
@@ -106,7 +106,7 @@ Time = TypeVar("Time", float, Samples)
 
 
 class Spacing(StrEnum):
-    """How the frequency moves with time."""
+    """Frequency over time."""
 
     LINEAR = "linear"
     """The same number of hertz in every second."""
@@ -116,7 +116,7 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep that a generator makes by itself, or the course that a computer steps along."""
+    """A generator's own sweep, or the ideal sweep for the computer's steps."""
 
     start_hz: float
     stop_hz: float
@@ -124,7 +124,7 @@ class Sweep:
     spacing: Spacing = Spacing.LINEAR
 
     def cycles(self, time_s: Time) -> Time:
-        """Cycles since its start, in closed form, at a time or at many."""
+        """Return the cycles since its start, in closed form, at one or several times."""
         match self.spacing:
             case Spacing.LINEAR:
                 rate = (self.stop_hz - self.start_hz) / self.duration_s
@@ -137,19 +137,19 @@ class Sweep:
 
 @dataclass(frozen=True)
 class GeneratorDescription:
-    """What a kind of generator can do, known before any is opened: plans are checked against it."""
+    """Abilities of a model of generator, known before it is opened: plans are checked with them."""
 
     name: str
     """For sentences: ``"AFG1022"``."""
     amplitude_range_vpp: tuple[float, float]
-    """Smallest and largest setting with the load that the configuration declares, peak to peak [V]."""
+    """Smallest and largest setting at the configured load, peak to peak [V]."""
     highest_sine_hz: float
     memory_points: tuple[int, int]
     """Fewest and most points of one period of a waveform."""
     usb_ids: tuple[tuple[int, int], ...] = ()
-    """Numbers of maker and product by which it is found on the USB bus."""
+    """Numbers of maker and product on the USB bus."""
     longest_sweep_s: float = 0.0
-    """Longest sweep that it makes by itself [s]; 0 where it makes none."""
+    """Longest internal sweep [s]; 0 without one."""
 
 
 class FunctionGenerator(Protocol):
@@ -160,15 +160,15 @@ class FunctionGenerator(Protocol):
 
     @property
     def identity(self) -> Identity:
-        """Who answered ``*IDN?``."""
+        """Reply to ``*IDN?``."""
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Settings that could be neither made nor read remotely: the operator must confirm them."""
+        """Settings that could neither be made nor read remotely: the operator must confirm them."""
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """Smallest and largest amplitude that may be set here, peak to peak [V]."""
+        """Smallest and largest amplitude that this bench allows, peak to peak [V]."""
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
@@ -179,42 +179,40 @@ class FunctionGenerator(Protocol):
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Set up a sine that stays at the start until `trigger`, sweeps, and stays at the stop.
 
-        Raises
-        ------
-        LimitExceeded
-            When the generator makes no such sweep by itself; see `GeneratorDescription.longest_sweep_s`.
+        Raises LimitExceeded when the generator has no such internal sweep; see
+        `GeneratorDescription.longest_sweep_s`.
         """
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Change the frequency of what is playing; the phase goes on without a jump."""
+        """Change the frequency during the drive, without a jump of the phase."""
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Change the peak-to-peak amplitude of what is playing."""
+        """Change the peak-to-peak amplitude during the drive."""
 
     def arm_burst(self, cycles: int) -> None:
-        """Play this many periods at each `trigger` instead of playing on; 0 V before and after."""
+        """Play this many periods at each `trigger`, with 0 V before and after."""
 
     def trigger(self) -> None:
         """Fire an armed burst, or begin a sweep."""
 
     def end_burst(self) -> None:
-        """Play on without a trigger."""
+        """Play continuously, without triggers."""
 
     def measured_latency_s(self) -> float:
-        """How long one verified change of amplitude takes: the floor of any step, ramp and stop [s]."""
+        """Return how long one verified change of amplitude takes: the shortest step, ramp and stop [s]."""
 
     def start(self) -> None:
         """Turn the output on."""
 
     def stop(self) -> None:
-        """Turn the output off. Legal at any time, in any state; never gives up silently."""
+        """Turn the output off. Legal at any time, in any state; never fails silently."""
 
     def close(self) -> None:
-        """Output off, connection closed."""
+        """Switch the output off and close the connection."""
 
 
 class Digitizer(Protocol):
-    """A converter that samples voltages continuously, without a gap."""
+    """A converter that samples voltages continuously, without gaps."""
 
     @property
     def identity(self) -> Identity:
@@ -222,7 +220,7 @@ class Digitizer(Protocol):
 
     @property
     def sample_rate_hz(self) -> float:
-        """The rate that the hardware really runs at, read back from it."""
+        """The real sample rate, read back from the hardware."""
 
     @property
     def roles(self) -> tuple[str, ...]:
@@ -230,25 +228,23 @@ class Digitizer(Protocol):
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
+        """Step of the converter for each channel [V]; None where volts are not multiples of one step."""
 
     def start(self) -> None:
         """Begin sampling; the first sample of the run is sample 0."""
 
     def read(self, samples: int) -> Block:
-        """Wait for the next ``samples`` of every channel and hand them over.
+        """Wait for the next ``samples`` of every channel and return them.
 
-        Raises
-        ------
-        DataLost
-            When samples were overwritten before they were read.
-        InstrumentLost
-            When the device or its server is gone.
+        Raises DataLost when samples were overwritten before they were read, and InstrumentLost when the
+        device or its server is gone.
         """
 
     @property
     def waiting_samples(self) -> int:
-        """How many samples of every channel are converted and not read yet; it takes no time to read them."""
+        """Return the number of converted samples of every channel that are not read yet, which can be read at
+        once.
+        """
 
     def stop(self) -> None:
         """End sampling. Legal at any time."""
@@ -258,7 +254,7 @@ class Digitizer(Protocol):
 
 
 class IdleOutput(StrEnum):
-    """What an output does by itself when nobody feeds it any more."""
+    """Voltage of an output that gets no more samples."""
 
     ZERO = "goes to zero volts"
     HELD = "holds its last value"
@@ -273,25 +269,25 @@ class AnalogOutput(Protocol):
 
     @property
     def sample_rate_hz(self) -> float:
-        """The rate that the hardware really runs at."""
+        """The real sample rate."""
 
     @property
     def idle(self) -> IdleOutput:
-        """What the device does when it runs dry, or its program dies."""
+        """State of the output when it runs empty, or its program dies."""
 
     @property
     def ahead_samples(self) -> int:
-        """How many samples can be written in front of what is being played."""
+        """Largest number of samples ahead of the one being played."""
 
     def write(self, volts: Samples) -> None:
-        """Put samples behind those that are still to be played; wait for room when there is none.
+        """Add samples behind those still to be played; wait for room if there is none.
 
         Raises
         ------
         LimitExceeded
-            When a sample is past the limit of the bench. Nothing was written.
+            When a sample is beyond the limit of the bench. Nothing was written.
         DataLost
-            When the output ran dry: it has stopped.
+            When the output ran empty: it has stopped.
         """
 
     def arm(self) -> None:
@@ -301,34 +297,35 @@ class AnalogOutput(Protocol):
         """Go to zero volts at once. Legal at any time; the next `write` begins a new stream."""
 
     def close(self) -> None:
-        """Zero volts, device released. Legal at any time."""
+        """Go to zero volts and release the device. Legal at any time."""
 
 
 class RealTimeController(Protocol):
-    """An instrument that plays in the generator's place and closes a loop of its own."""
+    """An instrument that plays instead of the generator, with its own feedback loop."""
 
     @property
     def identity(self) -> Identity:
-        """Who answered."""
+        """Identity of the controller."""
 
     def close(self) -> None:
-        """Silence, connection closed. Legal at any time."""
+        """Silence the drive and close the connection. Legal at any time."""
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
-    """Read a block that holds samples: a caller that waits for more of them would wait for ever.
+    """Read a block, and refuse an empty one: a caller that waits for more samples would wait for ever.
 
     Parameters
     ----------
     digitizer
-        Samples are being converted.
+        A converter that is sampling.
     samples
-        How many of every channel.
+        Number of samples of every channel.
 
     Raises
     ------
     InstrumentError
-        When the block holds none, of other channels, or no finite volts; or what `Digitizer.read` raises.
+        When the block is empty, has other channels, or contains volts that are not finite; or the errors of
+        `Digitizer.read`.
     """
     block = digitizer.read(samples)
     rows = len(digitizer.roles)

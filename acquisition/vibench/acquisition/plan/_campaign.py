@@ -1,6 +1,6 @@
-"""What to measure, in order: measurements and nested sweeps, and the TOML file that says them.
+"""Measurements and nested sweeps in order, and the TOML file that contains them.
 
-What is tried again, and how often, when nobody is there to ask.
+Also which failures are tried again, and how often.
 """
 
 from collections import Counter
@@ -19,7 +19,7 @@ from ._sweep import Sweep
 
 
 class Retryable(StrEnum):
-    """Failures that another attempt may mend."""
+    """Failures after which another attempt may succeed."""
 
     DATA_LOST = "data_lost"
     """Samples were overwritten before they were read."""
@@ -28,40 +28,40 @@ class Retryable(StrEnum):
     INSTRUMENT_FAULT = "instrument_fault"
     """An instrument refused a command, or is held by another program; the bench is opened again first."""
     CHECK_FAILED = "check_failed"
-    """The bench did not answer at low level as it should."""
+    """The check at low level before the recording failed."""
     LIMIT = "limit"
     """A measured value passed a limit."""
     OVER_RANGE = "over_range"
-    """The recording is complete, but an input was near its full scale while it counted."""
+    """The recording is complete, but an input was near its full scale in a recorded segment."""
 
 
 class RetryPolicy(FrozenModel):
-    """How often a point is tried, and after which failures."""
+    """Number of attempts at a point, and the failures after which it is tried again."""
 
     attempts: PositiveInt = Field(default=1, le=100)
-    """At each point, the first one included; every attempt is a file of its own."""
+    """Attempts at each point, including the first; every attempt has a separate file."""
     on: tuple[Retryable, ...] = (Retryable.DATA_LOST, Retryable.INSTRUMENT_LOST, Retryable.INSTRUMENT_FAULT)
     reopen_for_s: NonNegativeFloat = Field(default=60.0, le=86400)
-    """How long a lost instrument is looked for before the campaign ends [s]."""
+    """How long to search for a lost instrument before the campaign ends [s]."""
 
 
 BYTES_PER_SAMPLE = 4
-"""A recording keeps the converter's counts as 32-bit integers while it runs; the finished file is smaller."""
+"""A growing recording stores the converter's counts as 32-bit integers; the finished file is smaller."""
 
 
 class Campaign(FrozenModel):
     """Measurements to be made one after the other, and sweeps after them.
 
-    In a file, ``[defaults]`` holds what all measurements share, and ``[defaults.<kind>]`` what all
-    excitations of one kind share; a measurement's own values come first, and so do a sweep's. The
-    campaign itself has every value in its place. A file holds values and nothing that could be run.
+    In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` for all
+    excitations of one kind; a measurement's or sweep's own values have priority. The campaign itself
+    contains every value. A file contains values and nothing that could be executed.
     """
 
     name: Name
     notes: str = ""
     retry: RetryPolicy = RetryPolicy()
     rest_s: NonNegativeFloat = Field(default=0.0, le=86400)
-    """Silence between two recordings [s]: specimen and amplifier cool."""
+    """Pause between two recordings [s], in which specimen and amplifier cool."""
     measurements: tuple[Measurement, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
 
@@ -96,12 +96,12 @@ class Campaign(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """Every recording that is wanted, in order: measurements, then sweeps."""
+        """All planned recordings, in order: measurements, then sweeps."""
         listed = (Point(name, each) for each in self.measurements for name in _names(each))
         return (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
 
     def recordings(self) -> tuple[tuple[str, Measurement], ...]:
-        """Name of each recording, and the measurement it is one of, in order."""
+        """Name and measurement of each recording, in order."""
         return tuple((point.name, point.measurement) for point in self.points())
 
     def recording_names(self) -> tuple[str, ...]:
@@ -110,17 +110,17 @@ class Campaign(FrozenModel):
 
     @property
     def duration_s(self) -> float:
-        """Time of all measurements with their ramps, one bench check each, and rests in between [s]."""
+        """Time of all measurements with their ramps, one bench check each, and pauses in between [s]."""
         points = self.points()
         return _recorded_s(points) + self.rest_s * (len(points) - 1)
 
     def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
-        """Disk space of all recordings while they are made; compressed afterwards, they need less."""
+        """Disk space of all growing recordings [bytes]; finished ones need less."""
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
 def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Return the first of all points that are played alike: what limits say of it holds for the others."""
+    """Return the first of all points with the same drive: its limit checks hold for the others."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats"}), point)
@@ -132,12 +132,9 @@ def _recorded_s(points: tuple[Point, ...]) -> float:
 
 
 def load_campaign(path: Path | str) -> Campaign:
-    """Read a campaign: a TOML file, or by its name (``"quick"``) one that comes with vibench.
+    """Read a campaign: a TOML file, or a shipped one by its name (``"quick"``).
 
-    Raises
-    ------
-    ConfigurationError
-        With file, key, what was given and what is allowed.
+    Raises ConfigurationError with file, key, what was given and what is allowed.
     """
     return load_toml(named(path, "campaigns"), Campaign)
 
@@ -149,13 +146,12 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
 
 
 def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
-    """Return a list as it stands; what is none is left for the validation to refuse."""
+    """Return a list unchanged; for other types an empty one, so that the validation refuses them."""
     given = content.get(key, [])
     return list(given) if isinstance(given, list | tuple) else [given]
 
 
 def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
-    """Put the defaults underneath a sweep's template, and underneath each of its excitations."""
     match sweep:
         case {"measurement": dict(template), **rest}:
             others = [
@@ -168,16 +164,17 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
 
 
 def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
-    """Return what excitations of a kind share; ValueError when it is no table."""
+    """Return the defaults of one kind of excitation; ValueError if they are not a table."""
     match defaults.get(present_word(str(kind)), {}):
         case dict(shared):
             return shared
         case _:
-            raise ValueError(f"defaults.{kind} is no table; write [defaults.{kind}] and its values below it")
+            raise ValueError(
+                f"defaults.{kind} is not a table; write [defaults.{kind}] and its values below it"
+            )
 
 
 def _with_defaults(measurement: object, defaults: Mapping[str, Any]) -> object:
-    """Put the defaults underneath a measurement's own values."""
     match measurement:
         case dict():
             shared = {key: value for key, value in defaults.items() if key not in EXCITATION_KINDS}

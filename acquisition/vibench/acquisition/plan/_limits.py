@@ -1,4 +1,4 @@
-"""The safety envelope: what a plan would do to the rig, next to what the rig survives."""
+"""Predicted effect of a plan on the rig, compared with the rig's limits."""
 
 import math
 from collections.abc import Iterator
@@ -45,13 +45,13 @@ from ._schedule import (
 )
 
 _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
-"""What of a plan is heard in its recording."""
+"""Fields of a plan that determine its recording."""
 
 
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
-    """Refuse to play a recording back under a plan that it was not made with: it would be called its result.
+    """Refuse to replay a recording with another plan than its own, whose result it would seem to be.
 
-    Raises ConfigurationError. What was imported, or planned by another version, has no plan to compare.
+    Raises ConfigurationError. Imported recordings, and plans of another version, cannot be compared.
     """
     path = rig.daq.options.get("recording")
     if not rig.plays_back or not isinstance(path, str):
@@ -69,7 +69,7 @@ def require_own_plan(measurement: Measurement, rig: Rig) -> None:
 
 
 RAMP_PERIODS = 3.0
-"""A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
+"""Smallest number of periods of the shaker's suspension in a ramp; a shorter one acts like a step."""
 USABLE_BANDWIDTH = 0.45
 """Share of the sample rate below which a converter with an anti-alias filter is flat (NI 9234: 0.45)."""
 
@@ -82,38 +82,38 @@ class LimitSide(StrEnum):
 
 
 class Consequence(StrEnum):
-    """What follows when a limit would be passed."""
+    """What happens when a limit would be exceeded."""
 
     REFUSED = "refused"
     """The plan is not played."""
     TOLD = "told"
-    """It is said beforehand, and marked in the recording if it comes true."""
+    """It is reported beforehand, and marked in the recording if it occurs."""
 
 
 _DIGITS = 6
-"""Digits of a value beside its limit: 8200 points and 8192 must not look alike."""
+"""Digits of a value beside its limit, enough to distinguish 8200 points from 8192."""
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """One predicted value beside its limit."""
+    """One predicted value, with its limit."""
 
     what: str
     value: float
     limit: float
     unit: str
     source: str
-    """Where the limit comes from."""
+    """Source of the limit."""
     remedy: str
     """What to change when it is exceeded."""
     side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
     load: BaseQuantity | None = None
-    """Of which the value is the peak; None for any other value."""
+    """Quantity whose peak the value is; None for any other value."""
 
     @property
     def use(self) -> float:
-        """How much of the limit is used: above 1 is too much."""
+        """Share of the limit that is used; above 1 is too much."""
         match self.side:
             case LimitSide.AT_MOST:
                 return self.value / self.limit if self.limit else math.inf
@@ -127,11 +127,11 @@ class LimitCheck:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the value is allowed; a value on the limit is, except for rounding."""
+        """Whether the value is allowed; a value on the limit is allowed, except for rounding."""
         return self.use <= 1 + 1e-9
 
     def complaint(self) -> str:
-        """Say the violation in one clause."""
+        """Return the violation in one clause."""
         return (
             f"{self.what} would be {self.value:.{_DIGITS}g} {self.unit}, allowed is {self.side.value} "
             f"{self.limit:.{_DIGITS}g} {self.unit} ({self.source}): {self.remedy}"
@@ -139,7 +139,7 @@ class LimitCheck:
 
 
 def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Every predicted load of ``measurement`` beside the limit of ``rig`` it must keep."""
+    """Return every predicted load of ``measurement`` with its limit on ``rig``."""
     loads = predicted_loads(measurement.excitation, rig)
     return (
         *_settings(measurement, rig),
@@ -149,7 +149,7 @@ def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
 
 
 def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Refuse a measurement that would pass any limit of the rig.
+    """Refuse a measurement that would exceed any limit of the rig.
 
     Raises
     ------
@@ -237,7 +237,6 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
 
 
 def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck]:
-    """Check what only the kind of generator limits."""
     can = generator_driver(rig.generator).describe(rig.generator)
     setting = "the setting beside what the generator can"
     most_vpp, range_of = can.amplitude_range_vpp[1], f"range of the {can.name}"
@@ -263,7 +262,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
 
 
 def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
-    """Check that the settings which held levels need, by the rig's model, are within the plan's largest."""
+    """Check that the settings for held levels, by the rig's model, are within the plan's largest."""
     needed = [
         (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
         for frequency_hz, acceleration in measurement.excitation.held_accelerations()
@@ -281,7 +280,6 @@ def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
 
 
 def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iterator[LimitCheck]:
-    """Check what only the analogue output limits."""
     excitation = measurement.excitation
     yield LimitCheck(
         "the analogue output's voltage (peak)",
@@ -332,7 +330,7 @@ def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCh
 
 
 def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
-    """Check the estimate of the specimen's motion against its springs and the vibrometer."""
+    """Check the estimated motion of the specimen against its springs and the vibrometer."""
     amplitude, velocity = loads[BaseQuantity.AMPLITUDE], loads[BaseQuantity.M0_VELOCITY]
     limit = rig.specimen.amplitude_limit_m
     yield LimitCheck(
@@ -359,7 +357,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
 
 
 def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: float) -> Iterator[LimitCheck]:
-    """Whether the converter can show what is predicted of the rig."""
+    """Check that the converter can show the predicted values."""
     peaks = {
         Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
         Role.AMPLIFIER_VOLTAGE: amplifier_v,
@@ -378,13 +376,13 @@ def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: fl
 
 
 TOUCH_SHARE = 0.25
-"""Part of the gap that p may take in a check: a sine started at once overshoots, and collisions last."""
+"""Share of the gap that p may reach in a check: a sine started at once overshoots, and impacts last."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""A specimen's resonances are known to some per cent, and beside one the base moves by decibels."""
+"""A specimen's resonances are known to some per cent, and near one the base moves by decibels."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
-    """Lower a check's sine until p stays within a quarter of the gap, down to 10 mV at least [V].
+    """Lower a check's sine until p stays within a quarter of the gap, but not below 10 mV [V].
 
     Parameters
     ----------
@@ -400,12 +398,12 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
 
 
 def run_check_vpp(planned_vpp: float, rig: Rig) -> float:
-    """Amplitude of a run's own check for a plan at ``planned_vpp``, never above it [V]."""
+    """Return the amplitude of a run's own check for a plan at ``planned_vpp``, never above it [V]."""
     return min(planned_vpp, check_amplitude_vpp(max(CHECK_FRACTION * planned_vpp, CHECK_LOWEST_VPP), rig))
 
 
 def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phase]:
-    """Lay out the check of the bench: listen in silence, let a small sine settle, listen to it."""
+    """Return the phases of the check: measure silence, let a small sine settle, measure it."""
     planned_vpp = measurement.excitation.amplitude_vpp
     amplitude_vpp = run_check_vpp(planned_vpp, rig)
     tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
@@ -422,17 +420,17 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
 def expected_under_check(
     rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
 ) -> ComplexArray:
-    """Return what a check may find of a quantity, as phasors over the voltage's phase; shape (n,).
+    """Return the expected values of a quantity in a check, as phasors over the voltage's phase; shape (n,).
 
-    One for each of some specimens whose resonances lie up to 3 % elsewhere; where p comes near a stop all the
-    same, also with m1 held to m2.
+    One for each of several specimens whose resonances are up to 3 % higher or lower; if p still comes near a
+    stop, also with m1 bound to m2.
 
     Parameters
     ----------
     terminal_v
         Peak at the generator's terminal [V].
     quantity
-        Of base or specimen, which says the unit: SI, such as m/s2 for an acceleration.
+        Quantity of base or specimen, in SI units, such as m/s2 for an acceleration.
     """
     model = RigModel(rig)
     free = terminal_v * model.transfer(quantity, _KNOWN_HZ)
@@ -443,14 +441,14 @@ def expected_under_check(
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Return the amplitude among what is expected that lies nearest to a measured one [m/s2].
+    """Return the expected amplitude that is nearest to a measured one [m/s2].
 
     Parameters
     ----------
     measured
         Amplitude of the base [m/s2].
     expected
-        As `expected_under_check` gives it, shape (n,) [m/s2].
+        From `expected_under_check`, shape (n,) [m/s2].
     """
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

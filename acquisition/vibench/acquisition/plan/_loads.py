@@ -1,8 +1,8 @@
-"""What a plan will do to the rig, before anything moves: peaks through the rig's model.
+"""Predicted peaks of a plan on the rig, from the rig's model.
 
-Exact where p stays inside the gap; where it does not, the fundamental of a motion whose p is held at the gap.
-Impacts add to it; tests/acquisition/plan/test_specimen_loads.py says how much. What moves in fact is watched
-while it runs.
+Exact while p stays inside the gap; otherwise the fundamental of a motion whose p is limited to the gap.
+Impacts add to it; tests/acquisition/plan/test_specimen_loads.py has the amounts. The real motion is watched
+during the run.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -28,12 +28,15 @@ from ..excitation.steps import (
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
-"""A held waveform is followed to twice its playback rate: the images above are below 1/20 of the band
-and the table answers them ever less."""
+"""A held waveform is computed to twice its playback rate: the images above are below 1/20 of the band, and
+the table's response to them decreases.
+"""
 PASSED_LEVELS = np.arange(1, 17) / 16
-"""Shares of a tone's level that are looked at: ramps pass them, and with stops more level may move less."""
+"""Shares of a tone's level that are computed: ramps pass them, and with stops a higher level may move
+less.
+"""
 BAND_POINTS = 2000
-"""Frequencies over which the mean square of streamed noise is summed."""
+"""Number of frequencies for the mean square of streamed noise."""
 
 Floats: TypeAlias = NDArray[np.float64]
 Transfer: TypeAlias = Callable[[Floats], ComplexArray]
@@ -42,14 +45,14 @@ Transfer: TypeAlias = Callable[[Floats], ComplexArray]
 
 @dataclass(frozen=True)
 class Load:
-    """The largest a quantity becomes while a plan plays."""
+    """Largest value of a quantity while a plan plays."""
 
     peak: float
     """SI unit of the quantity."""
     rms: float
-    """Over the worst steady stretch; SI unit of the quantity."""
+    """Over the largest steady stretch; SI unit of the quantity."""
     cause: str
-    """What in the plan does it: ``"at 150 Hz"``."""
+    """Part of the plan that causes it: ``"at 150 Hz"``."""
 
 
 Loads: TypeAlias = Mapping[BaseQuantity, Load]
@@ -57,15 +60,15 @@ Loads: TypeAlias = Mapping[BaseQuantity, Load]
 
 
 def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
-    """Peak and rms of every quantity of rig and specimen while ``excitation`` plays, steady state.
+    """Return peak and rms of every quantity of rig and specimen while ``excitation`` plays, steady state.
 
-    By frequency for sines, by Fourier lines summed in time for periodic waveforms (the images of the
-    generator's hold included). Streamed noise is Gaussian: its peak is taken as its own crest factor times
-    the rms value. Ramps stay below by their half-cosine shape.
+    By frequency for sines, by Fourier lines summed in time for periodic waveforms (including the images of
+    the generator's hold). Streamed noise is Gaussian: its peak is its own crest factor times the rms value.
+    Ramps stay below by their half-cosine shape.
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
-    # All different tones, waveforms and sources of streams of a plan, at their loudest.
+    # All different tones, waveforms and sources of streams of a plan, at their highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(model, terminal_v, partial(_of_waveform, each, number), _lines_hz(each))
@@ -81,7 +84,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
 
 
 def terminal_volts(excitation: Excitation, rig: Rig) -> float:
-    """Peak at the generator's terminal at the largest setting of the plan [V]."""
+    """Return the peak at the generator's terminal at the largest setting of the plan [V]."""
     return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
 
 
@@ -111,7 +114,7 @@ def _of_tones(model: RigModel, quantity: BaseQuantity, tones: list[Tone], termin
 
 
 class _BroadPlay:
-    """A waveform or stream: the specimen is free where its p stays inside the gap, else held by the stops."""
+    """A waveform or stream: free motion if its p stays inside the gap, otherwise limited by the stops."""
 
     def __init__(
         self, model: RigModel, terminal_v: float, follow: Callable[[Transfer], Load], band_hz: Floats
@@ -126,7 +129,7 @@ class _BroadPlay:
         if not self._touches:
             return self._through(self._model.transfer, quantity)
         stuck = self._through(self._model.stuck_transfer, quantity)
-        # A p at the gap, wherever in the band it moves.
+        # A p at the gap, at any frequency of the band.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
@@ -146,11 +149,10 @@ def _band_hz(source: SampleSource) -> Floats:
 
 
 def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
-    """Peak and rms over one period of realisation ``number``."""
     lines = held_lines(waveform.values, HELD_SPANS)
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Twice the points that the highest line needs, so that no peak hides between two of them.
+    # Twice the points that the highest line needs, so that no peak is missed between two of them.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)
@@ -161,7 +163,6 @@ def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
 
 
 def _of_source(source: SampleSource, transfer: Transfer) -> Load:
-    """Peak and rms of streamed noise."""
     gain = float(np.sqrt(np.mean(np.abs(transfer(_band_hz(source))) ** 2)))
     return Load(gain, gain / source.crest_factor, "streamed noise")
 
@@ -174,13 +175,13 @@ def needed_vpp(
     Parameters
     ----------
     rig
-        Its model is asked.
+        Rig whose model is used.
     acceleration
         Amplitude of the base [m/s2].
     frequency_hz
-        Of the sine.
+        Frequency of the sine.
     on_table
-        Feedback asks for the bare table, smooth over frequency, and measures what the specimen does to it.
+        Feedback uses the bare table, smooth over frequency, and measures the effect of the specimen.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()
@@ -192,13 +193,13 @@ class BaseMotion:
 
     amplitude_m: NDArray[np.float64]
     basis: str
-    """Where it comes from."""
+    """Source of the prediction."""
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
-    """Predict the base's motion, shape of ``frequency_hz``: a level that feedback holds is met exactly.
+    """Predict the base's motion, shape of ``frequency_hz``; a level held by feedback is exact.
 
-    A setting is followed through the rig's model, specimen included; noise is stood for by a sine of its rms.
+    A setting uses the rig's model, including the specimen; noise is represented by a sine of its rms.
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
     model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)

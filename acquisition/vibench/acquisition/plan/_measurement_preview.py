@@ -1,4 +1,4 @@
-"""What a measurement will be, before anything moves: signal, loads beside limits, time, size."""
+"""Preview of a measurement: signal, loads with their limits, time, size."""
 
 from dataclasses import dataclass
 
@@ -16,22 +16,22 @@ from ._loop_time import loop_time_s
 from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
-"""Most samples of the signal that is shown: a long sweep is sampled less often than it will be played."""
+"""Most samples of the displayed signal: a long sweep is displayed at a lower rate."""
 SPECTRUM_POINTS = 4000
 _LOWEST_RATE = 2.1
-"""Samples per period of the highest frequency, at least."""
+"""Smallest number of samples per period of the highest frequency."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPreview:
-    """Everything that can be said of a measurement on a rig without touching it."""
+    """Predictions for a measurement on a rig, without touching it."""
 
     measurement: Measurement
     volts: Samples
-    """As the generator's panel promises them, shape (samples,) [V]."""
+    """According to the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """At most `SPECTRUM_POINTS`, each the highest line of its stretch [Hz]."""
+    """At most `SPECTRUM_POINTS`, each the highest line of its interval [Hz]."""
     spectrum_v: Samples
     """Peak amplitude of the sine at each frequency [V]."""
     rms_v: float
@@ -43,7 +43,7 @@ class MeasurementPreview:
     size_bytes: int
     """Size [bytes] of the recording while it is made."""
     least_growth_time_s: float | None
-    """What grows by e in this time or longer, feedback on this rig can hold; None without feedback [s]."""
+    """Shortest growth time (factor e) that feedback on this rig can hold; None without feedback [s]."""
 
     @property
     def is_allowed(self) -> bool:
@@ -57,7 +57,7 @@ class MeasurementPreview:
 
 
 def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPreview:
-    """Look ahead at a measurement on a rig; raises ConfigurationError when it cannot be sampled."""
+    """Compute a measurement's preview; raises ConfigurationError when it cannot be sampled."""
     excitation = measurement.excitation
     affordable = MOST_SAMPLES / max(excitation.playing_s, 1.0)
     rate_hz = max(min(rig.daq.sample_rate_hz, affordable), _LOWEST_RATE * excitation.highest_frequency_hz)
@@ -85,13 +85,13 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
     if not EXCITATION_KINDS[excitation.kind].is_feedback:
         return None
     if drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
-        # What a fast loop holds follows from its gains and the plant, see `require_holdable`.
+        # The reach of a fast loop follows from its gains and the plant, see `require_holdable`.
         return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 
 
 def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:
-    """Keep of every stretch, equal in logarithm, its highest line: what is excited must not be lost."""
+    """Keep the highest line of each logarithmic interval, so that no excited line is lost."""
     frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
     if len(frequency_hz) <= SPECTRUM_POINTS:
         return frequency_hz, amplitude_v

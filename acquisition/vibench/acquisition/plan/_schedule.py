@@ -1,4 +1,4 @@
-"""A measurement laid out in time: phases with a state, something to play, and a duration."""
+"""A measurement as a sequence of phases with a state, a signal, and a duration."""
 
 import re
 from collections.abc import Iterator
@@ -20,9 +20,8 @@ from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, generator_driver
 from ._until import Until
 
-# The plan of one measurement: what is played, how it is ramped, when the run must end itself.
-#
-# A point: one recording that a campaign wants, and the chain of points that it belongs to.
+# The plan of one measurement: excitation, ramps, limits during the run. A point: one recording of a campaign,
+# and its chain of points.
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
@@ -34,36 +33,36 @@ def _is_of_a_file(said: object) -> object:
 
 
 Name = Annotated[str, Field(pattern=_NAME), BeforeValidator(_is_of_a_file)]
-"""Becomes part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
+"""Part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
 
 LONGEST_S = 30 * 86400.0
 """Longest duration of one recording: a month [s]."""
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 FEWEST_STAIRS = 4
-"""Fewest steps of a ramp: fewer would be steps."""
+"""Fewest stairs of a ramp; fewer would act like steps."""
 
 
 class OnOverload(StrEnum):
-    """What the run does when an input or the vibrometer passes 95 % of its range."""
+    """What the run does when an input or the vibrometer exceeds 95 % of its range."""
 
     FLAG = "flag"
-    """Mark the samples in the recording and go on: nothing breaks, the analysis leaves them out."""
+    """Mark the samples in the recording and continue: nothing is damaged, and the analysis omits them."""
     STOP = "stop"
     """Ramp down and end the run."""
 
 
 class OnChange(StrEnum):
-    """What the run does when the live twin finds that the specimen is no longer what it was."""
+    """What the run does when the live twin finds a change of the specimen."""
 
     NOTE = "note"
-    """Note it as an event in the recording and go on."""
+    """Note it as an event in the recording and continue."""
     STOP = "stop"
-    """Ramp down and end the run; the live twin is started for it where nobody has."""
+    """Ramp down and end the run; the live twin is started if needed."""
 
 
 class InRunLimits(FrozenModel):
-    """When the running measurement must end itself: fractions of the rig's own limits."""
+    """Limits during a measurement, as fractions of the rig's own limits."""
 
     base_acceleration: Fraction = 1.0
     """Fraction of the shaker's acceleration limit, measured at the base."""
@@ -72,14 +71,15 @@ class InRunLimits(FrozenModel):
     stroke: Fraction = 1.0
     """Fraction of the shaker's stroke limit, integrated twice."""
     force: Fraction = 1.0
-    """Of the shaker's force limit: the coil's, from its current, and the one that moves the table."""
+    """Fraction of the shaker's force limit: for the coil, from its current, and for the force on the
+    table."""
     amplifier_voltage: Fraction = 1.0
     """Fraction of the amplifier's clipping voltage, measured at its output."""
     current: Fraction = 1.0
-    """Of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier voltage,
-    less what the moving coil induces, over the coil's resistance."""
+    """Fraction of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier
+    voltage, minus the moving coil's induced voltage, over the coil's resistance."""
     specimen_amplitude: Fraction = 1.0
-    """Fraction of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
+    """Fraction of the specimen's amplitude limit: the main mass relative to the base, from the vibrometer."""
     on_overload: OnOverload = OnOverload.FLAG
     on_changed_specimen: OnChange = OnChange.NOTE
 
@@ -92,13 +92,13 @@ class Measurement(FrozenModel):
     ramp_s: PositiveFloat = Field(default=1.0, le=60)
     """Time of a half-cosine ramp from silence to full amplitude, and back [s]."""
     ramp_step_s: PositiveFloat = 0.05
-    """The ramp is a staircase of amplitude settings; this is one stair [s]."""
+    """Duration of one stair: the ramp is a staircase of amplitude settings [s]."""
     repeats: PositiveInt = Field(default=1, le=1000)
-    """How many recordings a campaign makes of it."""
+    """Number of recordings of it in a campaign."""
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None
-    """How well results must be known for the recording to end; without it the plan's time is recorded."""
+    """Required bounds of results, which end the recording; if absent, the plan's time is recorded."""
 
     @model_validator(mode="after")
     def _until_fits(self) -> Self:
@@ -140,11 +140,11 @@ class Point:
     """Name of its recording, without ``.h5``; different from every other point's."""
     measurement: Measurement
     chain: str = ""
-    """Points of one chain follow each other on one branch; empty for a point that stands alone."""
+    """Points of one chain follow each other on one branch; empty for a single point."""
 
 
 class RunState(StrEnum):
-    """Where a run stands.
+    """State of a run.
 
     ::
 
@@ -177,39 +177,40 @@ CHECK_FREQUENCY_HZ = 160.0
 CHECK_FRACTION = 0.02
 """Level of the bench check over the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""The check is not done below this, as far as the plan allows: hum would take part [V]."""
+"""Lowest level of a check, as far as the plan allows, because of hum [V]."""
 CHECK_QUIET_S = 0.1
-"""How long the check listens before anything plays [s]."""
+"""Duration of silence in the check before anything plays [s]."""
 CHECK_SETTLE_S = 0.2
 CHECK_LISTEN_S = 0.3
-"""How long the check measures: 48 periods [s]."""
+"""Measuring time of the check: 48 periods [s]."""
 HUSH_S = 1.0
-"""Silence before the first ramp of a measurement with feedback: what is heard then is noise [s]."""
+"""Silence before the first ramp of a measurement with feedback, to measure noise [s]."""
 CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of time in one state, playing one thing."""
+    """A stretch of time with one state and one signal."""
 
     state: RunState
     play: Play | None
     """None for silence."""
     duration_s: float
     segment: Segment | None = None
-    """The named stretch of the recording that this phase belongs to."""
+    """The named range of the recording that this phase belongs to."""
 
     @property
     def end_level(self) -> float:
-        """Where the level stands at its end, from 0 (quiet) to 1 (as planned); only ramps change it."""
+        """Level at its end, from 0 (silent) to 1 (as planned); only ramps change it."""
         return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
 
 
 def phases(measurement: Measurement) -> Iterator[Phase]:
-    """Lay out ``measurement`` from the first ramp up to the last ramp down, without the check of the bench.
+    """Yield the phases of ``measurement`` from the first ramp up to the last ramp down, without the bench
+    check.
 
-    A change of waveform is a change of everything at once: it happens in silence, between a ramp
-    down and a ramp up. A change of frequency keeps the phase and the amplitude and needs neither.
+    A change of waveform happens in silence, between a ramp down and a ramp up. A change of frequency keeps
+    the phase and the amplitude and needs neither.
     """
     previous: Step | None = None
     for step in measurement.excitation.steps():
@@ -226,7 +227,7 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
 
 
 def known_phases(measurement: Measurement) -> Iterator[Phase]:
-    """Lay out what can be said before anything was heard: all of it, or with feedback nothing."""
+    """Yield the phases known before the measurement: all of them, or with feedback none."""
     return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
 
 
@@ -239,16 +240,16 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
-    """Lay out one ramp up to, or down from, what is played.
+    """Return the phase of one ramp up or down.
 
     Parameters
     ----------
     state
-        Whether it goes up or down.
+        Ramp up or ramp down.
     play
-        What is played at its end.
+        Signal at full level.
     measurement
-        Says how long a ramp takes, and in what steps.
+        Plan with the duration of a ramp, and its stairs.
     """
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
@@ -270,9 +271,9 @@ def duration_s(measurement: Measurement) -> float:
 
 
 def lead_in_s(measurement: Measurement) -> float:
-    """Time from the first sample until what is to be measured begins: bench check, ramp and settling [s].
+    """Return the time from the first sample to the measurement proper: bench check, ramp and settling [s].
 
-    With feedback it ends with the ramp: what settles then is part of what is watched.
+    With feedback it ends with the ramp: settling is then part of the measurement.
     """
     if isinstance(measurement.excitation, AbstractFeedback):
         return CHECK_S + HUSH_S + measurement.ramp_s
@@ -285,17 +286,17 @@ def lead_in_s(measurement: Measurement) -> float:
 
 
 def measured_s(measurement: Measurement) -> float:
-    """Time of a measurement with its bench check, at most [s]."""
+    """Return the longest time of a measurement with its bench check [s]."""
     return CHECK_S + duration_s(measurement)
 
 
 def stairs(measurement: Measurement) -> int:
-    """Amplitude settings of one ramp."""
+    """Return the number of amplitude settings of one ramp."""
     return ceil(measurement.ramp_s / measurement.ramp_step_s * (1 - 1e-9))
 
 
 def half_cosine(progress: float) -> float:
-    """Level of a ramp from 0 to 1, with no kink at either end.
+    """Return the level of a ramp from 0 to 1, with no kink at either end.
 
     Parameters
     ----------
@@ -311,7 +312,7 @@ def half_cosine(progress: float) -> float:
 
 
 class DriveSource(StrEnum):
-    """What drives the amplifier."""
+    """Source of the signal at the amplifier."""
 
     GENERATOR = "function generator"
     OUTPUT = "analogue output"
@@ -319,7 +320,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return what plays a measurement on a rig; a stream needs an output, also where there is none."""
+    """Return the source of a measurement on a rig; for a stream the output, also if the rig has none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -327,7 +328,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return what plays a measurement on a rig; raises ConfigurationError where the rig has none."""
+    """Return the source of a measurement on a rig; raises ConfigurationError if the rig has none."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
@@ -345,11 +346,11 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""The least setting of an analogue output, as a share of its largest: some tens of a converter's counts."""
+"""Smallest setting of an analogue output over its largest: some tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
-    """Return the least setting of what plays a measurement, peak to peak [V]."""
+    """Return the smallest setting of a measurement's source, peak to peak [V]."""
     if rig.controller is not None and drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
         return LEAST_SHARE * 2 * rig.controller.limit_v
     output = rig.daq.output

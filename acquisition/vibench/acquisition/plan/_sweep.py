@@ -1,4 +1,4 @@
-"""Nested sweeps: one template, several axes, and the named points that they make, in a stated order."""
+"""Nested sweeps: one template, several axes, and the resulting named points in order."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,11 +17,11 @@ from ..host.toml_file import FrozenModel, complaints
 from ._schedule import Measurement, Name, Point
 
 MOST_VALUES = 10_000
-"""On one axis."""
+"""Largest number of values on one axis."""
 
 
 class RangeSpacing(StrEnum):
-    """How the values of a range lie."""
+    """Spacing of the values of a range."""
 
     LINEAR = "linear"
     """At equal distances."""
@@ -34,7 +34,7 @@ class Range(FrozenModel):
 
     start: PositiveFloat
     stop: PositiveFloat
-    """The last value, if the steps land on it."""
+    """The last value, if whole steps reach it."""
     step: PositiveFloat | None = None
     count: PositiveInt | None = Field(default=None, ge=2, le=MOST_VALUES)
     spacing: RangeSpacing = RangeSpacing.LINEAR
@@ -69,26 +69,26 @@ class Range(FrozenModel):
     def _count(self) -> int:
         if self.step is None:
             return self.count or 0
-        # 1e-9: a stop that the steps reach except for rounding belongs to the range.
+        # 1e-9: a stop that the steps reach except for rounding is included.
         return floor((self.stop - self.start) / self.step + 1e-9) + 1
 
 
 Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max_length=MOST_VALUES)] | Range
-"""What a file gives for an axis: a list, or a table with start, stop and step or count."""
+"""Values of an axis in a file: a list, or a table with start, stop and step or count."""
 
 
 def values_of(given: Values) -> tuple[float, ...]:
-    """Return the values of an axis: a range's rising, a list's as they stand."""
+    """Return the values of an axis: a range's rising, a list's in their order."""
     return given.values if isinstance(given, Range) else given
 
 
 MOST_POINTS = 10_000
-"""Most points of one sweep; more is a mistake rather than a plan."""
+"""Largest number of points of one sweep; more is a mistake."""
 LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """What a sweep may vary; the words of ``order``."""
+    """Axes of a sweep; the words of ``order``."""
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
@@ -110,35 +110,34 @@ _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a point lies: its value on each axis that is given."""
+    """Position of a point: its value on each given axis."""
 
     values: Mapping[SweepAxis, Any]
     words: Mapping[SweepAxis, str]
-    """Each value as a part of a name, in the order of the axes."""
+    """Each value as part of a name, in the order of the axes."""
 
     def name(self, sweep: str) -> str:
-        """Name of the point here."""
         return "-".join([sweep, *self.words.values()])
 
     def with_words(self, **words: str) -> "_Place":
-        """Call some values otherwise."""
+        """Replace the words of some values."""
         return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
 class Sweep(FrozenModel):
     """Every combination of the given axes, each a measurement made from ``measurement``.
 
-    A point is called after the sweep and its values: ``line-0p5vpp-up-205hz``. With
-    ``continue_from_previous`` the points along that axis make a chain: each is a dwell to which the
-    specimen is led through all points before it, so that it stays on its branch, and a point that is
-    measured again, days later, lies on the same one.
+    A point is named after the sweep and its values: ``line-0p5vpp-up-205hz``. With
+    ``continue_from_previous`` the points along that axis form a chain: each is a dwell that begins with all
+    earlier points, so that the specimen stays on its branch, and a point that is measured again, days later,
+    is on the same one.
     """
 
     name: Name
     measurement: dict[str, Any]
-    """What all points share: a measurement without its name."""
+    """Values that all points share: a measurement without its name."""
     excitations: tuple[dict[str, Any], ...] = ()
-    """Excitations in the template's place, one after the other; their values come before the template's."""
+    """Excitations that replace the template's, one after the other; their values have priority."""
     repetitions: PositiveInt = Field(default=1, le=1000)
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
@@ -146,13 +145,14 @@ class Sweep(FrozenModel):
     order: tuple[SweepAxis, ...] = USUAL_ORDER
     """The axes, the outermost (slowest) first."""
     continue_from_previous: SweepAxis | None = None
-    """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the branch is kept."""
+    """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the specimen stays on its
+    branch."""
     lead_s: PositiveFloat = 0.5
-    """Time at each earlier point of a chain on the way to a point [s]."""
+    """Time at each earlier point of a chain in a lead-in [s]."""
 
     lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
-    """This many earlier points at most on the way to a point, the nearest ones; absent: all of its chain. A
-    shorter way takes less time, and leads to the wrong branch where it begins behind the jump."""
+    """Largest number of earlier points in a lead-in, the nearest ones; absent: the whole chain. A shorter
+    lead-in takes less time, and reaches the wrong branch if it begins behind the jump."""
 
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:
@@ -170,7 +170,7 @@ class Sweep(FrozenModel):
             return self
         if axis not in (SweepAxis.FREQUENCY, SweepAxis.LEVEL):
             raise ValueError(
-                f"continue_from_previous = {axis.value!r} is no axis to go along; allowed are "
+                f"continue_from_previous = {axis.value!r} is not an axis for a chain; allowed are "
                 "'frequency_hz' and 'amplitude_vpp'"
             )
         given = [each for each in self.order if each in self._axes() and each is not SweepAxis.DIRECTION]
@@ -203,18 +203,16 @@ class Sweep(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """Make the points, in order.
+        """Return the points, in order.
 
-        Raises ValueError when a combination is no measurement; the text names the point and the key.
+        Raises ValueError when a combination is not a valid measurement; the text names the point and the key.
         """
         return tuple(self._led()) if self.continue_from_previous else tuple(self._alone())
 
     def _passes(self) -> int:
-        """How often the directions go through an axis."""
         return sum(2 if way in _TURNING and self.continue_from_previous else 1 for way in self.direction)
 
     def _axes(self) -> dict[SweepAxis, tuple[Any, ...]]:
-        """Values of every axis that is given."""
         given: dict[SweepAxis, tuple[Any, ...]] = {}
         if self.repetitions > 1:
             given[SweepAxis.REPETITION] = tuple(range(1, self.repetitions + 1))
@@ -244,7 +242,7 @@ class Sweep(FrozenModel):
             yield Point(name, measurement)
 
     def _led(self) -> Iterator[Point]:
-        """Go along each chain, the points passed before being the way to the next."""
+        """Follow each chain; the earlier points are the lead-in of the next."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))
         rising = sorted(axes.pop(along))
@@ -261,7 +259,6 @@ class Sweep(FrozenModel):
                 way.append(tone)
 
     def _content(self, name: str, values: Mapping[SweepAxis, Any]) -> dict[str, Any]:
-        """Put the values of a place into the template."""
         excitation = dict(self.measurement.get("excitation", {}))
         if SweepAxis.EXCITATION in values:
             excitation |= self.excitations[values[SweepAxis.EXCITATION]]
@@ -271,7 +268,7 @@ class Sweep(FrozenModel):
         return {**self.measurement, "name": name, "excitation": excitation}
 
     def _word(self, axis: SweepAxis, value: Any) -> str:
-        """Write a value as a part of a name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
+        """Return a value as part of a name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
         match axis:
             case SweepAxis.REPETITION:
                 return f"r{value}"
@@ -289,7 +286,7 @@ class Sweep(FrozenModel):
 
 
 def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Go through a chain's values, once or up and down; each with the word for its direction."""
+    """Yield a chain's values, once or up and down; each with the word for its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
     match way:
@@ -304,14 +301,13 @@ def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[
 
 
 def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitation:
-    """Let an excitation that moves by itself go the given way."""
     try:
         turned = excitation.turned(way)
     except ValidationError as error:
         raise ValueError(f"{name}: {complaints(error, excitation.model_dump())}") from error
     if turned is None:
         raise ValueError(
-            f"{name}: direction = {way.value!r} says nothing to the excitation {excitation.kind!r} by "
+            f"{name}: direction = {way.value!r} does not apply to the excitation {excitation.kind!r} by "
             "itself; give continue_from_previous to go along an axis, or leave direction out"
         )
     return turned
@@ -320,7 +316,6 @@ def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitat
 def _with_lead_in(
     excitation: Excitation, way: tuple[LeadIn, ...], lead_s: float, name: str
 ) -> tuple[Excitation, LeadIn]:
-    """Lead to a point of a chain through those before it."""
     led = excitation.led(way, lead_s)
     if led is None:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Recording until a result is known well enough: what a plan wants to know, and when to look."""
+"""Recording until a result is known well enough: targets, and times of the analyses."""
 
 import re
 from typing import Annotated
@@ -8,9 +8,9 @@ from pydantic import BeforeValidator, Field, PositiveFloat, model_validator
 from ..host.toml_file import FrozenModel
 
 FEWEST_REALISATIONS = 4
-"""Of noise before its first look: fewer have too little scatter to state a bound by."""
+"""Number of realisations before the first analysis: fewer have too little scatter for a bound."""
 LOOK_FACTOR = 2.0**0.5
-"""Recorded time of a look over that of the one before."""
+"""Ratio of recorded times between one analysis and the next."""
 
 
 def _share(given: object) -> object:
@@ -29,22 +29,22 @@ Wish = Annotated[
 
 
 class Until(FrozenModel):
-    """Record until every result named here is known this well; the plan's own time is the longest.
+    """Record until every result named here has its bound; the plan's own time is the longest.
 
-    A bound holds in 95 % of recordings, also of those that end by it. It states noise and chance, which
-    recording time reduces, and leaves out calibrations, which it does not reduce.
+    A bound covers in 95 % of recordings, also of those that end by it. It contains noise and chance, which
+    recording time reduces, but no calibrations.
     """
 
     resonance_hz: Wish | None = None
-    """Of the frequency of every resonance that noise shows: ``"0.1 %"``."""
+    """Bound of the frequency of every resonance found in noise: ``"0.1 %"``."""
     transmissibility: Wish | None = None
-    """Of the transmissibility at every resonance that noise shows: ``"2 %"``."""
+    """Bound of the transmissibility at every resonance found in noise: ``"2 %"``."""
     response_i: Wish | None = None
-    """Of Response I of a dwell or of each step: ``"1 %"``."""
+    """Bound of Response I of a dwell or of each step: ``"1 %"``."""
     response_ii: Wish | None = None
-    """Of Response II of a dwell or of each step: ``"1 %"``."""
+    """Bound of Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = 2.0
-    """Recorded before the first look, of a dwell, a step or streamed noise [s]."""
+    """Recorded time before the first analysis, of a dwell, a step or streamed noise [s]."""
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":
@@ -54,7 +54,7 @@ class Until(FrozenModel):
 
     @property
     def wishes(self) -> dict[str, float]:
-        """What is wanted, by the name of the result."""
+        """Targets by the name of the result."""
         return {name: wish for name in WISHES if (wish := getattr(self, name)) is not None}
 
 

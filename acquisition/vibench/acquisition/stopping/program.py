@@ -1,4 +1,4 @@
-"""Programs that drive a bench say so in the state folder, and can be stopped from outside while they do."""
+"""Programs that drive a bench announce themselves in the state folder, and can be stopped from outside."""
 
 import os
 import platform
@@ -30,17 +30,15 @@ from vibench.stop_files import stop_path, taken_path
 from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 
-# Stops that need no connection: a file in the state folder, which whatever drives looks for all the time.
-#
-# Its name says everything: which process, when that began, how hard. So it is found with a look at a name,
-# by a process that may open no more files, and it can be put down on a disk that takes no more bytes; what
-# it holds is the reason, where there is room for one.
+# Stops without a connection: a file in the state folder, for which a driving program looks all the time. Its
+# name contains process, start time and level, so it can be found by a process that may open no more files,
+# and be written on a full disk; its content is the reason, if there is room for one (decision 0029).
 
 SILENT_REASON = "a stop that was left in the state folder"
 
 
 def engines_folder() -> Path:
-    """Return the folder in which programs are announced and stops are put down; nobody else's business."""
+    """Return the private folder for announcements of programs, and for stops."""
     folder = state_folder() / "engines"
     folder.mkdir(mode=0o700, exist_ok=True)
     if S_IMODE(folder.stat().st_mode) != 0o700:
@@ -49,7 +47,7 @@ def engines_folder() -> Path:
 
 
 class KeptStops:
-    """The stops that are put down for one process."""
+    """The stops that are written for one process."""
 
     def __init__(
         self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
@@ -61,7 +59,7 @@ class KeptStops:
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Given back to read a reason by."""
+        """Released to read a reason."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
@@ -69,7 +67,7 @@ class KeptStops:
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
     def obey(self) -> None:
-        """Carry out what was put down since the last look, the hardest first; confirm what was obeyed."""
+        """Carry out new stops, the hardest first; confirm those obeyed."""
         for level, path in self._paths.items():
             try:
                 found = path.stat()
@@ -78,7 +76,7 @@ class KeptStops:
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
                 continue
-            self._obeyed[path] = mark  # where it cannot be taken away, it is still obeyed only once
+            self._obeyed[path] = mark  # if it cannot be removed, it is obeyed only once
             # Reading a pipe could wait for ever.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             taken = Path(taken_path(str(path)))
@@ -88,7 +86,7 @@ class KeptStops:
         self.confirm()
 
     def confirm(self) -> None:
-        """Remove obeyed stops once nothing drives; until then, show that the program is alive."""
+        """Remove obeyed stops when nothing drives; until then, show that the program is alive."""
         is_advancing = DRIVES_ON.take_advance()
         for taken in tuple(self._taken):
             with suppress(OSError):  # somebody has emptied the folder
@@ -99,7 +97,7 @@ class KeptStops:
                     os.utime(taken)
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop looking."""
         if self._reserve >= 0:
             os.close(self._reserve)
             self._reserve = -1
@@ -108,7 +106,7 @@ class KeptStops:
         self.close()
         try:
             return path.read_text(encoding="utf-8", errors="replace") or SILENT_REASON
-        except OSError:  # somebody else has taken the descriptor
+        except OSError:  # another thread has taken the descriptor
             return SILENT_REASON
         finally:
             with suppress(OSError):
@@ -116,12 +114,12 @@ class KeptStops:
 
 
 INTERVAL_S = 0.05
-"""How often it is looked at [s]."""
+"""Interval of the look [s]."""
 LEFT_ALONE_S = 1.0
 
 
 class Watchdog:
-    """Calls a function at every `INTERVAL_S`, in a separate thread, until closed.
+    """Calls a function every `INTERVAL_S`, in a separate thread, until closed.
 
     Raises AcquisitionError when the system gives no thread.
     """
@@ -139,7 +137,7 @@ class Watchdog:
             ) from error
 
     def close(self) -> None:
-        """Stop watching; a look that hangs, in a folder that has gone away, is left alone."""
+        """Stop watching; a call that hangs, in a folder that is gone, is abandoned."""
         self._closing.set()
         self._thread.join(LEFT_ALONE_S)
 
@@ -148,7 +146,7 @@ class Watchdog:
             try:
                 if not self._closing.wait(INTERVAL_S):
                     self._look()
-            except MemoryError:  # a record of it would take more
+            except MemoryError:  # a record of it would take more memory
                 MEMORY_RESERVE.release()
             except Exception:
                 getLogger(__name__).exception("%s", self._thread.name)
@@ -158,18 +156,18 @@ Press = Callable[[StopLevel, str], None]
 
 
 class Program(BaseModel):
-    """A program of this user on this computer that drives a bench, or may at any moment."""
+    """A program of this user on this computer that drives a bench, or may do so at any moment."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     pid: int
     what: str
-    """What it was started for: a campaign's name, or ``"window"``."""
+    """Its purpose: a campaign's name, or ``"window"``."""
     started_utc: str
     process_start: str = ""
-    """When its process began, as the system counts: a number is given again, this pair is not."""
+    """Start of its process, as the system counts: a number is used again, this pair is not."""
     computer: str = ""
-    """A state folder may lie in a home that several computers share."""
+    """A state folder may be in a home folder that several computers share."""
 
     @property
     def place(self) -> Place:
@@ -178,7 +176,7 @@ class Program(BaseModel):
 
     @property
     def is_alive(self) -> bool:
-        """Whether its process lives, answering or not."""
+        """Whether its process is alive, answering or not."""
         if self.place is Place.HERE:
             return is_process(self.pid, self.process_start)
         try:
@@ -189,7 +187,7 @@ class Program(BaseModel):
 
     @property
     def was_killed(self) -> bool:
-        """Whether its process ended without taking back its announcement."""
+        """Whether its process ended without removing its announcement."""
         return not self.is_alive and _path(self).exists()
 
 
@@ -197,7 +195,7 @@ AnyProgram = TypeVar("AnyProgram", bound=Program)
 
 
 def facts_of_this_process(what: str) -> dict[str, object]:
-    """Return what a program says of itself."""
+    """Return the announcement of this process."""
     pid = os.getpid()
     return {
         "pid": pid,
@@ -209,21 +207,18 @@ def facts_of_this_process(what: str) -> dict[str, object]:
 
 
 def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
-    """Every living program that is known here by its number and says what ``model`` asks, oldest first.
+    """Return every living program announced under this process number space, oldest first, as ``model``.
 
-    What is left of processes that have ended is swept away; nothing else is.
+    Entries of processes that have ended are removed.
 
-    Raises
-    ------
-    AcquisitionError
-        When there is no state folder and none can be made.
+    Raises AcquisitionError when there is no state folder and none can be made.
     """
     found = []
     for path, told in _announcements(model):
         is_here = told.computer in ("", platform.node())
         if told.place is not Place.HERE:
             continue
-        # A computer may be given another name while a program runs; number and start together are no other's.
+        # A computer may be renamed while a program runs; number and start together are unique.
         if told.is_alive and (is_here or told.process_start):
             found.append(told)
         elif is_here:
@@ -234,7 +229,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 
 
 def programs_of_other_places() -> tuple[Program, ...]:
-    """Every living program that shares the state folder, in another container or on another computer.
+    """Return every living program of another container or computer that shares the state folder.
 
     Raises AcquisitionError as `announced_programs` does.
     """
@@ -244,55 +239,57 @@ def programs_of_other_places() -> tuple[Program, ...]:
 
 def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]:
     try:
-        paths = sorted(engines_folder().iterdir())  # glob would find nothing in a folder that it may not read
+        paths = sorted(
+            engines_folder().iterdir()
+        )  # glob would find nothing in a folder without read permission
     except OSError as error:
         raise AcquisitionError(
             f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
             "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
         ) from error
     for path in paths:
-        if path.suffix != ".json" or not path.is_file():  # a pipe would be waited for
+        if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait
             continue
         try:
             yield path, model.model_validate_json(_read_stop(path))
-        except (ValueError, OSError):  # another version's, of another kind, or ended in between
+        except (ValueError, OSError):  # from another version, of another kind, or removed in between
             continue
 
 
 def _read_stop(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except PermissionError:  # started as root, say: who may write in this folder may stop it all the same
+    except PermissionError:  # started as root, say: anyone who may write in this folder may stop it
         pid, start, _ = path.name.split(".")
         facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
 
 
 def withdraw(program: Program) -> None:
-    """Take away what a program said of itself; legal where nothing is, or can be taken away."""
+    """Remove a program's announcement; legal if there is none, or it cannot be removed."""
     with suppress(OSError):
         _path(program).unlink()
 
 
 class _Reached:
-    """All of this process that a stop from outside is to reach: an engine, runs, checks.
+    """Everything in this process that a stop from outside must reach: an engine, runs, checks.
 
-    The first of them speaks for the process until it ends, an engine for the runs in it.
+    The first of them represents the process until it ends, an engine also the runs in it.
     """
 
     def __init__(self) -> None:
         self._inside: list[tuple[Press, Program]] = []
         self._kept: KeptStops | None = None
         self._mark: OpenFile | None = None
-        """A lock by which those who do not know this process by its number see that it lives."""
+        """A lock that shows other containers that this process is alive."""
         self._watchdog: Watchdog | None = None
         self._changing = Lock()
 
     def enter(self, entry: tuple[Press, Program]) -> None:
-        """Let one more be reached; raises OSError when the state folder cannot be written."""
+        """Add one more; raises OSError when the state folder cannot be written."""
         with self._changing:
             if not self._inside:
-                announced_programs(Program)  # removes what killed programs have left
+                announced_programs(Program)  # removes entries of killed programs
                 kept = KeptStops.of_this_process(self._press)
                 try:
                     self._announce(entry[1])
@@ -303,7 +300,7 @@ class _Reached:
             self._inside.append(entry)
 
     def leave(self, entry: tuple[Press, Program]) -> None:
-        """Let it go; with the last, nothing is looked for any more."""
+        """Remove one; after the last, the look ends."""
         with self._changing:
             spoke = self._inside[0] is entry
             self._inside = [each for each in self._inside if each is not entry]
@@ -321,7 +318,7 @@ class _Reached:
         withdraw(entry[1])
 
     def _look(self) -> None:
-        """Obey what was put down, and be found: somebody may have emptied the state folder."""
+        """Obey new stops, and renew the announcement: somebody may have emptied the state folder."""
         kept, inside = self._kept, self._inside
         if kept is None or not inside:
             return
@@ -337,7 +334,7 @@ class _Reached:
                         self._mark = _lock(_path(self._inside[0][1]))
 
     def _announce(self, program: Program) -> None:
-        self._unmark()  # Windows replaces no file that is open
+        self._unmark()  # Windows cannot replace an open file
         self._mark = _lock(_write(program))
 
     def _unmark(self) -> None:
@@ -355,12 +352,10 @@ _REACHED = _Reached()
 
 @contextmanager
 def announce_program(press: Press, program: Program) -> Iterator[None]:
-    """While inside, be found by `announced_programs`, and let ``press`` carry out the stops put down for it.
+    """Let `announced_programs` find this program inside the context, and ``press`` carry out its stops.
 
-    Raises
-    ------
-    AcquisitionError
-        When the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: a program that cannot be found could not
+    be stopped.
     """
     entry = (press, program)
     try:
@@ -381,7 +376,7 @@ def _path(program: Program) -> Path:
 
 
 def _lock(path: Path) -> OpenFile | None:
-    """Lock a file for as long as this process lives; None where it is not to be had, now or at all."""
+    """Lock a file for as long as this process lives; None if that is impossible."""
     try:
         file = OpenFile(path)
     except OSError:
@@ -398,7 +393,7 @@ def _lock(path: Path) -> OpenFile | None:
 def _write(program: Program) -> Path:
     path = _path(program)
     coming = path.with_suffix(".coming")
-    coming.unlink(missing_ok=True)  # left by a process of the same number that was killed
+    coming.unlink(missing_ok=True)  # left by a killed process of this number
     # Nobody else may read a token, not even for the moment before the mode is set.
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -408,7 +403,7 @@ def _write(program: Program) -> Path:
 
 
 def _sweep() -> None:
-    """Take away what was put down for processes that have ended; names begin with the process's number."""
+    """Remove entries of processes that have ended; names begin with the process's number."""
     folder = engines_folder()
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
@@ -425,28 +420,26 @@ LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SI
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """By default these neither end nor stop a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
-"""Stop a process, as Ctrl-Z does; a terminal sends the last two again and again."""
+"""They stop a process, as Ctrl-Z does; a terminal sends the last two again and again."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
-"""Always heeded; other signals are heeded only if the program does not handle them."""
+"""Always handled; other signals are handled only if the program does not handle them itself."""
 
 
 @contextmanager
 def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]:
-    """While inside, a stop from outside the program is asked of ``switch``.
+    """Stop ``switch`` on a signal, or on a stop from outside the program, inside the context.
 
-    ``vibench stop`` finds the program and leaves its stop in the state folder, whatever thread this is;
-    ``what`` is what it is called there. In the main thread, the only one to which Python delivers signals,
-    every signal is a stop that would end or stop the program (`heeded_signals`). SIGHUP stays ignored where
-    it was ignored before (nohup): such a run is meant to go on.
+    ``vibench stop`` finds the program and leaves its stop in the state folder, in any thread; ``what`` is
+    its name there. In the main thread, the only one to which Python delivers signals, every signal that
+    would end or stop the program is a stop (`heeded_signals`). SIGHUP stays ignored if it was ignored before
+    (nohup): such a run is meant to continue.
 
-    The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
-    raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are
-    ignored, so that impatience cannot interrupt the silencing; so is a second Ctrl-Z.
+    The first signal ramps down and ends the run as stopped: Ctrl-C with the planned ramp, the others faster.
+    A second one raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones
+    are ignored, so that impatience cannot interrupt the silencing; so is a second Ctrl-Z.
 
-    Raises
-    ------
-    AcquisitionError
-        When the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: a program that cannot be found could not
+    be stopped.
     """
 
     def press(level: StopLevel, reason: str) -> None:
@@ -491,10 +484,10 @@ def signal_name(number: int) -> str:
 
 
 def heeded_signals() -> list[int]:
-    """Return the signals that are stops while something drives: those that would end or stop the process.
+    """Return the signals that are stops during a drive: those that would end or stop the process.
 
-    A signal that the program handles itself, or ignores, does neither. Those in `LEFT_TO_THE_DEAD_MAN` cannot
-    be heeded.
+    Signals that the program handles or ignores are left out. Those in `LEFT_TO_THE_DEAD_MAN` cannot be
+    handled.
     """
     return [number for number in sorted(signal.valid_signals()) if _is_heeded(number)]
 
@@ -505,5 +498,5 @@ def _is_heeded(number: int) -> bool:
         return False
     if name in _ALWAYS:
         return name != "SIGHUP" or handler is not signal.SIG_IGN
-    # A handler of this module belongs to a run around this one, with another switch.
+    # A handler of this module belongs to an outer run, with another switch.
     return handler is signal.SIG_DFL or getattr(handler, "__module__", "") == __name__

@@ -12,16 +12,16 @@ from ..errors import AcquisitionError
 
 
 class StopLevel(StrEnum):
-    """How hard a run is stopped, from the gentlest to the hardest."""
+    """Level of a stop, from the gentlest to the hardest."""
 
     HOLD = "hold"
-    """Stay as it is, drive included, until resumed or stopped."""
+    """Keep the present drive until released or stopped."""
     RAMP = "ramp"
-    """The half-cosine ramp that the plan ends with."""
+    """The half-cosine ramp at the end of the plan."""
     ABORT = "abort"
-    """The shortest ramp that is no blow: three periods of the loaded shaker on its suspension."""
+    """The shortest ramp without a shock: three periods of the loaded shaker on its suspension."""
     OFF = "off"
-    """The output is switched off at once, whatever the step does to the specimen."""
+    """The output is switched off at once, with a step."""
 
     def is_harder_than(self, other: "StopLevel") -> bool:
         """Whether this one ends sooner."""
@@ -32,7 +32,7 @@ _HARDNESS = {level: number for number, level in enumerate(StopLevel)}
 
 
 class Cause(StrEnum):
-    """What made a run end before its plan did."""
+    """Cause of a stop."""
 
     OPERATOR = "operator"
     """Somebody pressed stop."""
@@ -40,13 +40,13 @@ class Cause(StrEnum):
     """Esc, or the large button."""
     KEYBOARD = "ctrl-c"
     TERMINATED = "terminated"
-    """The system asked the process to end."""
+    """The system ended the process."""
     VIEWER_GONE = "viewer gone"
-    """Attended, and nobody has looked for too long: the window froze, was closed or was killed."""
+    """Attended, without requests for too long: the window froze, was closed or was killed."""
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
-    """The program that carried the run out went away from it."""
+    """The program that carried out the run left it."""
     LIMIT = "limit"
     INSTRUMENT = "instrument"
     DISK = "disk"
@@ -67,13 +67,14 @@ LEVELS: Mapping[Cause, StopLevel] = {
     Cause.DISK: StopLevel.OFF,
     Cause.FAULT: StopLevel.OFF,
 }
-"""How hard each cause stops. Where nothing can be read any more (instrument, disk, fault), what still answers
-is lowered as fast as it takes commands before its output goes off."""
+"""Level of each cause. Where nothing can be read any more (instrument, disk, fault), instruments that still
+answer are lowered as fast as they accept commands before their output is switched off.
+"""
 
 
 @dataclass(frozen=True)
 class StopRequest:
-    """A wish to end, and who has it."""
+    """A request to end a run, with its cause."""
 
     cause: Cause
     level: StopLevel
@@ -81,15 +82,15 @@ class StopRequest:
 
     @classmethod
     def by(cls, cause: Cause, reason: str) -> "StopRequest":
-        """Stop as hard as the cause asks for."""
+        """Return a request with the level of its cause."""
         return cls(cause, LEVELS[cause], reason)
 
 
 class StopSwitch:
-    """What anybody may use to hold, to mark or to end a run, or a campaign: any thread, and signal handlers.
+    """Used by any thread, and by signal handlers, to hold, to mark or to end a run or a campaign.
 
-    It takes no lock, so that a signal handler cannot wait for one. A stop cannot be taken back, only
-    be made harder.
+    It takes no lock, so that a signal handler cannot wait for one. A stop cannot be withdrawn, only replaced
+    by a harder one.
     """
 
     def __init__(self) -> None:
@@ -100,8 +101,8 @@ class StopSwitch:
 
     @property
     def request(self) -> StopRequest | None:
-        """The hardest stop asked for so far; None while nobody has asked."""
-        # One slot a level: two threads that ask at once cannot lose the harder wish.
+        """The hardest stop requested so far; None without one."""
+        # One slot for each level: two threads at the same time cannot lose the harder request.
         for level in reversed(StopLevel):
             if level in self._asked:
                 return self._asked[level]
@@ -109,26 +110,26 @@ class StopSwitch:
 
     @property
     def is_holding(self) -> bool:
-        """Whether the run should stay where it is; a stop ends a hold."""
+        """Whether the run is held; a stop ends a hold."""
         return self._holding and not self._asked
 
     def ask(self, request: StopRequest) -> None:
-        """Ask for a stop; the first of each level is the one that counts."""
+        """Request a stop; the first of each level counts."""
         if request.level is StopLevel.HOLD:
             self.hold()
         else:
             self._asked.setdefault(request.level, request)
 
     def hold(self) -> None:
-        """Stay as it is."""
+        """Hold the run."""
         self._holding = True
 
     def resume(self) -> None:
-        """Go on after a hold."""
+        """End a hold."""
         self._holding = False
 
     def mark(self, text: str) -> None:
-        """Note an event at the next sample that is recorded."""
+        """Note an event at the next recorded sample."""
         self._marks.append(text)
 
     def take_marks(self) -> Iterator[str]:
@@ -137,7 +138,7 @@ class StopSwitch:
             yield self._marks.popleft()
 
     def tell_change(self, text: str) -> None:
-        """Note that the specimen has changed; a run whose plan asks for it ends then."""
+        """Report that the specimen has changed; a run with ``on_changed_specimen = "stop"`` then ends."""
         self._changes.append(text)
 
     def take_changes(self) -> Iterator[str]:
@@ -159,11 +160,10 @@ class DrivesOn:
         self._has_advanced = False
 
     def __bool__(self) -> bool:
-        """Whether any drive may be on."""
         return bool(self._drives)
 
     def begin(self, drive: object) -> None:
-        """Note that a drive may be on. The output was read back as off before, whatever was unconfirmed."""
+        """Note that a drive may be on, which resets an earlier unconfirmed state."""
         self._drives = {drive}
 
     def confirm_silence(self, drive: object) -> None:
@@ -171,11 +171,11 @@ class DrivesOn:
         self._drives.discard(drive)
 
     def note_advance(self) -> None:
-        """Note that the run of a drive goes on, or ramps down."""
+        """Note that the run of a drive continues, or ramps down."""
         self._has_advanced = True
 
     def take_advance(self) -> bool:
-        """Return whether a run has gone on since the last call."""
+        """Return whether a run has continued since the last call."""
         advanced, self._has_advanced = self._has_advanced, False
         return advanced
 
@@ -185,7 +185,7 @@ DRIVES_ON = DrivesOn()
 
 
 RESERVE_BYTES = 16_000_000
-"""Commands of a generator take some kB; the rest is what other threads may take meanwhile."""
+"""Commands of a generator take some kB; the rest is for other threads in the meantime."""
 
 
 class MemoryReserve:
@@ -196,7 +196,7 @@ class MemoryReserve:
         self._changing = Lock()
 
     def hold(self) -> None:
-        """Reserve it before anything drives. Raises AcquisitionError when memory is too short."""
+        """Reserve it before any drive. Raises AcquisitionError when memory is too short."""
         with self._changing:
             if self._held is None:
                 try:
