@@ -182,7 +182,8 @@ class Refresh(StrEnum):
 def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
     """List the recordings of a folder, oldest first, and update its catalogue.
 
-    In a read-only folder the list is made again each time.
+    In a read-only folder the list is made again each time. Raises RecordingError when there is no such
+    folder, or ``catalogue.sqlite`` is another file.
     """
     if not folder.is_dir():
         raise RecordingError(f"{folder} is not a folder; give the folder that the recordings are in.")
@@ -310,7 +311,7 @@ def verify_recordings(
     depth
         ``"quick"`` reads attributes, texts and tables, ``"whole"`` every sample too.
     key
-        What they should be signed with, as `vibench.acquisition.recording.seal_key` reads it.
+        Key of their signatures, as `vibench.acquisition.recording.seal_key` reads it.
 
     Raises
     ------

@@ -190,7 +190,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
         at_starts = _hermite(integral, rotated, low, part)
         scale = 1.0 if order == 0 else 2.0
-        # 1j: a drive A sin(...) that begins at each start shall have the real coefficient A.
+        # 1j: a drive A sin(...) that begins at each start has the real coefficient A.
         turned = np.exp(2j * pi * order * turns * starts[:-1]) * (1j if order else 1.0)
         found[:, order] = scale * np.diff(at_starts) / length * turned
     return found

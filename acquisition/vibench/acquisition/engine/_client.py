@@ -241,7 +241,7 @@ def exchange(
         answer = receive(connection, ANSWERS)
         connection.settimeout(usual_s)
     except TimeoutError as error:
-        # An answer that comes late must not be taken for that to the next question.
+        # A late answer must not be taken for the answer to the next request.
         connection.close()
         raise _silent(patience_s) from error
     except OSError as error:

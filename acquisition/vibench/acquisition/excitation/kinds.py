@@ -147,21 +147,21 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return every kind the row of its family, or its own where it has one.
+    """Return the row of every kind: its own if it has one, otherwise that of its family.
 
     Parameters
     ----------
     of_family
         Row of each family of excitations.
     of_kind
-        Rows of single kinds, by their words.
+        Rows of single kinds, by name.
     of_packages
         Entry points by which installed packages give rows of the kinds that they add.
 
     Raises
     ------
     KeyError
-        When a row is given for a word that is no kind.
+        When a row is given for an unknown kind.
     """
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():
