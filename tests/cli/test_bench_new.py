@@ -59,7 +59,7 @@ def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
     assert CliRunner().invoke(app, [*shlex.split(told), "--estimate"]).exit_code == 0
     again = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert again.exit_code == 1
-    assert "is there already" in str(again.exception)
+    assert "exists already" in str(again.exception)
 
 
 @pytest.mark.thorough
@@ -190,7 +190,7 @@ def test_a_place_that_is_no_folder_is_told_before_anything_is_asked(tmp_path):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "no" / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert isinstance(done.exception, ConfigurationError)
-    assert "is no folder" in str(done.exception)
+    assert "is not a folder" in str(done.exception)
 
 
 def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_path):
@@ -223,7 +223,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_nothing_is_written(tmp_path)
     def ask(question, choices, held):
         return "ten" if question.key == "amplifier.gain_db" else ""
 
-    with pytest.raises(ConfigurationError, match=r"amplifier\.gain_db: 'ten' is no number"):
+    with pytest.raises(ConfigurationError, match=r"amplifier\.gain_db: 'ten' is not a number"):
         configure(LAB, tmp_path / "lab.toml", seen(), ask, "note")
     assert not list(tmp_path.iterdir())
 
@@ -257,7 +257,7 @@ def test_a_person_is_asked_again_at_once_after_a_wrong_answer(tmp_path):
     )
     assert (rig.amplifier.gain_db, rig.generator.settle_s) == (12.0, 0.2)
     assert len(wrong) == 3
-    for words in ("'ten' is no number", "gain_db = 700", "settle_s = -1"):
+    for words in ("'ten' is not a number", "gain_db = 700", "settle_s = -1"):
         assert any(words in each for each in wrong)
     assert load_rig(tmp_path / "lab.toml") == rig
 

@@ -191,7 +191,7 @@ def test_an_output_that_nobody_feeds_runs_dry_and_says_so(opened):
     bench.output.arm()
     bench.digitizer.start()
     bench.digitizer.read(4096)
-    with pytest.raises(DataLost, match="ran dry"):
+    with pytest.raises(DataLost, match="ran empty"):
         bench.output.write(np.zeros(600))
 
 

@@ -25,7 +25,7 @@ def test_a_member_and_its_word_are_the_same_choice():
         ),
         (
             lambda folder: list_recordings(folder, "some"),
-            "'some' is not a Refresh; give one of 'changed', 'all'",
+            "'some' is no Refresh; give one of 'changed', 'all'",
         ),
     ],
 )

@@ -466,8 +466,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """Insert the measurements that a result requested after its point, and mark the point, in one
-        transaction."""
+        """Insert the measurements that a result requested, and mark its point, in one transaction."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))
