@@ -287,7 +287,7 @@ def test_a_page_that_is_a_folder_is_refused_before_anything_is_computed(vibench_
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("--notify", "no-such-program --now"), "is no program")],
+    [(("--notify", "no-such-program --now"), "is not a program")],
 )
 def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, said):
     result = vibench_here("measure", campaign(tmp_path), "--out", "recordings", *words, cwd=tmp_path)

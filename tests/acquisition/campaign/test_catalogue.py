@@ -121,7 +121,7 @@ def test_a_file_that_is_no_recording_is_listed_with_what_is_wrong(folder):
 
 def test_a_file_of_the_catalogue_s_name_that_is_none_is_left_alone_until_it_is_to_be_rebuilt(folder):
     (folder / CATALOGUE_NAME).write_text("my notes " * 200)
-    with pytest.raises(RecordingError, match="is no catalogue"):
+    with pytest.raises(RecordingError, match="is not a catalogue"):
         list_recordings(folder)
     assert (folder / CATALOGUE_NAME).read_text().startswith("my notes")
     assert len(list_recordings(folder, Refresh.ALL)) == 2

@@ -52,7 +52,7 @@ class TrackedPlace:
 
 
 class PhaseLaw:
-    """The law of the phase-locked loop.
+    """The law of the phase-locked loop (decisions 0064 and 0074).
 
     In a look of the time L the phase of a motion over its drive drifts by ``2 pi L (r - f) - h e``: f is the
     frequency, r the resonance, e the phase error in radians, and h = 2 pi L w the decay of the mode, with

@@ -291,7 +291,7 @@ _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Begin with a small drive, bring m0 to its amplitude at every frequency, record, ramp down."""
+    """Begin quietly, bring m0 to its amplitude at each frequency, record, ramp down (decision 0066)."""
     passes = tuple(plan.passes())
     loop.change(passes[0][1][0], loop.bounded_vpp(plan.start_share * loop.most_vpp))
     yield from loop.listen_to_silence()

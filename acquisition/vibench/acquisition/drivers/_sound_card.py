@@ -1,8 +1,8 @@
 """A sound card as converter and analogue output, over PortAudio, once calibrated.
 
 A sound card does not report volts and passes no DC: its full scale is measured once and written in
-``daq.options`` (docs/instruments.md); without it nothing opens. Inputs and output are one stream, so they
-begin together except for the card's delay.
+``daq.options`` (docs/instruments.md, decision 0054); without it nothing opens. Inputs and output are one
+stream, so they begin together except for the card's delay.
 """
 
 from collections import deque

@@ -108,10 +108,7 @@ class EngineProcess(ClosedOnLeaving):
 
 
 def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> EngineProcess:
-    """Start an engine of this installation, with no bench open.
-
-    Raises EngineGone when it does not start.
-    """
+    """Start an engine of this installation, with no bench open. Raises EngineGone when it does not start."""
     supervision = chosen(Supervision, supervision)
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
         [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", supervision.value],

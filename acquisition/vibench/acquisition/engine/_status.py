@@ -246,9 +246,9 @@ class EngineStatus(FrozenModel):
     """The newest, oldest first."""
 
 
-# The live twin's process, started and ended by an engine, which never waits for it. It is a viewer like any
-# other (`vibench twin`): it requests samples, reports its results, and keeps no run alive. When it is too
-# slow it skips samples; the recording does not.
+# The live twin's process (decision 0044), started and ended by an engine, which never waits for it. It is a
+# viewer like any other (`vibench twin`): it requests samples, reports its results, and keeps no run alive.
+# When it is too slow it skips samples; the recording does not.
 
 ENDING_S = 2.0
 

@@ -147,7 +147,7 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return the row of every kind: its own if it has one, otherwise that of its family.
+    """Return the row of every kind: its own if it has one, else its family's (decision 0062).
 
     Parameters
     ----------

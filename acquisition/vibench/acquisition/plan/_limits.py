@@ -378,7 +378,7 @@ def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: fl
 TOUCH_SHARE = 0.25
 """Share of the gap that p may reach in a check: a sine started at once overshoots, and impacts last."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""A specimen's resonances are known to some per cent, and near one the base moves by decibels."""
+"""Resonances are known to some per cent, and near one the base moves by decibels (decision 0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:

@@ -1,4 +1,4 @@
-"""How fast a bench's feedback acts, which decides what unstable motions it can hold."""
+"""How fast a bench's feedback acts, which decides what unstable motions it can hold (decision 0065)."""
 
 from ..rig import Rig
 
