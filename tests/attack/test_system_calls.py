@@ -224,7 +224,7 @@ for name, read in READ.items():
             print(name, number, said)
     shim.arm(PREAD, 10**6, 0, 5, bytes(copy))
     if name == "catalogue":
-        assert list_recordings(copy)[0].verdict == "good", list_recordings(copy)
+        assert list_recordings(copy)[0].verdict == "samples not checked", list_recordings(copy)
     print(name, number)
 """
 

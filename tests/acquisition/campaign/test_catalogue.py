@@ -49,7 +49,7 @@ def reads(monkeypatch):
 def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
-    assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "good", "dwell")
+    assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")
     assert (sweep.amplitude_vpp, sweep.frequency_low_hz, sweep.frequency_high_hz) == (0.5, 200, 300)
     assert dwell.size_bytes == (folder / dwell.path).stat().st_size
     assert dwell.duration_s == pytest.approx(0.6 + 0.2 + 0.1 + 0.2 + 0.2)

@@ -35,7 +35,7 @@ UNREADABLE = "unreadable"
 """State of a file that is not a recording, or is damaged; its reason says what is wrong."""
 DAMAGED = "damaged"
 """State of a recording that opens but differs from its seal."""
-GOOD = "good"
+UNCHECKED = "samples not checked"
 _FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
 
 
@@ -156,11 +156,11 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
     lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
     if lost:
         concerns.append(f"{lost} samples lost")
-    return "; ".join(concerns) or GOOD
+    return "; ".join(concerns) or UNCHECKED
 
 
 CATALOGUE_NAME = "catalogue.sqlite"
-VERSION = 3
+VERSION = 4
 """Raised whenever an entry changes; an older catalogue is then made again."""
 WAIT_S = 10.0
 """Waiting time for another program that writes the same catalogue."""

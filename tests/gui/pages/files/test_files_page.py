@@ -343,13 +343,27 @@ def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_pat
     page._looked_s = 0.0
     page.refresh()
     waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
+    waited(lambda: not shared_context.background.is_busy)
+
+
+def test_samples_that_were_changed_under_an_intact_seal_are_warned_of(page, folder, tmp_path, waited):
+    """A quick look at the seal reads no samples of a large file."""
+    path = tmp_path / "changed.h5"
+    shutil.copyfile(folder / "whole.h5", path)
+    with h5py.File(path, "r+") as file:
+        file["m0_velocity"][...] = file["m0_velocity"][...] // 2
+    page.open_path(path)
+    waited(lambda: "samples not checked yet" in page._facts.sentence)
+    waited(lambda: page._facts.sentence.startswith("✖ damaged: not as it was sealed: data of /m0_velocity"))
+    page.open_path(folder / "whole.h5")
+    waited(lambda: "  ·  all samples as they were sealed  ·  " in page._facts.sentence)
 
 
 def test_the_facts_say_a_state_once(begin_recording, tmp_path):
     writer, _ = begin_recording(tmp_path, "ended")
     path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
     with open_recording(path) as recording:
-        assert facts_text(recording).startswith("■ stopped by the operator, in the window")
+        assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
 def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path, waited):

@@ -28,7 +28,14 @@ from vibench.acquisition.campaign import (
     list_recordings,
     read_journal,
 )
-from vibench.acquisition.recording import JOURNAL_SUFFIX, Recording, RecordingState, SealDepth, SealState
+from vibench.acquisition.recording import (
+    JOURNAL_SUFFIX,
+    Recording,
+    RecordingState,
+    SealCheck,
+    SealDepth,
+    SealState,
+)
 from vibench.analysis.live import THUMBNAIL_COLUMNS, OverviewLevel, Thumbnail, overview_levels, thumbnail
 
 from ...forms.editor import Choice
@@ -196,8 +203,14 @@ def role_text(role: str) -> str:
     return printable(role.replace("_", " "))
 
 
-def facts_text(recording: Recording) -> str:
-    """Return a one-line summary of a recording."""
+def check_of_all_samples(path: Path) -> SealCheck:
+    """Check a recording against its seal, which takes seconds for a long one."""
+    with open_recording(path) as recording:
+        return recording.check_seal(SealDepth.WHOLE)
+
+
+def facts_text(recording: Recording, seal: SealCheck | None) -> str:
+    """Describe a recording in a line; ``seal`` is the check of all samples, None until it is known."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -205,9 +218,11 @@ def facts_text(recording: Recording) -> str:
         f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
         f"bench {recording.bench.get('name', 'unnamed')}",
     ]
-    seal = recording.check_seal(SealDepth.QUICK)
-    if seal.state not in (SealState.INTACT, SealState.UNFINISHED):
-        parts.insert(0, f"✖ {seal.state.value.replace('_', ' ')}: {seal.sentence}")
+    found = seal or recording.check_seal(SealDepth.QUICK)
+    if found.state not in (SealState.INTACT, SealState.UNFINISHED):
+        parts.insert(0, f"✖ {found.state.value.replace('_', ' ')}: {found.sentence}")
+    elif found.state is SealState.INTACT:
+        parts.append("samples not checked yet" if seal is None else "all samples as they were sealed")
     if recording.overloads:
         parts.append(f"{len(recording.overloads)} overloads (red)")
     if recording.gaps:
