@@ -104,9 +104,9 @@ SENSITIVITY = "accelerometer.sensitivity_v_per_m_per_s2"
 def test_a_sensitivity_is_taken_with_the_unit_of_its_certificate(tmp_path):
     rig, wrong = asked_of_a_person(tmp_path, {SENSITIVITY: ["10 pC/g", "10 mV/m/s2", "much", "100 mV/g"]})
     assert rig.accelerometer.sensitivity_v_per_m_per_s2 == pytest.approx(0.1 / 9.80665)
-    assert [part in told for part, told in zip(("charge", "two ways", "not a number"), wrong, strict=True)] == [
-        True
-    ] * 3
+    assert [
+        part in told for part, told in zip(("charge", "two ways", "not a number"), wrong, strict=True)
+    ] == [True] * 3
 
 
 def test_a_number_takes_the_place_of_a_sensitivity_with_its_unit(tmp_path):

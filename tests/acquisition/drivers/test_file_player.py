@@ -1,5 +1,6 @@
 """A recording played back: the same plan records it again, sample for sample."""
 
+import h5py
 import numpy as np
 import pytest
 
@@ -77,6 +78,17 @@ def test_the_end_of_the_recording_is_told(playing, original):
 def test_a_bench_that_does_not_fit_the_recording_is_refused(playing, daq, said):
     with pytest.raises(ConfigurationError, match=said):
         open_bench(playing(**daq), calibration=CalibrationRule.WAIVED)
+
+
+@pytest.mark.parametrize("change", ["samples", "seal"])
+def test_an_altered_recording_is_not_played_back_into_a_new_seal(playing, original, change):
+    with h5py.File(original, "r+") as file:
+        if change == "seal":
+            del file["seal"]
+        else:
+            file["m0_velocity"][...] = file["m0_velocity"][...] // 2
+    with pytest.raises(ConfigurationError, match=r"data of /m0_velocity|its seal is gone"):
+        open_bench(playing(), calibration=CalibrationRule.WAIVED)
 
 
 def test_a_recording_under_another_plan_is_refused(playing, tmp_path):

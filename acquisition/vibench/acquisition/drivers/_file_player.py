@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost
 from ..instruments import Block, Identity, Overload
-from ..recording import Recording, open_recording
+from ..recording import Recording, SealDepth, SealState, open_recording
 from ..rig import Channel, Rig, channels_of
 
 _SAME_RATE = 1e-9
@@ -30,9 +30,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError where channels, scales or rate differ from the
-        rig's.
-        """
+        """Open the recording; raises ConfigurationError where its seal, channels, scales or rate do not fit."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -40,6 +38,13 @@ class FilePlayer:
                 'daq.options.recording = "PATH.h5"'
             )
         recording = open_recording(Path(path))
+        seal = recording.check_seal(SealDepth.WHOLE)
+        if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
+            recording.close()
+            raise ConfigurationError(
+                f"{path} is damaged ({seal.sentence}). Nothing was played back, for the new file would have an "
+                "intact seal; restore it from a copy"
+            )
         channels = channels_of(rig)
         missing = [each.role.value for each in channels if each.role.value not in recording.roles]
         scales = {each.role.value: each.units_per_volt for each in channels if not missing}
