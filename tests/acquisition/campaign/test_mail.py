@@ -56,6 +56,14 @@ def settings(tmp_path, port, security="none"):
     return load_toml(path, MailSettings)
 
 
+def test_no_word_of_a_file_or_an_instrument_breaks_a_message(server, tmp_path):
+    hostile = NOTICE | {"campaign": "c\nBcc: all@lab.example", "folder": "\udcff", "reason": "\x1b[2J\r\n."}
+    said = MailMessenger(settings(tmp_path, server.server_address[1])).send(hostile)
+    assert said == "mail sent to me@lab.example"
+    assert r"reason: \x1b[2J\r\n." in server.heard
+    assert r"folder: \udcff" in server.heard
+
+
 def test_a_notice_becomes_one_message(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1])).send(NOTICE)
     assert said == "mail sent to me@lab.example"

@@ -293,6 +293,14 @@ class TestWatching:
         last = (tmp_path / "c.status").read_text().splitlines()[-1]
         assert "c is through (2 done, about 0:00:00 left)" in last
 
+    def test_words_of_an_instrument_move_no_cursor_of_who_follows_the_status(self, bench, tmp_path):
+        lost = failing_once(bench, lambda: DataLost("it replied \x1b[2J\udcff\nc is through"))
+        with pytest.raises(DataLost):
+            run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
+        text = (tmp_path / "c.status").read_text()
+        assert r"it replied \x1b[2J\udcff\nc is through" in text
+        assert "\x1b" not in text
+
     def test_half_a_line_of_a_killed_program_does_not_spoil_the_next(self, bench, tmp_path):
         (tmp_path / "c.log.jsonl").write_text('{"utc": "2026-01-01T00:00:00", "eve')
         run_campaign(bench, campaign("one"), tmp_path)

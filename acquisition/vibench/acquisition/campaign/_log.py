@@ -21,6 +21,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
 from ..errors import ConfigurationError, RecordingError
 from ..host.beside import Beside, ClosedOnLeaving
+from ..host.printable import printable
 from ..host.toml_file import FrozenModel
 from ..plan import measured_s
 from ._journal import CampaignProgress, JournalPoint, JournalPointState
@@ -165,8 +166,8 @@ class StatusLine(ClosedOnLeaving):
         self._written = monotonic()
         counts = ", ".join(f"{number} {word}" for word, number in self._counts.items())
         utc = datetime.now(UTC).isoformat(timespec="seconds")
-        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._left()} left)\n"
-        self._beside.do(lambda: self._append(line))
+        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._left()} left)"
+        self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
         # A full disk must not end a measurement because of this line.
@@ -225,10 +226,10 @@ class MailMessenger:
 
     def _message(self, notice: Mapping[str, str | int | float]) -> EmailMessage:
         message = EmailMessage()
-        message["Subject"] = f"vibench: {notice['campaign']}: {notice['event']}"
+        message["Subject"] = printable(f"vibench: {notice['campaign']}: {notice['event']}")
         message["From"] = self._settings.sender
         message["To"] = ", ".join(self._settings.recipients)
-        message.set_content("\n".join(f"{key}: {value}" for key, value in notice.items()) + "\n")
+        message.set_content("".join(f"{printable(f'{key}: {value}')}\n" for key, value in notice.items()))
         return message
 
     def _connected(self) -> smtplib.SMTP:
