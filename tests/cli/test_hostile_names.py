@@ -13,8 +13,8 @@ from vibench.cli.__main__ import COMMANDS
 
 from ..attack.recordings_corpus import good_recordings
 
-HOSTILE = "a\x1b[2J\x1b]0;title\x07\x1b]52;c;Zm9v\x07\x9b31m\u202eb\u2066\x08\r\nerror: all is well\x7f"
-"""Clears the screen, names the window, fills the clipboard, colours, reorders, and forges a line."""
+HOSTILE = "a\x1b[2J\x1b]0;title\x07\x1b]52;c;Zm9v\x07\x9b31m\u202eb\u2066\x08\r\nerror: all is well\x7f$^$"
+"""Clears the screen, names the window, fills the clipboard, reorders, forges a line, breaks formulas."""
 FORGED = re.compile(r"^error: all is well", re.MULTILINE)
 TOML = f"""
 {json.dumps(HOSTILE)} = 1
@@ -48,7 +48,8 @@ def written_over(path):
             said |= dict.fromkeys(keys, HOSTILE)
             del file[f"configuration/{text}"]
             file[f"configuration/{text}"] = np.bytes_(json.dumps(said).encode())
-        file["m0_velocity"].attrs["serial"] = np.bytes_(HOSTILE.encode())
+        for name in ("serial", "units", "long_name"):
+            file["m0_velocity"].attrs[name] = np.bytes_(HOSTILE.encode())
         _seal.write_seal(file, {}, None)
 
 

@@ -294,7 +294,7 @@ def vibench(
 def main() -> None:
     """Run the command line; an error that a user can fix is one sentence and a non-zero exit."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
-    warnings.formatwarning = lambda message, *_place, **_named: f"warning: {message}\n"
+    warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
         app()
     except CheckStopped as error:
@@ -359,15 +359,13 @@ _NO_MEMORY = (
 """Messages of the system, Python and the loader when memory is exhausted."""
 
 
-LONGEST_SENTENCE = 1800
-"""Largest length of an error sentence, which may contain text from a file."""
 NAME_SHOWN = 80
 """Displayed letters of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:
     """Print the sentence of an error, then the errors that followed it."""
-    errors.print(Text("error:", style="bold red"), shortened(str(error), LONGEST_SENTENCE))
+    errors.print(Text("error:", style="bold red"), str(error))
     for note in getattr(error, "__notes__", ()):
         errors.print(f"  {note}")
 

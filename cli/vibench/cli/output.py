@@ -9,11 +9,15 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from vibench.acquisition import printable
+from vibench.acquisition import printable, shortened
 
 if TYPE_CHECKING:
     from rich.progress import TextColumn
     from rich.table import Table
+
+
+LONGEST_LINE = 1800
+"""Characters: a name in a file may have any length."""
 
 
 class PrintableConsole(Console):
@@ -21,7 +25,7 @@ class PrintableConsole(Console):
 
     def print(self, *objects: Any, **settings: Any) -> None:
         """Print each string as one line; use `paragraph` for text of several lines."""
-        super().print(*(printable(each) if isinstance(each, str) else each for each in objects), **settings)
+        super().print(*map(_shown, objects), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render tables, bars and lines in the same way."""
@@ -30,7 +34,11 @@ class PrintableConsole(Console):
             yield segment if segment.control else Segment(text, segment.style)
 
 
-# Markup and emoji are disabled, because names and paths may contain similar text.
+def _shown(each: Any) -> Any:
+    return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
+
+
+# Neither markup nor emoji: names and paths may hold what looks like some.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 

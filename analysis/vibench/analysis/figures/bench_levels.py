@@ -3,7 +3,7 @@
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts
 from ..tables import table
-from .style import MEASURED, DrawnFigure, new_figure, prefixed, styled
+from .style import MEASURED, DrawnFigure, new_figure, plain_label, prefixed, styled
 
 _ROW_IN = 0.85
 _FRAME_IN = 0.6
@@ -22,7 +22,8 @@ def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
             axes.fill_between(
                 shape.time_s, factor * shape.lower, factor * shape.upper, color=MEASURED, linewidth=0.3
             )
-            axes.set_ylabel(f"{level.header.role.replace('_', chr(10))}\n[{unit}]", fontsize=7.5)
+            role = plain_label(level.header.role).replace("_", "\n")
+            axes.set_ylabel(f"{role}\n[{plain_label(unit)}]", fontsize=7.5)
         panels[-1].set_xlabel("time since the first sample [s]")
         panels[-1].set_xlim(0, facts.duration_s)
         figure.align_ylabels()
