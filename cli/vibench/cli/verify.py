@@ -47,7 +47,8 @@ def verify(
     else:
         for each in found:
             console.print(f"{each.verdict:10}  {each.path}: {each.sentence}")
-        console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()) or "no recordings")
+        summary = [f"{count} {verdict}" for verdict, count in counts.items()] or ["no recordings"]
+        console.print(", ".join([*summary, "samples not checked"] if quick else summary))
     bad = [each for each in found if each.is_bad]
     if bad:
         named = ", ".join(each.path for each in bad[:MOST_NAMED]) + (" and more" if bad[MOST_NAMED:] else "")

@@ -30,7 +30,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError where its seal, channels, scales or rate do not fit."""
+        """Open the recording; raises ConfigurationError where seal, channels, scales or rate do not fit."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -42,8 +42,8 @@ class FilePlayer:
         if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
             recording.close()
             raise ConfigurationError(
-                f"{path} is damaged ({seal.sentence}). Nothing was played back, for the new file would have an "
-                "intact seal; restore it from a copy"
+                f"{path} is damaged ({seal.sentence}), and the new file would have an intact seal. Nothing "
+                "was played back; restore it from a copy"
             )
         channels = channels_of(rig)
         missing = [each.role.value for each in channels if each.role.value not in recording.roles]

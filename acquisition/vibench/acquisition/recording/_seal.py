@@ -46,6 +46,7 @@ QUICK_BYTES = 65_536
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Names the file with the key, for every command and program."""
 SHORTEST_KEY = 16
+AS_SEALED = "as it was sealed"
 
 
 Manifest = dict[str, dict[str, str]]
@@ -167,7 +168,8 @@ def check_seal(
     if differing:
         more = f" and {len(differing) - 3} more" if len(differing) > 3 else ""
         return SealCheck(SealState.DAMAGED, f"not as it was sealed: {', '.join(differing[:3])}{more}", seal)
-    return _signature_check(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal)
+    as_sealed = AS_SEALED if depth is SealDepth.WHOLE else f"{AS_SEALED}, samples not checked"
+    return _signature_check(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal, as_sealed)
 
 
 def require_reachable(file: h5py.File | str, error: Exception) -> None:
@@ -331,19 +333,20 @@ def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
     return SealCheck(SealState.OTHER_KEY, f"it has no seal, and none by the key given ({key.name})", "")
 
 
-def _signature_check(text: str, signed: list[str], key: SealKey | None, seal: str) -> SealCheck:
+def _signature_check(
+    text: str, signed: list[str], key: SealKey | None, seal: str, as_sealed: str = AS_SEALED
+) -> SealCheck:
     signature, key_id = signed
     if key is None:
         also = f"; signed with the key {key_id}, which was not given" if key_id else ""
-        return SealCheck(SealState.INTACT, f"as it was sealed{also}", seal)
+        return SealCheck(SealState.INTACT, f"{as_sealed}{also}", seal)
     if not signature or key_id != key.name:
         by = f"with the key {key_id}" if key_id else "without a key"
-        return SealCheck(
-            SealState.OTHER_KEY, f"as it was sealed, but {by}, not with the one given ({key.name})", seal
-        )
+        sentence = f"{as_sealed}, but {by}, not with the one given ({key.name})"
+        return SealCheck(SealState.OTHER_KEY, sentence, seal)
     if not hmac.compare_digest(signature.encode(), key.signature(text.encode()).encode()):
         return SealCheck(SealState.DAMAGED, "its signature is not that of the key: it was forged", seal)
-    return SealCheck(SealState.INTACT, f"as it was sealed, and signed with the key {key.name}", seal)
+    return SealCheck(SealState.INTACT, f"{as_sealed}, and signed with the key {key.name}", seal)
 
 
 def _sha256(raw: bytes) -> str:

@@ -119,6 +119,19 @@ def test_a_recording_whose_seal_is_gone_is_warned_of(opened):
     assert page._facts.sentence.startswith("✖ seal gone: its seal is gone")
 
 
+def test_samples_that_were_changed_under_an_intact_seal_are_warned_of(page, folder, tmp_path, waited):
+    """A quick look at the seal reads no samples of a large file."""
+    path = tmp_path / "changed.h5"
+    shutil.copyfile(folder / "whole.h5", path)
+    with h5py.File(path, "r+") as file:
+        file["m0_velocity"][...] = file["m0_velocity"][...] // 2
+    page.open_path(path)
+    waited(lambda: "as it was sealed, samples not checked" in page._facts.sentence)
+    waited(lambda: page._facts.sentence.startswith("✖ damaged: not as it was sealed: data of /m0_velocity"))
+    page.open_path(folder / "whole.h5")
+    waited(lambda: "  ·  as it was sealed  ·  " in page._facts.sentence)
+
+
 def test_a_name_moves_no_cursor_and_reorders_no_text(page, folder, waited, tmp_path):
     shutil.copyfile(folder / "whole.h5", tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
     page._go_to(tmp_path)
@@ -344,19 +357,6 @@ def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_pat
     page.refresh()
     waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
     waited(lambda: not shared_context.background.is_busy)
-
-
-def test_samples_that_were_changed_under_an_intact_seal_are_warned_of(page, folder, tmp_path, waited):
-    """A quick look at the seal reads no samples of a large file."""
-    path = tmp_path / "changed.h5"
-    shutil.copyfile(folder / "whole.h5", path)
-    with h5py.File(path, "r+") as file:
-        file["m0_velocity"][...] = file["m0_velocity"][...] // 2
-    page.open_path(path)
-    waited(lambda: "samples not checked yet" in page._facts.sentence)
-    waited(lambda: page._facts.sentence.startswith("✖ damaged: not as it was sealed: data of /m0_velocity"))
-    page.open_path(folder / "whole.h5")
-    waited(lambda: "  ·  all samples as they were sealed  ·  " in page._facts.sentence)
 
 
 def test_the_facts_say_a_state_once(begin_recording, tmp_path):

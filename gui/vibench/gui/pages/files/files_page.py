@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from vibench.acquisition import RecordingError, open_recording, printable
-from vibench.acquisition.recording import Recording, SealCheck, name_now
+from vibench.acquisition.campaign import VerifiedRecording
+from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
 from vibench.sim.background import Job
 
@@ -26,12 +27,12 @@ from .recording_table import (
     Listing,
     RecordingTable,
     add_note,
-    check_of_all_samples,
     export_recording,
     facts_text,
     read_levels,
     read_listing,
     thumbnails,
+    whole_check,
 )
 from .spectrogram_view import Pictures
 
@@ -39,7 +40,7 @@ EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
 """Interval between checks for deleted files [s]."""
 CHECK_WAIT_MS = 250
-"""How long a recording stays open before its samples are checked."""
+"""How long a recording stays open before it is checked whole."""
 
 
 class FilesPage(Page):
@@ -57,8 +58,8 @@ class FilesPage(Page):
         """The recording in the pictures."""
         self._listing: Job | None = None
         self._making: Job | None = None
-        self._sample_check = LatestRequest(
-            context.background, check_of_all_samples, self._show_facts, self._failed, CHECK_WAIT_MS, self
+        self._check = LatestRequest(
+            context.background, whole_check, self._show_facts, self._failed, CHECK_WAIT_MS, self
         )
         self._wanted: Path | None = None
         self._folder = context.folder
@@ -208,18 +209,18 @@ class FilesPage(Page):
             return
         self._show_facts()
         if not self._opened.is_growing:
-            self._sample_check.ask(self._opened.path)
+            self._check.ask(self._opened.path)
         hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
         self.pictures.show_recording(RecordingOverview(self._opened, levels), hint)
         self._pictured_path = self._opened.path
         self._say_view()
 
-    def _show_facts(self, seal: SealCheck | None = None) -> None:
+    def _show_facts(self, found: VerifiedRecording | None = None) -> None:
         if self._opened is not None:
-            self._facts.setText(facts_text(self._opened, seal))
+            self._facts.setText(facts_text(self._opened, found))
 
     def _close(self) -> None:
-        self._sample_check.drop()
+        self._check.drop()
         self.pictures.show_recording(None, "Reading the recording…")
         self._pictured_path = None
         if self._opened is not None:

@@ -25,14 +25,15 @@ from vibench.acquisition.campaign import (
     UNREADABLE,
     CatalogueEntry,
     JournalPointState,
+    VerifiedRecording,
     list_recordings,
     read_journal,
+    verify_recordings,
 )
 from vibench.acquisition.recording import (
     JOURNAL_SUFFIX,
     Recording,
     RecordingState,
-    SealCheck,
     SealDepth,
     SealState,
 )
@@ -203,14 +204,13 @@ def role_text(role: str) -> str:
     return printable(role.replace("_", " "))
 
 
-def check_of_all_samples(path: Path) -> SealCheck:
-    """Check a recording against its seal, which takes seconds for a long one."""
-    with open_recording(path) as recording:
-        return recording.check_seal(SealDepth.WHOLE)
+def whole_check(path: Path) -> VerifiedRecording:
+    """Check all samples and results against their seals, which takes seconds for a long recording."""
+    return verify_recordings(path)[0]
 
 
-def facts_text(recording: Recording, seal: SealCheck | None) -> str:
-    """Describe a recording in a line; ``seal`` is the check of all samples, None until it is known."""
+def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
+    """Describe a recording in a line; ``found`` is its whole check, None until that has ended."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -218,11 +218,13 @@ def facts_text(recording: Recording, seal: SealCheck | None) -> str:
         f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
         f"bench {recording.bench.get('name', 'unnamed')}",
     ]
-    found = seal or recording.check_seal(SealDepth.QUICK)
-    if found.state not in (SealState.INTACT, SealState.UNFINISHED):
-        parts.insert(0, f"✖ {found.state.value.replace('_', ' ')}: {found.sentence}")
-    elif found.state is SealState.INTACT:
-        parts.append("samples not checked yet" if seal is None else "all samples as they were sealed")
+    if found is None:
+        quick = recording.check_seal(SealDepth.QUICK)
+        found = VerifiedRecording("", quick.state.value, quick.sentence, quick.seal, {})
+    if found.is_bad or found.verdict == SealState.UNSEALED:
+        parts.insert(0, f"✖ {found.verdict.replace('_', ' ')}: {found.sentence}")
+    elif found.verdict == SealState.INTACT:
+        parts.append(found.sentence)
     if recording.overloads:
         parts.append(f"{len(recording.overloads)} overloads (red)")
     if recording.gaps:
