@@ -270,7 +270,7 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
         signal_name(number): (
             send(number), WITHIN_ABORT_S + (RAMP_S if number == signal.SIGINT else 0.0), SUBJECTS
         )
-        for number in heeded_signals()
+        for number in sorted({*heeded_signals(), signal.SIGHUP})  # under nohup, too: the draw is the same
         if signal_name(number) in signal.Signals.__members__
     },
 }  # fmt: skip
@@ -403,6 +403,7 @@ def kill_cells() -> list[Cell]:
 
 def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
     """Be the process that drives: `vibench measure`, the window, or another one that attends an engine."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     rig = Rig.model_validate_json(Path(rig_path).read_text())
     campaign = Path(folder).with_suffix(".toml")
     plan = Campaign.model_validate(PLAN)
