@@ -123,7 +123,7 @@ def amplitudes(out: Path) -> dict[str, float]:
                 continue
             name = str(recording.plan["name"])
             assert name not in found, f"{name} was made twice"
-            assert recording.is_intact("m0_velocity")
+            assert recording.check_seal("whole").state.value == "intact"
             (dwell,) = (each for each in recording.segments if each.label == "dwell")
             values = recording.read("m0_velocity", dwell.first_sample, dwell.last_sample + 1)
             found[name] = float(np.sqrt(2) * np.std(values))

@@ -92,7 +92,7 @@ def test_a_disk_that_refuses_while_recording_keeps_what_was_committed(tmp_path):
         assert recording.state is RecordingState.FAILED
         assert recording.reason.startswith("full; the disk refused")
         assert 20_000 <= recording.samples <= 50_000
-        assert recording.is_intact("response")
+        assert recording.check_seal("whole").state.value == "intact"
 
 
 def test_a_disk_that_is_full_at_the_end_leaves_a_part_to_recover(tmp_path):

@@ -176,7 +176,7 @@ def require_kept(killed):
         else:
             assert recording.samples == FINISHED_BLOCKS * child.BLOCK
         require_truth(recording)
-        assert all(recording.is_intact(role) for role in recording.roles)
+        assert recording.check_seal("whole").state.value == "intact"
 
 
 def killed_at(folder, moments, seed):

@@ -25,7 +25,7 @@ def test_every_24_bit_count_comes_back(tmp_path, make_header, make_block):
         assert recording.duration_s == 4.0
         for row, role in enumerate(recording.roles):
             np.testing.assert_array_equal(recording.read_counts(role), truth[row])
-            assert recording.is_intact(role)
+        assert recording.check_seal("whole").state.value == "intact"
         step = 5.0 / 2**23
         np.testing.assert_allclose(
             recording.read("m0_velocity"), 0.125 * (truth[1] + 1.5) * step, rtol=1e-13, atol=1e-18

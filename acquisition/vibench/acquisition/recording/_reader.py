@@ -1,6 +1,5 @@
 """Reading a recording, days later, on another machine, or while it is still growing."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -289,18 +288,6 @@ class Recording(RecordingDescription):
         for first in range(begin, end, samples):
             last = min(first + samples, end)
             yield RecordedBlock(first, np.stack([self.read(role, first, last) for role in roles]))
-
-    def is_intact(self, role: str) -> bool:
-        """Whether the channel's samples still have the checksum they were recorded with.
-
-        A ``.part`` has no checksum yet: RecordingError.
-        """
-        self._require_finished("checked")
-        digest = hashlib.sha256()
-        for first in range(0, self.samples, layout.CHUNK_SAMPLES):
-            stop = min(first + layout.CHUNK_SAMPLES, self.samples)
-            digest.update(self.read_counts(role, first, stop).astype(layout.COUNT_DTYPE).data)
-        return digest.hexdigest() == read_attributes(self._open.file[role])["sha256"]
 
     def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
         """Check the recording against its own seal, and against the one in a campaign's journal.
