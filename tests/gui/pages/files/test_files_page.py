@@ -19,7 +19,14 @@ from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files import files_page as _files_page
 from vibench.gui.pages.files.files_page import FilesPage
-from vibench.gui.pages.files.recording_table import HEADINGS, facts_text, read_levels, read_listing
+from vibench.gui.pages.files.recording_table import (
+    HEADINGS,
+    add_note,
+    facts_text,
+    read_levels,
+    read_listing,
+    whole_check,
+)
 from vibench.gui.widgets.theme import DARK
 
 IMPACT_S = 40_002 / 6400.0
@@ -357,6 +364,18 @@ def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_pat
     page.refresh()
     waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
     waited(lambda: not shared_context.background.is_busy)
+
+
+def test_a_forged_note_is_not_shown(record, tmp_path):
+    path = add_note(record(tmp_path, "forged"), "glue was still wet")
+    with h5py.File(path, "r+") as file:
+        del file["results/note/settings_json"]
+        file["results/note/settings_json"] = np.bytes_(b'{"text": "glue was dry"}')
+    with open_recording(path) as recording:
+        said = facts_text(recording, whole_check(path))
+    assert "glue was dry" not in said
+    assert "note: ✖ " in said
+    assert "not as they were saved: results note" in said
 
 
 def test_the_facts_say_a_state_once(begin_recording, tmp_path):

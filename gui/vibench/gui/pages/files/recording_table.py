@@ -143,10 +143,13 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the notes of the plan and those added later, the oldest first."""
+    """Return the notes of the plan, and those added later, the oldest first, or why none is readable."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
-    added = sorted(recording.results.values(), key=lambda each: each.saved_utc) if has_more else []
+    try:
+        added = sorted(recording.results.values(), key=lambda each: each.saved_utc) if has_more else []
+    except RecordingError as error:
+        return tuple(filter(None, (plan, f"✖ {error}")))
     more = [str(each.settings.get("text", "")) for each in added if each.name.startswith(NOTE)]
     return tuple(filter(None, (plan, *more)))
 
