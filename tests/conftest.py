@@ -92,7 +92,6 @@ LONG = (
     "tests/analysis/sine/test_jumps.py",
     "tests/cli/test_study.py",
     "tests/analysis/report/test_report.py",
-    "tests/sim/exponents/test_two_trajectories.py",
     "tests/acquisition/run/test_stream_faults.py",
     "tests/acquisition/bench/test_bench.py",
     "tests/acquisition/drivers/test_daqmx_output.py",

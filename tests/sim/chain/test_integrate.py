@@ -25,8 +25,6 @@ from vibench.sim.chain._tables import chain_tables
 
 pytestmark = pytest.mark.timeout(300)
 
-PERIODIC = Harmonic(130.0, 20e-6)
-"""One cell strikes about 260 times a second and settles on a stable period."""
 HARD = Harmonic(220.0, 40e-6)
 STILL = Harmonic(100.0, 0.0)
 UNITS = np.repeat([1e-4, 0.1], 3)
@@ -105,18 +103,6 @@ def energy(chain, states):
     return linear + np.sum(contact, axis=0)
 
 
-@pytest.mark.parametrize("accuracy", list(Accuracy))
-def test_one_cell_settles_on_the_periodic_motion_of_the_specimen(accuracy):
-    specimen = gong2025(damping_time_s=3e-5)
-    ours = integrate_chain(chain_of(specimen, 1), PERIODIC, 2.0, accuracy)
-    theirs = integrate(specimen, PERIODIC, 2.0, Accuracy.REFERENCE)
-    assert ours.impacts.count == theirs.impacts.count
-    bound = {Accuracy.QUICK: 3e-4, Accuracy.STANDARD: 3e-6, Accuracy.REFERENCE: 1e-9}[accuracy]
-    assert distance(ours.final_state[0], theirs.final_state) < bound
-    if accuracy is Accuracy.REFERENCE:
-        np.testing.assert_allclose(ours.impacts.times_s, theirs.impacts.times_s, atol=1e-11)
-
-
 @pytest.mark.parametrize("law", ["hertz", "hunt_crossley:0.5", "linear_gap:2e5", "linear", "power:3+5+7"])
 def test_one_cell_by_windows_is_the_specimen_that_the_scalar_engine_follows(law):
     specimen = gong2025(contact=law)
@@ -130,16 +116,6 @@ def test_one_cell_by_windows_is_the_specimen_that_the_scalar_engine_follows(law)
         assert distance(ours.motion[0], theirs.final_state) < bound
 
 
-@pytest.mark.thorough
-def test_two_cells_move_as_an_independent_integrator_restarted_at_every_touch_says():
-    chain = chain_of(gong2025(), 2)
-    theirs = independent(chain, HARD, 0.008, lively(2))
-    runs = {level: integrate_chain(chain, HARD, 0.008, level, lively(2)) for level in Accuracy}
-    assert np.all(runs[Accuracy.REFERENCE].impacts.per_cell >= 2)
-    assert distance(runs[Accuracy.REFERENCE].final_state, theirs) < 1e-8
-    assert distance(runs[Accuracy.STANDARD].final_state, theirs) < 1e-3
-
-
 def test_cells_of_every_law_move_together_as_an_independent_integrator_says():
     paper = gong2025()
     chain = Chain(
@@ -150,12 +126,12 @@ def test_cells_of_every_law_move_together_as_an_independent_integrator_says():
                 paper, contact=HuntCrossley(paper.contact.stiffness, 0.3), gap_m=30e-6, dampings=(0.3, 0, 0.1)
             ),
             gong2025(contact="power:29"),
+            paper,
         )
     )
-    theirs = independent(chain, HARD, 0.004, lively(4, 3))
-    ours = integrate_chain(chain, HARD, 0.004, Accuracy.REFERENCE, lively(4, 3))
-    assert ours.impacts.per_cell[0] > 0
-    assert ours.impacts.per_cell[2] > 0
+    theirs = independent(chain, HARD, 0.004, lively(5, 3))
+    ours = integrate_chain(chain, HARD, 0.004, Accuracy.REFERENCE, lively(5, 3))
+    assert np.all(ours.impacts.per_cell[[0, 2, 4]] > 0)
     assert distance(ours.final_state, theirs) < 1e-7
 
 

@@ -135,14 +135,6 @@ def energy_j(specimen, state):
     return 0.5 * v @ specimen.mass_matrix @ v + 0.5 * x @ specimen.stiffness_matrix @ x
 
 
-def test_a_mirrored_start_half_a_period_on_moves_as_the_mirror_image():
-    drive = Harmonic(130.0, 2e-5)
-    start = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
-    mirrored = Harmonic(130.0, 2e-5, phase_rad=math.pi)
-    one, other = followed(SPECIMEN, [drive, mirrored], [start, -start], [50, 50])
-    assert off(one.states, -other.states).max() < 1e-9
-
-
 @pytest.mark.parametrize(
     ("specimen", "tolerance", "follows"),
     [

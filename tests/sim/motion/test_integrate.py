@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from scipy.integrate import simpson, solve_ivp
+from scipy.integrate import simpson
 
+from tests.sim.as_written import as_written, distance, paper
 from vibench.sim import (
     Accuracy,
     Harmonic,
     LinearSweep,
-    LogarithmicSweep,
     Outcome,
     Sampled,
     base_transmissibility,
@@ -20,34 +20,6 @@ from vibench.sim.motion.integrate import HERMITE, sweep_interval_s
 
 PERIODIC = Harmonic(130.0, 20e-6)
 """Strikes about 260 times a second and settles on a stable period."""
-INDEPENDENT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "max_step": 2e-5}
-CHAOTIC = Harmonic(260.0, 5e-6)
-
-
-def paper(**options):
-    return gong2025(**{"damping_time_s": 3e-5, **options})
-
-
-def equations(specimen, displacement, velocity):
-    """Section 0 of the model as written, with the 3/2 power: an independent right-hand side."""
-    m0, m1, m2 = specimen.masses
-    k0, k1, k2 = specimen.stiffnesses
-    c0, c1, c2 = specimen.dampings
-
-    def rates(t, state):
-        x, y, z, vx, vy, vz = state
-        p, rate = y - z, vy - vz
-        force = np.sign(p) * specimen.contact.stiffness * max(abs(p) - specimen.gap_m, 0.0) ** 1.5
-        upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * p + c1 * rate + force
-        base = k0 * (displacement(t) - x) + c0 * (velocity(t) - vx)
-        return [vx, vy, vz, (upper + base) / m0, -inner / m1, (inner - upper) / m2]
-
-    return rates
-
-
-def distance(first, second):
-    """Largest difference of two states in units of 100 um and 0.1 m/s."""
-    return np.max(np.abs(first - second) / np.repeat([1e-4, 0.1], 3))
 
 
 def energy(specimen, state):
@@ -59,31 +31,6 @@ def energy(specimen, state):
     elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
     contact = 0.4 * specimen.contact.stiffness * pressed**2.5
     return 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2 + elastic) + contact
-
-
-@pytest.mark.parametrize("drive", [PERIODIC, CHAOTIC])
-def test_an_independent_integrator_of_the_equations_as_written_agrees(drive):
-    specimen, omega = paper(), 2.0 * np.pi * drive.frequency_hz
-    rates = equations(
-        specimen,
-        lambda t: drive.amplitude_m * np.sin(omega * t),
-        lambda t: drive.amplitude_m * omega * np.cos(omega * t),
-    )
-    ours = integrate(specimen, drive, 0.03, Accuracy.REFERENCE)
-    theirs = solve_ivp(
-        rates, (0.0, 0.03), np.zeros(6), method="DOP853", rtol=1e-11, atol=1e-14, max_step=2e-5
-    )
-    assert ours.impacts.count > 2
-    assert distance(ours.final_state, theirs.y[:, -1]) < 2e-6
-
-
-def test_each_level_of_accuracy_is_nearer_to_the_reference_in_a_periodic_motion():
-    specimen = paper()
-    runs = {level: integrate(specimen, PERIODIC, 2.0, level) for level in Accuracy}
-    reference = runs[Accuracy.REFERENCE]
-    assert {run.impacts.count for run in runs.values()} == {523}
-    assert distance(runs[Accuracy.QUICK].final_state, reference.final_state) < 2e-5
-    assert distance(runs[Accuracy.STANDARD].final_state, reference.final_state) < 2e-6
 
 
 def test_without_contact_a_long_run_ends_on_the_exact_transmissibility():
@@ -136,48 +83,24 @@ def test_in_a_periodic_motion_the_drive_does_the_work_that_the_dampers_take():
     assert work == pytest.approx(taken, rel=1e-6)
 
 
-@pytest.mark.parametrize("drive", [PERIODIC, LinearSweep(100.0, 300.0, 1.0, 10e-6)])
-def test_sampling_does_not_change_the_motion_by_one_bit(drive):
-    plain = integrate(paper(), drive, 0.3)
-    for rate in (777.0, 48_000.0):
-        sampled = integrate(paper(), drive, 0.3, sample_rate_hz=rate)
-        np.testing.assert_array_equal(sampled.final_state, plain.final_state)
-        np.testing.assert_array_equal(sampled.impacts.times_s, plain.impacts.times_s)
-
-
-def test_samples_lie_on_the_motion_in_flight_and_in_contact():
-    specimen = paper()
+@pytest.mark.parametrize("contact", ["hertz", "hunt_crossley:0.5", "linear_gap", "power:3", "power:47"])
+def test_samples_lie_on_the_motion_in_flight_and_in_contact(contact):
+    specimen = paper(contact)
     run = integrate(specimen, PERIODIC, 0.1, Accuracy.REFERENCE, sample_rate_hz=50_000.0)
     p = run.states[:, 1] - run.states[:, 2]
     pressed = np.flatnonzero(np.abs(p) > specimen.gap_m)
     assert len(run.time_s) == 5001
-    assert len(pressed) > 10
+    assert len(pressed) > 10 or contact == "power:3"
     for index in (*pressed[:5], 1234):
         there = integrate(specimen, PERIODIC, float(run.time_s[index]), Accuracy.REFERENCE)
         assert distance(there.final_state, run.states[index]) < 1e-8
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.floats(0.0, 0.25))
-def test_a_run_in_two_parts_ends_where_the_whole_does(first_s):
-    specimen = paper()
-    for drive in (PERIODIC, LogarithmicSweep(90.0, 150.0, 0.25, 20e-6)):
-        whole = integrate(specimen, drive, 0.25, Accuracy.REFERENCE)
-        first = integrate(specimen, drive, first_s, Accuracy.REFERENCE)
-        second = integrate(
-            specimen, drive, 0.25 - first_s, Accuracy.REFERENCE, first.final_state, start_time_s=first_s
-        )
-        assert first.impacts.count + second.impacts.count in range(
-            whole.impacts.count, whole.impacts.count + 2
-        )
-        assert distance(second.final_state, whole.final_state) < 1e-6
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.floats(60.0, 500.0), st.floats(2e-6, 30e-6))
-def test_half_a_turn_of_the_drive_mirrors_the_motion(frequency_hz, amplitude_m):
-    here = integrate(paper(), Harmonic(frequency_hz, amplitude_m), 0.02, Accuracy.REFERENCE)
-    there = integrate(paper(), Harmonic(frequency_hz, amplitude_m, np.pi), 0.02, Accuracy.REFERENCE)
+@given(st.floats(60.0, 500.0), st.floats(2e-6, 30e-6), st.sampled_from(["hertz", "linear_gap", "power:5"]))
+def test_half_a_turn_of_the_drive_mirrors_the_motion(frequency_hz, amplitude_m, contact):
+    here = integrate(paper(contact), Harmonic(frequency_hz, amplitude_m), 0.02, Accuracy.REFERENCE)
+    there = integrate(paper(contact), Harmonic(frequency_hz, amplitude_m, np.pi), 0.02, Accuracy.REFERENCE)
     assert here.impacts.count == there.impacts.count
     assert distance(here.final_state, -there.final_state) < 1e-6
 
@@ -198,36 +121,11 @@ def test_a_sampled_sine_drives_like_the_sine_itself_with_order_four():
 
 def test_a_sweep_agrees_with_an_independent_integrator_within_its_stated_error():
     specimen, sweep = paper(), LinearSweep(80.0, 300.0, 0.05, 20e-6)
-
-    def angle(t):
-        return 2.0 * np.pi * sweep.turns(np.asarray(t))
-
-    rates = equations(
-        specimen,
-        lambda t: sweep.amplitude_m * np.sin(angle(t)),
-        lambda t: 2.0 * np.pi * sweep.frequency_hz(np.asarray(t)) * sweep.amplitude_m * np.cos(angle(t)),
-    )
     ours = integrate(specimen, sweep, 0.03, Accuracy.REFERENCE)
-    theirs = solve_ivp(
-        rates, (0.0, 0.03), np.zeros(6), method="DOP853", rtol=1e-11, atol=1e-14, max_step=2e-5
-    )
     assert ours.impacts.count > 2
-    assert distance(ours.final_state, theirs.y[:, -1]) < 3e-6
+    assert distance(ours.final_state, as_written(specimen, sweep, 0.03)) < 3e-6
     turn = 2.0 * np.pi * sweep.highest_hz * sweep_interval_s(sweep, Accuracy.REFERENCE)
     assert turn**4 / HERMITE < 1e-11
-
-
-def test_a_drive_that_just_touches_strikes_and_one_a_hair_below_does_not():
-    specimen = paper()
-    frequency_hz = 130.0
-    reach = abs(base_transmissibility(specimen, frequency_hz)[0, 3])
-    threshold = specimen.gap_m / reach
-    for ratio, strikes in ((1.0 - 1e-9, False), (1.0 + 1e-9, True)):
-        drive = Harmonic(frequency_hz, threshold * ratio)
-        motion = base_transmissibility(specimen, frequency_hz)[0, :3] * drive.amplitude_m * -1j
-        steady = np.concatenate([motion, 2j * np.pi * frequency_hz * motion]).real
-        run = integrate(specimen, drive, 3.3 / frequency_hz, initial_state=steady)
-        assert (run.impacts.count > 0) is strikes
 
 
 @settings(max_examples=15, deadline=None)
@@ -256,18 +154,6 @@ def test_too_many_impacts_end_the_run_and_say_what_to_change():
     assert run.end_time_s < 30.0
     assert run.impacts.count == 400
     assert "max_impact_rate_hz" in run.outcome.text
-
-
-def test_a_motion_beyond_all_numbers_is_an_outcome_and_does_not_hang():
-    run = integrate(paper(), Harmonic(200.0, 1e100), 1.0)
-    assert run.outcome is not Outcome.REACHED_END
-
-
-@pytest.mark.parametrize("amplitude_m", [1e-3, 1e-1])
-def test_a_violent_drive_is_allowed(amplitude_m):
-    run = integrate(paper(), Harmonic(200.0, amplitude_m), 0.1)
-    assert run.outcome is Outcome.REACHED_END
-    assert run.impacts.count > 0
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from hypothesis import example, given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from tests.sim.as_written import distance
 from vibench.sim import (
     Accuracy,
     Harmonic,
@@ -32,11 +33,6 @@ BOUNCING = Harmonic(130.0, 20e-6)
 
 def rigid(restitution, **options):
     return gong2025(**{"damping_time_s": 3e-5, "contact": f"rigid:{restitution}", **options})
-
-
-def distance(first, second):
-    """Largest difference of two states in units of 100 um and 0.1 m/s."""
-    return np.max(np.abs(first - second) / np.repeat([1e-4, 0.1], 3))
 
 
 def relative(states):
@@ -410,28 +406,6 @@ def test_a_run_in_two_parts_ends_where_the_whole_does_even_cut_while_held(first_
             specimen, drive, 0.03 - first_s, Accuracy.REFERENCE, first.final_state, start_time_s=first_s
         )
         assert distance(second.final_state, whole.final_state) < 1e-5
-
-
-@pytest.mark.parametrize(("restitution", "drive"), [(0.0, STICKING), (0.6, STICKING), (0.9, BOUNCING)])
-def test_the_responses_with_rigid_stops_are_those_of_the_trajectory(restitution, drive):
-    specimen = rigid(restitution)
-    response = steady_response(specimen, drive, duration_s=0.5, window_s=0.1)
-    run = integrate(specimen, drive, 0.5, sample_rate_hz=1e6)
-    window = run.time_s > 0.4 - 1e-9
-    x, p = run.states[window, 0], relative(run.states[window])[0]
-    against = 2.0 * np.exp(-2j * np.pi * drive.frequency_hz * run.time_s[window])
-    assert response.impacts + response.impacts_before == run.impacts.count
-    assert response.largest_x_m == pytest.approx(np.abs(x).max(), rel=1e-6)
-    assert response.largest_p_m == pytest.approx(specimen.gap_m, rel=1e-9)
-    assert response.line_x_m == pytest.approx(np.trapezoid(x * against, run.time_s[window]) / 0.1, rel=1e-5)
-    assert response.line_p_m == pytest.approx(np.trapezoid(p * against, run.time_s[window]) / 0.1, rel=1e-5)
-
-
-def test_sampling_changes_no_bit_of_a_motion_that_sticks():
-    plain = integrate(rigid(0.6), STICKING, 0.3)
-    sampled = integrate(rigid(0.6), STICKING, 0.3, sample_rate_hz=7777.0)
-    np.testing.assert_array_equal(sampled.final_state, plain.final_state)
-    np.testing.assert_array_equal(sampled.impacts.times_s, plain.impacts.times_s)
 
 
 @pytest.mark.parametrize("p", [45.1e-6, -46e-6])

@@ -1,0 +1,44 @@
+"""The equations of motion as written, integrated by scipy, and how states are compared."""
+
+import math
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from vibench.sim import Harmonic, gong2025, spring_of
+
+UNITS = np.repeat([1e-4, 0.1], 3)
+"""Of an error: 100 um and 0.1 m/s."""
+
+
+def paper(contact="hertz", **options):
+    return gong2025(**{"damping_time_s": 3e-5, "contact": contact, **options})
+
+
+def distance(first, second):
+    """Largest difference of two states in units of 100 um and 0.1 m/s."""
+    return np.max(np.abs(first - second) / UNITS)
+
+
+def as_written(specimen, drive, duration_s, start=(0.0,) * 6, longest_step_s=2e-5):
+    """Final state by scipy, from the paper's equations and the force as harmonic balance knows it."""
+    (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
+    spring, size = spring_of(specimen), drive.amplitude_m
+
+    def turning(t):
+        """Angle of the drive and its rate."""
+        if isinstance(drive, Harmonic):
+            omega = 2.0 * math.pi * drive.frequency_hz
+            return omega * t, omega
+        return 2.0 * math.pi * drive.turns(np.asarray(t)), 2.0 * math.pi * drive.frequency_hz(np.asarray(t))
+
+    def rates(t, state):
+        x, y, z, vx, vy, vz = state
+        angle, omega = turning(t)
+        force = spring.force(np.array([y - z]), np.array([vy - vz]))[0]
+        upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * (y - z) + c1 * (vy - vz) + force
+        base = k0 * (size * math.sin(angle) - x) + c0 * (size * omega * math.cos(angle) - vx)
+        return [vx, vy, vz, (upper + base) / m0, -inner / m1, (inner - upper) / m2]
+
+    limits = {"rtol": 1e-11, "atol": 1e-15, "max_step": longest_step_s}
+    return solve_ivp(rates, (0.0, duration_s), start, "DOP853", **limits).y[:, -1]
