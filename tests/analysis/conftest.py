@@ -1,25 +1,11 @@
 """Recordings for the tests of analysis: made once, of a specimen whose answer is known."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import Dwell, SineSweep, SteppedSine, StreamedNoise, WhiteNoise
 
-
-def _load(name):
-    """The tests are no package: a module beside this file is loaded by its path."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-synthetic = _load("synthetic_recordings")
 A0_WEAK, A0_STRONG = 0.5e-6, 5e-6
 DELAY_SAMPLES = 1
 SETTLE_S, DWELL_S = 2.0, 3.0
@@ -152,9 +138,3 @@ def streamed_file(streamed_noise, tmp_path_factory):
         return synthetic.write_recording(folder, plan, base, velocity, parts, **{"name": "streamed", **how})
 
     return write
-
-
-@pytest.fixture(scope="session")
-def synthetic_module():
-    """The module that writes recordings of a faultless bench."""
-    return synthetic

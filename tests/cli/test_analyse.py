@@ -1,35 +1,20 @@
 """`vibench analyse` on good, growing and bad recordings: a report and numbers, or one sentence."""
 
-import importlib.util
 import json
 import shutil
-import sys
 import time
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import Dwell, StreamedNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.analysis import Simulation, analyse_files
 
-PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 SECONDS = 8.0
 PATIENCE_S = 60.0
-
-
-def _synthetic():
-    """The tests are no package: a module of another folder is loaded by its path."""
-    spec = importlib.util.spec_from_file_location("synthetic_recordings", PLACE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(spec.name, module)
-    spec.loader.exec_module(module)
-    return module
-
-
-synthetic = _synthetic()
 
 
 @pytest.fixture(scope="module")

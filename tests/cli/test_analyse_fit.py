@@ -1,31 +1,16 @@
 """`vibench analyse --fit`: the specimen that was measured, with intervals, as JSON and in words."""
 
-import importlib.util
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import WhiteNoise
 from vibench.sim import base_transmissibility, gong2025, load_specimen
 
-PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 DAMPING_S = 3.3e-5
 NOISE = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
-
-
-def _synthetic():
-    """The tests are no package: a module of another folder is loaded by its path."""
-    spec = importlib.util.spec_from_file_location("synthetic_recordings", PLACE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(spec.name, module)
-    spec.loader.exec_module(module)
-    return module
-
-
-synthetic = _synthetic()
 
 
 @pytest.fixture(scope="module")

@@ -1,33 +1,20 @@
 """`vibench analyse --hidden`: the hidden motion in numbers, figures and report, or a sentence why not."""
 
 import csv
-import importlib.util
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from tests.analysis.hidden_motion import shaken_world as world
 from vibench.sim import gong2025
 
-PLACE = Path(__file__).parents[1] / "analysis" / "hidden_motion" / "shaken_world.py"
 GAP_M = 45e-6
 
 
 @pytest.fixture(scope="module")
-def world():
-    """The virtual world, and recordings of it."""
-    spec = importlib.util.spec_from_file_location("shaken_world", PLACE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(spec.name, module)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def shaken(world, tmp_path_factory):
+def shaken(tmp_path_factory):
     """A colliding dwell of the virtual world, recorded."""
     return world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
 
@@ -58,7 +45,7 @@ def test_json_has_bounds_and_says_what_is_not_determined(vibench_here, shaken, t
 
 
 def test_a_recording_of_what_cannot_be_tracked_gets_a_sentence_and_the_rest_its_report(
-    vibench_here, world, tmp_path, monkeypatch
+    vibench_here, tmp_path, monkeypatch
 ):
     rigid = world.RIG.specimen.model_copy(update={"contact": "rigid:0.8"})
     monkeypatch.setattr(world, "RIG", world.RIG.model_copy(update={"specimen": rigid}))

@@ -1,6 +1,5 @@
 """The promise: a recording survives ``kill -9`` at any moment, minus at most the last second."""
 
-import importlib.util
 import json
 import os
 import random
@@ -17,13 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.acquisition.recording import recording_child as child
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState, recover
 
 CHILD = Path(__file__).with_name("recording_child.py")
-SPEC = importlib.util.spec_from_file_location("recording_child", CHILD)
-child = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(child)
 
 PROMISE_S = 1.0
 ENDLESS_BLOCKS = 200_000

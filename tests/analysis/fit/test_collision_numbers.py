@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.analysis.hidden_motion import shaken_world as world
 from vibench.analysis import Simulation, analyse_files, update_model
 from vibench.analysis.fit.collision_numbers import tracked_numbers
 from vibench.analysis.fit.suspects import Assumption
@@ -14,7 +15,7 @@ TRUE = gong2025(gap_m=(35e-6, 55e-6))
 
 
 @pytest.fixture(scope="module")
-def collided(world, tmp_path_factory):
+def collided(tmp_path_factory):
     """Analyse a dwell of a specimen with unequal gaps; the bench says 45 um on both sides."""
     recorded = world.shaken(
         tmp_path_factory.mktemp("unequal"), 258.0, 1.9, duration_s=2.6, seed=41, specimen=TRUE

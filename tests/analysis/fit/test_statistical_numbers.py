@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from tests.analysis.hidden_motion import shaken_world as world
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError, Simulation, analyse_files, update_model
 from vibench.analysis.fit.statistical_numbers import (
@@ -29,7 +30,7 @@ STRETCH_S = (0.5, 1.5)
 
 
 @pytest.fixture(scope="module")
-def buried(world, tmp_path_factory):
+def buried(tmp_path_factory):
     """Record a chaotic dwell under sixty times the noise; the bench says 45 um."""
     return world.shaken(
         tmp_path_factory.mktemp("buried"), 260.0, 1.8, duration_s=1.6, seed=8, noise=60.0, specimen=TRUE

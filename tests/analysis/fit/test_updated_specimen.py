@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import synthetic_recordings as synthetic
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import SineSweep, WhiteNoise
 from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
 from vibench.analysis.fit.gap_fit import bracketed_gap, brackets, fit_gap, onsets, swept_relative

@@ -1,13 +1,11 @@
 """An odd multisine in a recording tells even from odd distortion, and both from noise."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
@@ -19,18 +17,7 @@ NOISE_M_PER_S = 2e-5
 
 
 @pytest.fixture(scope="module")
-def synthetic():
-    """The tests are no package: a module beside this file is loaded by its path."""
-    place = Path(__file__).parents[1] / "synthetic_recordings.py"
-    spec = importlib.util.spec_from_file_location("synthetic_recordings", place)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(spec.name, module)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def analysed(synthetic, tmp_path_factory):
+def analysed(tmp_path_factory):
     """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity.
 
     `through` gives another transmission, `base_gain` the base sensor's gain; both may differ by realisation.
@@ -98,7 +85,7 @@ def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_without_distortion_only_noise_is_left_and_it_is_the_noise_that_was_put_in(analysed, synthetic):
+def test_without_distortion_only_noise_is_left_and_it_is_the_noise_that_was_put_in(analysed):
     found = distortion(analysed(np.zeros_like).response.periodic)
     # White noise of variance s^2 puts 4 s^2 over the averaged samples on the square of an amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))

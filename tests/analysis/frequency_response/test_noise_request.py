@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition import Overload, open_recording
 from vibench.analysis import (
     Estimator,
@@ -55,17 +56,15 @@ def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_dri
 @pytest.mark.parametrize(
     ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]
 )
-def test_an_estimator_that_noise_biases_is_remarked(
-    streamed_noise, tmp_path, synthetic_module, estimator, biased_by, noisy
-):
+def test_an_estimator_that_noise_biases_is_remarked(streamed_noise, tmp_path, estimator, biased_by, noisy):
     plan, base, velocity, parts = streamed_noise
     rng = np.random.default_rng(4)
     if noisy == "base":
         extra = 0.3 * np.std(base.acceleration) * rng.standard_normal(velocity.size)
-        base = synthetic_module.Motion(base.displacement_m, base.acceleration + extra)
+        base = synthetic.Motion(base.displacement_m, base.acceleration + extra)
     else:
         velocity = velocity + 0.3 * np.std(velocity) * rng.standard_normal(velocity.size)
-    path = synthetic_module.write_recording(tmp_path, plan, base, velocity, parts)
+    path = synthetic.write_recording(tmp_path, plan, base, velocity, parts)
     # The ratio tells of noise on the other channel.
     ratio = {"noise_ratio": 1e6 if noisy == "base" else 0.0} if estimator is Estimator.HV else {}
     with open_recording(path) as recording:

@@ -1,24 +1,10 @@
 """Recordings of the virtual rig's world, each made once, and specimens described otherwise than they are."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-
-def _load(name):
-    """The tests are no package: a module beside this file is loaded by its path."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-world = _load("shaken_world")
-live = _load("live_world")
+from tests.analysis.hidden_motion import live_world as live, shaken_world as world
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,16 @@
 """A world whose samples are fed to a live twin as they come."""
 
-import sys
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 
 import numpy as np
 
+from tests.analysis.hidden_motion import shaken_world
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.hidden_motion import LiveTwin
 from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
-shaken_world = sys.modules["shaken_world"]
 RATE_HZ = 51_200.0
 ROLES = ("base_acceleration", "m0_velocity")
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import Dwell
 from vibench.acquisition.recording import BIN_SAMPLES
@@ -15,13 +16,13 @@ CHANNELS = ("drive_voltage", "base_acceleration", "m0_velocity")
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory, synthetic_module):
+def recording(tmp_path_factory):
     time_s = np.arange(SAMPLES) / RATE
     velocity = 0.01 * np.sin(2 * np.pi * 50 * time_s)
     velocity[150_001:150_004] = (0.4, -0.5, 0.4)
-    motion = synthetic_module.Motion(np.zeros(SAMPLES), np.cos(time_s))
+    motion = synthetic.Motion(np.zeros(SAMPLES), np.cos(time_s))
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)
-    path = synthetic_module.write_recording(
+    path = synthetic.write_recording(
         tmp_path_factory.mktemp("overview"), plan, motion, velocity, [], hole=HOLE
     )
     with open_recording(path) as opened:
@@ -94,14 +95,12 @@ def test_a_picture_of_nothing_is_refused(recording, start, stop, columns):
 
 
 @pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 11.5])
-def test_a_steady_sine_has_straight_edges_where_bins_are_shorter_than_its_period(
-    tmp_path, synthetic_module, frequency_hz
-):
+def test_a_steady_sine_has_straight_edges_where_bins_are_shorter_than_its_period(tmp_path, frequency_hz):
     time_s = np.arange(SAMPLES) / RATE
-    motion = synthetic_module.Motion(np.zeros(SAMPLES), np.cos(time_s))
+    motion = synthetic.Motion(np.zeros(SAMPLES), np.cos(time_s))
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)
     velocity = 0.01 * np.sin(2 * np.pi * frequency_hz * time_s)
-    path = synthetic_module.write_recording(tmp_path, plan, motion, velocity, [])
+    path = synthetic.write_recording(tmp_path, plan, motion, velocity, [])
     with open_recording(path) as opened:
         for columns in (390, 350, 300):
             picture = overview_of(opened).picture(("m0_velocity",), 0, SAMPLES, columns)

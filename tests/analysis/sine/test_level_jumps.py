@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
@@ -90,7 +91,7 @@ def test_the_report_speaks_of_levels_and_jumps_in_short(analysis):
 
 @pytest.mark.parametrize("share", [0.2, 0.4, 0.6, 0.75])
 @pytest.mark.parametrize("factor", [1 / 3.5, 0.4, 2.2, 3.5])
-def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, synthetic_module, factor, share):
+def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, factor, share):
     levels, settle_s, record_s = (0.2, 0.3, 0.4, 0.5), 0.5, 1.0
     plan = SteppedLevel(
         frequency_hz=195,
@@ -101,19 +102,17 @@ def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, synthetic_modu
         record_s=record_s,
     )
     whole_s = settle_s + record_s
-    rate = synthetic_module.RATE
+    rate = synthetic.RATE
     time_s = np.arange(round(len(levels) * whole_s * rate)) / rate
     omega = 2 * np.pi * 195
     shaken = 1e-6 * np.repeat(levels, round(whole_s * rate))
-    base = synthetic_module.Motion(
-        shaken * np.sin(omega * time_s), -(omega**2) * shaken * np.sin(omega * time_s)
-    )
+    base = synthetic.Motion(shaken * np.sin(omega * time_s), -(omega**2) * shaken * np.sin(omega * time_s))
     jumps_at_s = whole_s + settle_s + share * record_s
     ratio = np.where(time_s < jumps_at_s, 1.0, factor)
     noise = 1e-6 * np.random.default_rng(1).standard_normal(time_s.size)
     velocity = ratio * omega * shaken * np.cos(omega * time_s) + noise
     parts = [
-        synthetic_module.Part(
+        synthetic.Part(
             "step",
             number * whole_s + settle_s,
             (number + 1) * whole_s,
@@ -121,7 +120,7 @@ def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, synthetic_modu
         )
         for number, level in enumerate(levels)
     ]
-    with open_recording(synthetic_module.write_recording(tmp_path, plan, base, velocity, parts)) as recording:
+    with open_recording(synthetic.write_recording(tmp_path, plan, base, velocity, parts)) as recording:
         (jump,) = level_jumps(analyse(recording).response)
     assert jump.factor == pytest.approx(factor, rel=0.05)
     assert (jump.before_vpp, jump.after_vpp) == (0.2, 0.4)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import Dwell, SteppedSine
 from vibench.analysis import Simulation, analyse_files, budgets_of
 from vibench.analysis.chaos.verdict import MotionKind
@@ -13,23 +14,22 @@ A0_M, GAIN, HZ, SECONDS = 1e-6, 5.0, 260.0, 12.5
 
 
 @pytest.fixture
-def dwell(synthetic_module, tmp_path):
+def dwell(tmp_path):
     """Analyse a dwell at 260 Hz whose complex envelope is given."""
 
     def analysed(envelope, seed=0):
-        module = synthetic_module
-        motion, time_s = module.sine(SECONDS + 1, HZ, A0_M), module.times(SECONDS + 1)
+        motion, time_s = synthetic.sine(SECONDS + 1, HZ, A0_M), synthetic.times(SECONDS + 1)
         moved = A0_M * GAIN * np.real(envelope(time_s) * np.exp(2j * np.pi * HZ * time_s - 0.5j * np.pi))
-        velocity = np.gradient(moved) * module.RATE
+        velocity = np.gradient(moved) * synthetic.RATE
         velocity += 1e-6 * np.random.default_rng(seed).standard_normal(velocity.size)
         plan = Dwell(
-            amplitude_vpp=2 * module.VOLTS_PER_METRE * A0_M,
+            amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * A0_M,
             frequency_hz=HZ,
             settle_s=1.0,
             duration_s=SECONDS,
         )
-        part = module.Part("dwell", 1.0, 1.0 + SECONDS, {"frequency_hz": HZ})
-        module.write_recording(tmp_path, plan, motion, velocity, [part], name=f"s{seed}")
+        part = synthetic.Part("dwell", 1.0, 1.0 + SECONDS, {"frequency_hz": HZ})
+        synthetic.write_recording(tmp_path, plan, motion, velocity, [part], name=f"s{seed}")
         (result,) = analyse_files([tmp_path / f"s{seed}.h5"], "slow", Simulation.LEFT_OUT).results
         return result
 
@@ -93,32 +93,33 @@ def test_a_transient_that_decays_has_no_long_period(dwell):
 MODE_HZ, SETTLE_S, RECORD_S = 200.0, 3.0, 1.0
 
 
-def unsettled_step(module, folder, hz, damping, seed):
+def unsettled_step(folder, hz, damping, seed):
     """Record a step of 1 s, 3 s after its begin; give its result, and Response I and II of a settled one."""
     rng = np.random.default_rng(seed)
-    motion, time_s = module.sine(SETTLE_S + RECORD_S + 1, hz, A0_M), module.times(SETTLE_S + RECORD_S + 1)
+    motion, time_s = (
+        synthetic.sine(SETTLE_S + RECORD_S + 1, hz, A0_M),
+        synthetic.times(SETTLE_S + RECORD_S + 1),
+    )
     gain = 1 / (1 - (hz / MODE_HZ) ** 2 + 2j * damping * hz / MODE_HZ)
     decay = np.exp((2j * np.pi * MODE_HZ * np.sqrt(1 - damping**2) - damping * 2 * np.pi * MODE_HZ) * time_s)
     forced = np.exp(2j * np.pi * hz * time_s) - np.exp(1j * rng.uniform(-0.5, 0.5)) * decay
     moved = A0_M * np.imag(gain * forced)
-    velocity = np.gradient(moved) * 2 * np.pi * hz / np.sin(2 * np.pi * hz / module.RATE)
+    velocity = np.gradient(moved) * 2 * np.pi * hz / np.sin(2 * np.pi * hz / synthetic.RATE)
     velocity += 1e-6 * rng.standard_normal(velocity.size)
     plan = SteppedSine(
-        amplitude_vpp=2 * module.VOLTS_PER_METRE * A0_M,
+        amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * A0_M,
         frequencies_hz=(hz,),
         settle_s=SETTLE_S,
         record_s=RECORD_S,
     )
-    part = module.Part("step", SETTLE_S, SETTLE_S + RECORD_S, {"frequency_hz": hz, "direction": "up"})
-    module.write_recording(folder, plan, motion, velocity, [part], name=f"step{seed}")
+    part = synthetic.Part("step", SETTLE_S, SETTLE_S + RECORD_S, {"frequency_hz": hz, "direction": "up"})
+    synthetic.write_recording(folder, plan, motion, velocity, [part], name=f"step{seed}")
     (result,) = analyse_files([folder / f"step{seed}.h5"], "steps", Simulation.LEFT_OUT).results
     return result, abs(gain)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_step_that_has_not_settled_is_told_to_change_or_has_a_bound_that_holds(
-    synthetic_module, tmp_path, seed
-):
+def test_a_step_that_has_not_settled_is_told_to_change_or_has_a_bound_that_holds(tmp_path, seed):
     """44.38 +- 0.51 was said instead of 49.97, and 246.6 +- 0.58 instead of 249.8."""
     rng = np.random.default_rng(seed)
     hz, damping = (
@@ -126,7 +127,7 @@ def test_a_step_that_has_not_settled_is_told_to_change_or_has_a_bound_that_holds
         if seed < 2
         else (rng.uniform(195, 205), 10 ** rng.uniform(-4, -2))
     )
-    result, truth = unsettled_step(synthetic_module, tmp_path, hz, damping, seed)
+    result, truth = unsettled_step(tmp_path, hz, damping, seed)
     for name in ("Response I", "Response II"):
         (budget,) = (each for each in budgets_of(result) if each.quantity.startswith(f"largest {name},"))
         if not {"noise", "chance"} & {

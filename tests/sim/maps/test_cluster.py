@@ -1,8 +1,5 @@
 """A map on the processes of a real Dask cluster, one of which dies, is the map of threads."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,11 +7,8 @@ from vibench.sim.maps import Map, Range, estimate_map, solve_map
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 
-SPEC = importlib.util.spec_from_file_location(
-    "study_cluster", Path(__file__).parents[1] / "study" / "test_cluster.py"
-)
-study_cluster = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(study_cluster)
+from tests.sim.study import test_cluster as study_cluster
+
 cluster = study_cluster.cluster
 
 PLAN = Map(

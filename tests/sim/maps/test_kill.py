@@ -1,28 +1,18 @@
 """The promise: a map survives ``kill -9`` at any moment, and ends with the points it would have had."""
 
-import importlib.util
 import random
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.sim.maps import map_child as child
+from tests.sim.study.test_kill import killed
 from vibench.sim.maps import open_map, solve_map
 from vibench.sim.study import ExistingStudy, PointState
 
 HERE = Path(__file__).parent
 OF_THE_OCCASION = ("taken", "session")
-
-
-def loaded(path):
-    spec = importlib.util.spec_from_file_location(f"maps_{path.stem}", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-study_kill = loaded(HERE.parent / "study" / "test_kill.py")
-child = loaded(HERE / "map_child.py")
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +26,7 @@ def test_a_killed_map_opens_at_once_and_ends_like_one_that_was_never_interrupted
     path, luck = tmp_path / "map.h5", random.Random(kills)
     sessions = np.full(child.PLAN.grid.size, -1)
     for session in range(kills):
-        promised = study_kill.killed(
+        promised = killed(
             path,
             tmp_path / f"words-{session}",
             luck.randint(1, 60),

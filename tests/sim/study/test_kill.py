@@ -1,6 +1,5 @@
 """The promise: a study survives ``kill -9`` at any moment, and goes on with what is missing."""
 
-import importlib.util
 import random
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.sim.study import study_child as child
 from vibench.sim import solve_scene
 from vibench.sim.study import PointState, ThreadExecutor, open_study, run_study, solve_study
 from vibench.sim.study._file_store import FileStore
@@ -17,9 +17,6 @@ from vibench.sim.study._grid import SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
 
 CHILD = Path(__file__).with_name("study_child.py")
-SPEC = importlib.util.spec_from_file_location("study_child", CHILD)
-child = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(child)
 
 QUICK, MANY = 1, 12
 PATIENCE_S = 60.0

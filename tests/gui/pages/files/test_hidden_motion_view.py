@@ -1,28 +1,19 @@
 """The hidden motion on the Files page: p between its stops in what is in sight, or a sentence."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from PySide6.QtWidgets import QFileDialog
 
+from tests.analysis.hidden_motion import shaken_world
 from vibench.acquisition import open_recording
 from vibench.analysis.live import RecordingOverview, kept_levels
 from vibench.gui.pages.files.spectrogram_view import Pictures
 from vibench.gui.widgets.theme import DARK
 
-PLACE = Path(__file__).parents[3] / "analysis" / "hidden_motion" / "shaken_world.py"
-
 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory):
-    spec = importlib.util.spec_from_file_location("shaken_world", PLACE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(spec.name, module)
-    spec.loader.exec_module(module)
-    return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
+    return shaken_world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
 
 
 @pytest.mark.thorough
