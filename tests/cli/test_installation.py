@@ -29,6 +29,21 @@ sys.argv = ["vibench", *{arguments!r}]
 from vibench.cli import main
 main()
 """
+ONE_AFTER_ANOTHER = """
+import contextlib, io, json, sys
+for library in {libraries!r}:
+    sys.modules[library] = None
+from vibench.cli import main
+told = []
+for words in {lines!r}:
+    sys.argv, out, err = ["vibench", *words], io.StringIO(), io.StringIO()
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            main()
+    except SystemExit as ended:
+        told.append((ended.code or 0, out.getvalue(), err.getvalue()))
+print(json.dumps(told))
+"""
 
 
 def without(libraries, *arguments, cwd):
@@ -172,26 +187,36 @@ def test_a_missing_library_is_one_sentence_with_the_command_that_brings_it(
 INSTRUMENTS_AND_WINDOW = [*EXTRAS["bench"], *EXTRAS["gui"]]
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json"),
-        ("study", "paper", "--out", "out.h5", "--estimate", "--json"),
-        ("doctor", "--json"),
-        ("specimen", "asymmetric", "--json"),
-    ],
-)
-def test_what_draws_nothing_needs_the_core_alone(tmp_path, arguments):
-    told = without([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], *arguments, cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert json.loads(told.stdout)
+CORE_ALONE = [
+    ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json"),
+    ("study", "paper", "--out", "out.h5", "--estimate", "--json"),
+    ("doctor", "--json"),
+    ("specimen", "asymmetric", "--json"),
+]
 
 
-@pytest.mark.parametrize("words", [*((name,) for name in COMMANDS), ("bench", "list"), ("bench", "check")])
-def test_every_command_explains_itself_on_the_base_installation(tmp_path, words):
-    told = without([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], *words, "--help", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert f"vibench {' '.join(words)}" in told.stdout
+def test_on_the_base_installation_what_draws_nothing_works_and_every_command_explains_itself(tmp_path):
+    helps = [(*words, "--help") for words in (*((name,) for name in COMMANDS), ("bench", "list"))]
+    program = ONE_AFTER_ANOTHER.format(
+        libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]
+    )
+    environment = {**os.environ, "COLUMNS": "200"}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert [(code, said) for code, _, said in told if code] == []
+    for words, (_, shown, _) in zip([*CORE_ALONE, *helps], told, strict=True):
+        if words in CORE_ALONE:
+            assert json.loads(shown), words
+        else:
+            assert f"vibench {' '.join(words[:-1])}" in shown
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import pytest
 from scipy import fft, signal
 
 from vibench.analysis import transmissibility
-from vibench.analysis.spectra.spectra import spectral_density
 
 RATE = 1024.0
 SEGMENT = 256
@@ -61,17 +60,3 @@ def test_filling_holes_with_zeros_would_lower_the_coherence_that_leaving_them_ou
     # 100 of 6500 samples are missing, and the others cannot know it: 1.5 % of the power no longer belongs.
     assert np.median(filled.coherence) == pytest.approx(1 - 100 / 6500, abs=0.004)
     assert kept.segments_excluded > 0 == filled.segments_excluded
-
-
-@pytest.mark.parametrize(("overlap", "n_eff"), [(0.0, 64.0), (0.5, 120.4), (0.75, 131.7)])
-def test_the_effective_averages_are_those_that_the_spread_of_a_density_shows(overlap, n_eff):
-    rng = np.random.default_rng(44)
-    segment = 128
-    densities = [
-        spectral_density(rng.standard_normal(64 * segment), RATE, segment_samples=segment, overlap=overlap)
-        for _ in range(500)
-    ]
-    assert densities[0].n_eff == pytest.approx(n_eff, rel=0.005)
-    levels = np.array([each.density[3:-3] for each in densities])
-    shown = np.mean(levels.mean(axis=0) ** 2 / levels.var(axis=0, ddof=1))
-    assert shown == pytest.approx(n_eff, rel=0.04)
