@@ -168,16 +168,6 @@ def test_the_noise_has_the_rms_of_its_density_in_half_the_sample_rate(seed, dens
     assert noise.std() == pytest.approx(expected, rel=0.03)
 
 
-def test_two_seeds_give_two_noises_and_one_seed_gives_one():
-    def noise(seed):
-        rig = Rig(Terminal(seed=seed))
-        rig.send("OUTP ON")
-        return rig.render(100)
-
-    assert np.array_equal(noise(1), noise(1))
-    assert not np.array_equal(noise(1), noise(2))
-
-
 def test_a_clock_that_is_fast_makes_every_frequency_higher():
     rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0))
     rig.send("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON")
