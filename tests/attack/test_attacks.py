@@ -16,10 +16,10 @@ SEED = 2025
 @pytest.mark.parametrize(
     ("attack", "count"),
     [
-        (toml_files.attack, 150),
-        (imported_files.attack, 200),
-        (engine_messages.attack, 500),
-        (instrument_messages.attack, 1500),
+        (toml_files.attack, 80),
+        (imported_files.attack, 100),
+        (engine_messages.attack, 250),
+        (instrument_messages.attack, 750),
     ],
     ids=["toml", "imports", "engine", "instruments"],
 )
