@@ -36,7 +36,7 @@ NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What"
     [
         pytest.param(["ruff", "check", "."], id="lint"),
         pytest.param(["ruff", "format", "--check", "."], id="format"),
-        pytest.param(["mypy"], id="types"),
+        pytest.param(["mypy"], id="types", marks=pytest.mark.thorough),  # a minute without a cache
         pytest.param(["lint-imports", "--no-cache"], id="imports-point-one-way"),
     ],
 )

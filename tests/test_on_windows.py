@@ -98,6 +98,7 @@ def test_a_campaign_is_measured_verified_and_analysed(here):
     ran(*measure, folder=here, fails=True)
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_a_study_is_solved_by_processes_that_are_spawned(here):
     ran("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--workers", "1", folder=here)

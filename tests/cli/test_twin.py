@@ -114,17 +114,3 @@ def test_a_twin_that_is_killed_is_told_and_disturbs_nothing(running, tmp_path):
     assert ("specimen", "The upper gap is 46 um.") in events
     assert "limit" not in dict(events)
     assert gaps == ()
-
-
-@pytest.mark.slow
-def test_gaps_that_widen_amid_a_dwell_end_it_within_a_second(running, tmp_path):
-    script = tmp_path / "faults.toml"
-    script.write_text('[[faults]]\nat_s = 40.0\nfault = "widen_gaps"\nby_m = 1e-6\n')
-    client = running(campaign(STOPPING), faults=script)
-    status = until(client, lambda status: status.state not in DRIVING)
-    assert [each.state for each in status.rows] == ["failed"]
-    with open_recording(tmp_path / "dwell.h5") as recording:
-        first = next(each for each in recording.events if each.kind == "specimen")
-        # The rig is on a little longer than it is recorded.
-        assert 38.0 < first.sample / recording.sample_rate_hz < 41.0
-        assert recording.gaps == ()

@@ -209,16 +209,6 @@ def test_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(
     assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [2, 3, 3]
 
 
-@forks
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_fifty_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(tmp_path):
-    left = killed_at(tmp_path, {"recording": 16, "committing": 16, "finalising": 18}, seed=2)
-    assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [16, 16, 18]
-    # The copy was half made at least once, so that recovering had to do it again.
-    assert left["finalising", frozenset({".part", ".tmp"})] > 0
-
-
 def test_a_killed_program_leaves_a_recording_that_opens(tmp_path):
     words = tmp_path / "words"
     with words.open("wb") as out:

@@ -68,6 +68,7 @@ def test_a_dwell_ends_when_its_response_is_known(rig, tmp_path):
     assert parts.verdict.value == "passed"
 
 
+@pytest.mark.thorough
 def test_a_wish_that_is_not_met_ends_at_the_longest_time(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
     outcome, recording, _ = measured(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))

@@ -68,6 +68,7 @@ def test_a_report_lays_branches_over_the_steps_and_says_how_their_levels_differ(
     assert "Branches: hertz, recorded level, shooting" in page
 
 
+@pytest.mark.thorough
 def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_path):
     options = ("--places", "2", "--starts", "0", "--json", "--out", str(tmp_path / "like"))
     result = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), *options])
@@ -83,6 +84,7 @@ def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_pat
     assert "the recording has its own level" in str(refused.exception)
 
 
+@pytest.mark.thorough
 def test_an_analysis_takes_branches_that_were_kept(diagram, stepped_file, tmp_path):
     kept = write_diagram(diagram, tmp_path / "b.h5")
     arguments = [

@@ -52,15 +52,6 @@ def test_bounds_of_hann_segments_hold_the_truth_95_times_in_100(estimator, overl
     require_coverage(estimator, overlap, averages=12, repeats=300)
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("estimator", list(Estimator))
-@pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
-@pytest.mark.parametrize("averages", [12, 48])
-def test_many_more_repeats_find_the_bounds_no_wider_and_no_narrower(estimator, overlap, averages):
-    require_coverage(estimator, overlap, averages, repeats=8000)
-
-
 def test_segments_counted_as_independent_would_promise_too_much():
     """Without the correction for overlap the bounds at 75 % would be those of too many averages."""
     rng = np.random.default_rng(8)

@@ -184,6 +184,7 @@ def test_wrong_gaps_and_m1_are_found_from_the_motion(world_recording, described_
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
 
 
+@pytest.mark.thorough
 def test_wrong_springs_and_dampers_are_found_too(world_recording):
     recorded = world_recording("noise", 10.0, seed=41)
     (k0, k1, k2), dampings = recorded.specimen.stiffnesses, recorded.specimen.dampings

@@ -60,10 +60,3 @@ def test_a_sweep_is_predicted_on_the_branch_that_it_comes_along():
     assert all(224.0 < each < 233.0 for each in rising)
     assert all(down < up - 1.0 for down, up in zip(falling, rising, strict=True))
     assert min(falling) < 223.0
-
-
-@pytest.mark.slow
-def test_a_dwell_inside_the_region_is_predicted_to_collide_there():
-    seen = predict_measurement(QUICK["dwell"], RIG)
-    assert any(low < 260 < high for low, high in seen.collision_bands_hz)
-    assert np.nanmax(seen.prediction.response_i) > 1

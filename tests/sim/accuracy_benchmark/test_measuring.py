@@ -23,18 +23,6 @@ def test_every_level_keeps_its_promise(motion):
         assert state_error(found, truth) <= level.promise
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("motion", [m for m in MOTIONS if m.regime is Regime.PERIODIC], ids=lambda m: m.name)
-def test_every_level_keeps_its_promise_over_two_seconds(motion):
-    start = settled_state(motion)
-    span_s = round(2 * motion.frequency_hz) / motion.frequency_hz
-    truth = independent_state(motion.specimen, motion.drive, span_s, start)
-    for level in Accuracy:
-        found = integrate(motion.specimen, motion.drive, span_s, level, start).final_state
-        assert state_error(found, truth) <= level.promise
-
-
 def test_a_periodic_motion_buys_digits_and_chaos_buys_none():
     periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels

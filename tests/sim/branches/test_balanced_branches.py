@@ -30,7 +30,7 @@ def test_the_phase_resonance_of_a_duffing_oscillator_runs_along_the_exact_backbo
     damping, alpha = 2e-3, 0.5
     structure = LinearStructure(ONE, damping * ONE, ONE, np.ones(1), np.ones(1), np.zeros(1))
     spring, options = PowerSpring(1.0, ((3, alpha),)), BalanceOptions(fewest=15, tolerance=1e-8)
-    for forced in (1e-3, 2e-3, 4e-3):
+    for forced in (1e-3, 4e-3):
         low, high = 0.9 / (2 * math.pi), 3.0 / (2 * math.pi)
         start = balance(structure, spring, low, forced, options)
         branch = balance_branch_within(structure, spring, start, FrequencyPath((forced,)), low, high, options)

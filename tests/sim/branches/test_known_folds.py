@@ -40,6 +40,7 @@ def test_over_level_it_folds_at_both_ends_of_its_unstable_stretch(frequency, low
     assert levels[-1] == pytest.approx(upper_um, rel=0.005)
 
 
+@pytest.mark.thorough
 def test_with_stops_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
     specimen, path = gong2025(), AmplitudePath(97.95)
     found = list(shot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))

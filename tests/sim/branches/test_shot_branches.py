@@ -8,7 +8,6 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 from vibench.sim import (
-    Accuracy,
     AmplitudePath,
     ArcEnd,
     BifurcationKind,
@@ -234,26 +233,3 @@ def test_under_a_recorded_level_each_point_is_a_motion_of_its_own_level():
 def test_a_level_that_is_none_is_refused(amplitudes, frequencies):
     with pytest.raises(ValueError, match="not allowed"):
         FrequencyPath(amplitudes, frequencies)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.1", "power:7", "rigid:0.9"])
-def test_fifty_random_points_of_each_law_come_back(contact):
-    specimen = gong2025(contact=contact)
-    rng = np.random.default_rng(50)
-    checked = 0
-    while checked < 50:
-        low = float(rng.uniform(40.0, 500.0))
-        amplitude = float(10.0 ** rng.uniform(-6.0, -4.5))
-        for found in shot_branches(specimen, FrequencyPath((amplitude,)), low, 1.05 * low, FEW):
-            branch = found.branch
-            for k in rng.choice(len(branch.frequencies_hz), 5):
-                drive = Harmonic(float(branch.frequencies_hz[k]), amplitude)
-                run = integrate(
-                    specimen, drive, found.periods / drive.frequency_hz, Accuracy.REFERENCE, branch.states[k]
-                )
-                scales = state_scales(specimen, drive)
-                growth = max(1.0, abs(branch.multipliers[k, 0]))
-                assert np.abs((run.final_state - branch.states[k]) / scales).max() < 1e-6 * growth
-                checked += 1
