@@ -28,6 +28,7 @@ def test_what_was_found_once_is_mended(name, seed, number):
     assert found_again(name, seed, number) == ()
 
 
+@pytest.mark.thorough
 def test_good_recordings_of_every_sort_give_numbers(tmp_path):
     for name in ("dwell.h5", "with_result.h5"):
         path = tmp_path / name

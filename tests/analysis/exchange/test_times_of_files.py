@@ -174,14 +174,16 @@ UNITS_OF_TIME = {
     "Time [d]": 1,
 }
 COUNTS = ("Index", "Scan", "Sample")
+COLUMN_FAULTS = ("sound", "gap", "drop", "repeat", "swap", "restart", "drift", "rate")
 
 
 @pytest.mark.parametrize("seed", [43])
-@pytest.mark.parametrize("fault", ["sound", "gap", "drop", "repeat", "swap", "restart", "drift", "rate"])
+@pytest.mark.parametrize("fault", COLUMN_FAULTS)
 def test_a_column_that_rises_evenly_places_samples_whatever_it_is_called(tmp_path, fault, seed):
     rng = np.random.default_rng(seed)
     scales = {**dict.fromkeys(HEADINGS, 1.0), **UNITS_OF_TIME, **dict.fromkeys(COUNTS, RATE_HZ), None: 1.0}
-    for number, (heading, scale) in enumerate(scales.items()):
+    # Each fault under a third of the headings, each heading with a third of the faults.
+    for number, (heading, scale) in list(enumerate(scales.items()))[COLUMN_FAULTS.index(fault) % 3 :: 3]:
         if heading in COUNTS and fault in {"drift", "rate"}:
             continue  # a count shows neither
         times = faulty_times(fault, rng)

@@ -11,6 +11,8 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files, update_model
 from vibench.analysis.fit.suspects import Assumption
 
+pytestmark = pytest.mark.thorough
+
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
 

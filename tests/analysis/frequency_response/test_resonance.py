@@ -66,7 +66,7 @@ def modes():
     return np.sort(omega) / (2 * np.pi), 2e-5 * np.sort(omega) / 2
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=8)
 @given(natural_hz=st.floats(150, 350), damping=st.floats(0.003, 0.08))
 def test_a_single_mode_is_recovered_exactly(natural_hz, damping):
     frequency_hz = np.arange(50, 500, 0.5)
@@ -98,7 +98,7 @@ def test_the_stated_spreads_are_the_scatter():
     frequency_hz = np.arange(200, 330, 1.0)
     clean = single(frequency_hz, 266.0, 0.02)
     found = []
-    for _ in range(150):
+    for _ in range(80):
         noise = rng.standard_normal((2, clean.size))
         noisy = clean * (1 + 0.03 * (noise[0] + 1j * noise[1]))
         fits = resonances(curve(frequency_hz, noisy, 0.03), low_hz=210, high_hz=320)
@@ -153,7 +153,7 @@ def _z(found, natural_hz, damping):
 def test_a_mode_narrower_than_a_line_is_not_reported_wider():
     modes = [(95.0, 0.0012), (266.0, 0.0033)]
     errors = []
-    for seed in range(3):
+    for seed in range(2):
         found = resonances(_streamed(np.random.default_rng(seed), modes, 0.05), low_hz=50, high_hz=400)
         errors += [_z(each, *modes[0]) for each in found if each.frequency_hz < 200]
     assert errors
@@ -163,15 +163,17 @@ def test_a_mode_narrower_than_a_line_is_not_reported_wider():
 @pytest.mark.parametrize("window", ["hann", "blackmanharris", "flattop"])
 def test_bounds_of_streamed_noise_hold_under_every_window(window):
     errors = []
-    for seed in range(4):
+    for seed in range(2):
         lines = _streamed(np.random.default_rng(seed), [(200.0, 0.005)], 0.02, window)
         (found,) = resonances(lines, low_hz=150, high_hz=250)
         errors.append(_z(found, 200.0, 0.005))
     assert np.max(np.abs(errors)) < 3.5
 
 
-@pytest.mark.parametrize("apart_hz", [2.0, 4.0])
-@pytest.mark.parametrize("shares", [(1.0, 1.0), (1.0, 0.4), (1.0, -0.7), (1.0, 0.6, 1.0)])
+@pytest.mark.parametrize(
+    ("apart_hz", "shares"),
+    [(2.0, (1.0, 1.0)), (4.0, (1.0, 0.4)), (2.0, (1.0, -0.7)), (4.0, (1.0, 0.6, 1.0))],
+)
 def test_close_modes_are_not_one(apart_hz, shares):
     modes = [(200 + apart_hz * place, 0.01, share) for place, share in enumerate(shares)]
     found = resonances(_streamed(np.random.default_rng(16), modes, 0.01), low_hz=150, high_hz=250)
@@ -180,7 +182,7 @@ def test_close_modes_are_not_one(apart_hz, shares):
         assert min(np.max(np.abs(_z(each, *mode[:2]))) for mode in modes) < 3.5
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3])
+@pytest.mark.parametrize("seed", [0, 3])
 def test_a_boxcar_does_not_merge_close_modes(seed):
     coverage = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks" / "resonance_coverage.py"))
     (number, scene) = next(
@@ -215,6 +217,7 @@ def test_a_band_with_too_few_lines_is_refused():
         resonances(curve(frequency_hz, single(frequency_hz, 266, 0.02)), low_hz=250, high_hz=280)
 
 
+@pytest.mark.thorough
 def test_frequency_and_damping_of_every_mode_are_held_by_their_bounds():
     frequency_hz = np.arange(50.0, 601.0)
     exact = specimen(frequency_hz)
@@ -245,7 +248,7 @@ def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(acceler
     natural_hz, damping = modes()
     fine = specimen(np.arange(50.0, 600.0, 0.02))
     peaks = [np.abs(fine[np.arange(-150, 150) + round(50 * (each - 50))]).max() for each in natural_hz]
-    rng, draws, held = np.random.default_rng(12), 60, np.zeros((3, 3))
+    rng, draws, held = np.random.default_rng(12), 36, np.zeros((3, 3))
     for _ in range(draws):
         sums = PeriodicSums(rate, 2.0)
         for _ in range(realisations):
@@ -267,15 +270,15 @@ def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(acceler
                 abs(each.damping_ratio - damping[number]) < 2 * each.sd_damping_ratio,
                 abs(each.peak_magnitude - peaks[number]) < 2 * each.sd_peak_magnitude,
             )
-    # 0.95 less three standard deviations of 60 draws; with the relative scatter of neighbours averaged in
+    # 0.95 less three standard deviations of 36 draws; with the relative scatter of neighbours averaged in
     # 0.68 to 0.78 at 95 Hz, with each line's own variance 0.78 to 0.88 at 500 Hz.
-    assert np.all(held / draws > 0.865)
+    assert np.all(held / draws > 0.84)
 
 
 @pytest.mark.thorough
 def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known_to():
     """As collisions do: fits that take lines as independent hold fewer than six of ten frequencies."""
-    frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 50
+    frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 30
     rng, independent, together = np.random.default_rng(13), 0, 0
 
     def told(values):
@@ -305,7 +308,7 @@ def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known
         independent += abs(found.frequency_hz - 200) < 2 * found.sd_frequency_hz
         together += abs(widened.frequency_hz - 200) < 2 * widened.sd_frequency_hz
     assert independent < 0.6 * draws
-    assert together > 0.86 * draws
+    assert together > 0.83 * draws
 
 
 def test_a_resonance_of_one_realisation_only_is_none():

@@ -93,7 +93,7 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
     law = design_law(plant())
     softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
     wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
-    for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
+    for index in (*unstable[[0, -1]], 10):
         slopes = motion_slopes(HARDENING, found, index, RATE_HZ)
         for each in wrong:
             assert loop_multiplier(each, law, *slopes) < 0.99
@@ -108,6 +108,7 @@ def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
     assert branch_multipliers(plant(), of_base, branch(), unstable[:1] + 100).max() > 1.0
 
 
+@pytest.mark.thorough
 def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
     """All that is weighed, by simulation under its noises."""
     weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
