@@ -116,7 +116,6 @@ LONG = (
     "tests/acquisition/engine/test_stopping_for_sure.py",
     "tests/acquisition/engine/test_time_to_silence.py",
     "tests/acquisition/run/test_disks.py",
-    "tests/acquisition/engine/test_heartbeat.py",
     "tests/analysis/frequency_response/test_noise_response.py",
     "tests/cli/test_campaign_commands.py",
     "tests/sim/test_extremes.py",
