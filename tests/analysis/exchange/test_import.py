@@ -388,16 +388,16 @@ def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("heading", "unit_s", "digits"),
+    ("heading", "unit_s", "digits", "rate_hz"),
     [
-        ("t [s]", 1.0, 9),
-        ("Zeit (s)", 1.0, 9),
-        ("Time [ms]", 1e-3, 6),
-        ("time (\u00b5s)", 1e-6, 3),
-        ("time [s]", 1.0, 2),
+        ("t [s]", 1.0, 9, 8020.0),
+        ("Zeit (s)", 1.0, 9, 8000.0),
+        ("Time [ms]", 1e-3, 6, 1000.0),
+        ("time (\u00b5s)", 1e-6, 3, 8020.0),
+        ("time [s]", 1.0, 2, 8000.0),
+        ("time [s]", 1.0, 2, 1000.0),
     ],
 )
-@pytest.mark.parametrize("rate_hz", [8000.0, 8020.0, 1000.0])
 def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
     rows = (f"{k / rate_hz / unit_s:.{digits}f};{value!r}\n" for k, value in enumerate(signals()[0].tolist()))
     (tmp_path / "a.csv").write_text(f"{heading};v\n" + "".join(rows), encoding="utf-8")

@@ -136,8 +136,9 @@ def allowed(kind, fault):
 @pytest.mark.parametrize("seed", [43])
 def test_what_a_file_says_of_time_reaches_the_recording(tmp_path, kind, seed):
     rng = np.random.default_rng(seed)
+    third = SAYS_TIMES.index(kind) % 3 if kind in SAYS_TIMES else 0
     faults = (
-        FAULTS
+        FAULTS[third::3]
         if kind in SAYS_TIMES
         else ("sound", "late", "rate")
         if kind in SAYS_STARTS
@@ -281,9 +282,16 @@ def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more=""):
     return validated(content, ImportMapping, "test")
 
 
-@pytest.mark.parametrize("full_scale", ["", "10"])
 @pytest.mark.parametrize(
-    ("low", "high", "noise"), [(-0.8, 0.8, 0.0), (-9, 0.8, 0.0), (-0.8, 0.8, 1e-3), (-9, 9, 0.0)]
+    ("low", "high", "noise", "full_scale"),
+    [
+        (-0.8, 0.8, 0.0, ""),
+        (-9, 0.8, 0.0, "10"),
+        (-0.8, 0.8, 1e-3, "10"),
+        (-0.8, 0.8, 1e-3, ""),
+        (-9, 9, 0.0, ""),
+        (-9, 9, 0.0, "10"),
+    ],
 )
 def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, low, high, noise):
     rng = np.random.default_rng(1)
@@ -367,7 +375,7 @@ def test_further_samples_of_a_wav_or_mat_file_are_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("at_s", "length_s", "share"),
-    [(8.0, 0.1, 0.47), (6.0, 0.1, 0.47), (3.0, 0.02, 0.2), (4.5, 0.1, 0.05), (4.5, 0.1, 0.0)],
+    [(8.0, 0.1, 0.47), (3.0, 0.02, 0.2), (4.5, 0.1, 0.0)],
 )
 def test_a_dwell_with_a_burst_is_not_called_periodic(tmp_path, at_s, length_s, share):
     rng = np.random.default_rng(4343)

@@ -180,12 +180,10 @@ def velocity_of_m0(hz):
     return np.array(found)
 
 
-@pytest.mark.parametrize(
-    "spacing_hz", [1.0, 1.0000175, 0.99998333, 0.5 * 1.000049, 0.25, 1.0666667, 0.9765625]
-)
+@pytest.mark.parametrize("spacing_hz", [1.0000175, 0.99998333, 0.25, 1.0666667])
 def test_modal_programs_find_the_modes_whatever_the_band_and_the_clock(known, tmp_path, spacing_hz):
     wanted = gong2025(contact="linear").natural_frequencies_hz
-    for number, start_hz in enumerate((10, 20, 25, 30, 37, 40, 50, 60, 73, 80)):
+    for number, start_hz in enumerate((10, 25, 37, 60, 73)):
         hz = spacing_hz * np.arange(np.ceil(start_hz / spacing_hz), 605 / spacing_hz)
         given = [
             function(hz, velocity_of_m0(hz)),

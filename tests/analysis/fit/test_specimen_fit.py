@@ -120,6 +120,7 @@ def test_the_intervals_hold_the_truth_as_often_as_they_say_and_are_no_wider_than
     assert np.mean([fit.reduced_chi_square for fit in fits]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.thorough
 def test_intervals_hold_as_often_where_the_scatter_comes_from_three_realisations(true):
     """Few lines tell damping and the first frequency, and each line's own scatter is known to half."""
     rng, held, draws = np.random.default_rng(2), [], 120

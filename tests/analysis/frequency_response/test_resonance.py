@@ -98,7 +98,7 @@ def test_the_stated_spreads_are_the_scatter():
     frequency_hz = np.arange(200, 330, 1.0)
     clean = single(frequency_hz, 266.0, 0.02)
     found = []
-    for _ in range(80):
+    for _ in range(40):
         noise = rng.standard_normal((2, clean.size))
         noisy = clean * (1 + 0.03 * (noise[0] + 1j * noise[1]))
         fits = resonances(curve(frequency_hz, noisy, 0.03), low_hz=210, high_hz=320)
@@ -110,7 +110,7 @@ def test_the_stated_spreads_are_the_scatter():
         ("peak_magnitude", "sd_peak_magnitude"),
     ):
         scatter = np.std([getattr(each, value) for each in found])
-        assert np.mean([getattr(each, spread) for each in found]) == pytest.approx(scatter, rel=0.25)
+        assert np.mean([getattr(each, spread) for each in found]) == pytest.approx(scatter, rel=0.35)
     assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
 
 
@@ -150,6 +150,7 @@ def _z(found, natural_hz, damping):
     )
 
 
+@pytest.mark.thorough
 def test_a_mode_narrower_than_a_line_is_not_reported_wider():
     modes = [(95.0, 0.0012), (266.0, 0.0033)]
     errors = []
