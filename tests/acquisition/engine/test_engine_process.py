@@ -250,6 +250,7 @@ class TestRefusals:
         sys.platform != "win32" and not hasattr(os, "pwrite"),
         reason="run as Windows here, this process has other locks than its engines",
     )
+    @pytest.mark.thorough
     def test_two_engines_cannot_open_one_bench(self, engine, shipped_rig):
         with VirtualRig(shipped_rig) as virtual:
             served = on_server(shipped_rig, virtual)
@@ -306,6 +307,7 @@ class TestNobodyLooks:
         assert told.kind.value == "fault"
         assert "unattended" in told.next_step
 
+    @pytest.mark.thorough
     def test_a_drive_far_from_its_limits_is_given_the_patience_that_was_granted(
         self, client, shipped_rig, tmp_path
     ):
@@ -346,6 +348,7 @@ class TestNobodyLooks:
         assert process._process.wait(20) == 0
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
+    @pytest.mark.thorough
     def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(
         self, client, shared_engine, shipped_rig, tmp_path
     ):

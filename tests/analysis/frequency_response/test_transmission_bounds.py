@@ -49,7 +49,7 @@ def require_coverage(estimator, overlap, averages, repeats):
 @pytest.mark.parametrize("estimator", list(Estimator))
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
 def test_bounds_of_hann_segments_hold_the_truth_95_times_in_100(estimator, overlap):
-    require_coverage(estimator, overlap, averages=12, repeats=300)
+    require_coverage(estimator, overlap, averages=12, repeats=150)
 
 
 def test_segments_counted_as_independent_would_promise_too_much():

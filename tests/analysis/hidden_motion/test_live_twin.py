@@ -119,6 +119,7 @@ def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, 
         LiveTwin(rig.model_copy(update={"daq": daq}), 51_200.0, at_once)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "level_vpp"), [(261.0, 1.7), ("noise", 8.0)])
 def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_vpp):
     lost = []

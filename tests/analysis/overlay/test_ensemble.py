@@ -32,6 +32,7 @@ def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, point
     assert (12 if points == 1 else 3) <= outside <= 50
 
 
+@pytest.mark.thorough
 def test_a_magnitude_that_is_mostly_chance_passes_its_limit_no_more_often():
     rng = np.random.default_rng(8)
     outside = 0

@@ -131,6 +131,7 @@ def test_a_dwell_with_dropouts_says_what_it_says_without(rig, tmp_path):
     assert checks["Overloads"].verdict is Verdict.PASSED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("dropouts_per_s", "seed"), [(20.0, 2), (20.0, 13), (60.0, 1)])
 def test_a_dwell_with_clustered_dropouts_says_what_it_says_without_or_nothing(
     rig, tmp_path, dropouts_per_s, seed
