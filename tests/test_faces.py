@@ -159,7 +159,14 @@ def test_a_room_says_what_it_is_for_and_every_name_on_its_face_is_there(room):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("face", FOR_PEOPLE)
+@pytest.mark.parametrize(
+    "face",
+    [
+        *FOR_PEOPLE,
+        *("vibench.sim.accuracy_benchmark", "vibench.sim.shaker"),
+        *("vibench.analysis.prediction", "vibench.cli.paper"),
+    ],
+)
 def test_the_example_of_a_face_runs(face):
     result = doctest.testmod(importlib.import_module(face))
     assert result.attempted

@@ -1,7 +1,5 @@
 """The public faces of the simulation: their examples run, and words stand for enums."""
 
-import doctest
-import importlib
 import inspect
 import typing
 from enum import StrEnum
@@ -14,15 +12,6 @@ import vibench.sim.chain as chain
 import vibench.sim.maps as maps
 import vibench.sim.study as study
 
-FACES = (
-    "vibench.sim",
-    "vibench.sim.accuracy_benchmark",
-    "vibench.sim.branches",
-    "vibench.sim.chain",
-    "vibench.sim.shaker",
-    "vibench.sim.maps",
-    "vibench.sim.study",
-)
 SPECIMEN, DRIVE = sim.gong2025(), sim.Harmonic(130.0, 20e-6)
 SMOOTH = sim.gong2025(contact="linear")
 SHORT = {"duration_s": 0.05, "window_s": 0.02}
@@ -124,27 +113,6 @@ def test_a_checker_of_types_knows_every_word_of_an_enum():
                 for word in typing.get_args(part)
             ]
             assert literals == list(kind), case.id
-
-
-@pytest.mark.parametrize("face", FACES)
-def test_the_example_of_a_face_runs(face):
-    failed, tried = doctest.testmod(importlib.import_module(face))
-    assert (failed, tried > 0) == (0, True)
-
-
-@pytest.mark.parametrize(
-    ("contact", "law"),
-    [
-        ("hertz", sim.Hertz),
-        ("linear", sim.NoContact),
-        ("linear_gap", sim.LinearGap),
-        ("hunt_crossley:0.5", sim.HuntCrossley),
-        ("rigid:0.8", sim.RigidStops),
-        ("power:3+5+7", sim.PowerLaw),
-    ],
-)
-def test_a_contact_law_is_named_by_its_word(contact, law):
-    assert isinstance(sim.gong2025(damping_time_s=2e-5, gap_m=45e-6, contact=contact).contact, law)
 
 
 def test_a_trajectory_holds_what_the_design_promises():

@@ -154,18 +154,3 @@ def test_too_many_impacts_end_the_run_and_say_what_to_change():
     assert run.end_time_s < 30.0
     assert run.impacts.count == 400
     assert "max_impact_rate_hz" in run.outcome.text
-
-
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"duration_s": -1.0}, r"Duration -1\.0 s is not allowed"),
-        ({"duration_s": 2.0}, r"The run ends at 2\.0 s, the drive at 1\.0 s"),
-        ({"duration_s": 0.5, "start_time_s": float("nan")}, "Start time nan s is not allowed"),
-        ({"duration_s": 0.5, "sample_rate_hz": 0.0}, r"Sample rate 0\.0 Hz is not allowed"),
-        ({"duration_s": 0.5, "initial_state": [0.0, 1.0]}, "give six finite numbers"),
-    ],
-)
-def test_what_cannot_be_run_is_refused_in_one_sentence(options, sentence):
-    with pytest.raises(ValueError, match=sentence):
-        integrate(paper(), LinearSweep(50.0, 100.0, 1.0, 1e-6), **options)

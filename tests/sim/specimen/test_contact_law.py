@@ -1,6 +1,5 @@
 """Contact laws: their numbers, their fits, and the names by which a user asks for them."""
 
-import math
 from typing import get_args
 
 import numpy as np
@@ -91,12 +90,6 @@ def test_a_law_survives_a_file(name):
     law = gong2025(contact=name).contact
     adapter = TypeAdapter(ContactLaw)
     assert adapter.validate_json(adapter.dump_json(law)) == law
-
-
-@pytest.mark.parametrize("gap", [(0.0, 1e-5), (math.inf, math.inf), (1e-5, math.nan), -1e-6])
-def test_a_gap_that_is_none_is_refused(gap):
-    with pytest.raises(ValueError, match="is not allowed: it must be positive, and one side finite"):
-        gong2025(gap_m=gap)
 
 
 def test_a_power_law_without_terms_is_refused():
