@@ -66,6 +66,7 @@ def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solv
     assert peaks(strong) == pytest.approx([200, 435], abs=5)
 
 
+@pytest.mark.thorough
 def test_figure_3_shades_the_frequencies_that_collide_and_no_others(solved):
     results = solved(paper_figure(3).studies(SHORT)[0])
     for amplitude_m, table in zip(AMPLITUDES_M, drawn(solved, 3).tables, strict=True):
@@ -89,6 +90,7 @@ def test_shading_reaches_halfway_to_the_neighbours():
     assert axes.spans == [(1.5, 3.0), (4.5, 5.0)]
 
 
+@pytest.mark.thorough
 def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved):
     (table,) = drawn(solved, 5).tables
     share = {name: numbers(table, f"collides_{name}").mean() for name in ("damped", "undamped", "damped_7um")}

@@ -76,6 +76,7 @@ def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode(method):
     assert found == pytest.approx(-np.min(rates), abs=0.5)
 
 
+@pytest.mark.thorough
 def test_chaos_under_a_tight_tolerance_is_that_of_the_exact_motion():
     # Many short motions, which go together, in place of a long one.
     drives = [Harmonic(260.0, 5e-6, phase) for phase in np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)]

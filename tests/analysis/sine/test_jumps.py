@@ -103,6 +103,7 @@ def test_a_hardening_specimen_jumps_down_where_its_branch_folds_and_later_than_i
     assert not found.differs[found.frequency_hz > folds[-1] + 3].any()
 
 
+@pytest.mark.thorough
 def test_hysteresis_needs_both_directions(hardening):
     _, _, (up, down) = hardening
     with pytest.raises(InvalidRequest, match="in this order"):
