@@ -115,7 +115,13 @@ def said_by_all(vibench_here, folder, name="dwell.h5"):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(each, marks=[pytest.mark.slow] if each in {"units", "rig", "delay"} else [])
+        for each in CHANGES
+    ],
+)
 def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, folder, change):
     with h5py.File(folder / "dwell.h5", "r+") as file:
         del file["seal"]

@@ -260,7 +260,9 @@ def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carri
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), ((30e-6, 60e-6), 90)])
+@pytest.mark.parametrize(
+    ("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), pytest.param((30e-6, 60e-6), 90, marks=pytest.mark.slow)]
+)
 def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_out, gap_m, phase_deg):
     """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
     plan = other_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
@@ -287,7 +289,7 @@ def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carr
     ("gap_m", "phase_deg", "model_hz", "model_m"),
     [
         ((60e-6, 30e-6), -90, 193.175, 2.075e-6),
-        ((30e-6, 60e-6), 90, 193.175, 2.075e-6),
+        pytest.param((30e-6, 60e-6), 90, 193.175, 2.075e-6, marks=pytest.mark.slow),
         ((60e-6, 30e-6), -60, 193.092, 2.417e-6),
     ],
 )
