@@ -3,9 +3,10 @@
     python benchmarks/fast_sweeps.py --count 100 --seed 1 --save fast.json
     python benchmarks/fast_sweeps.py --count 100 --seed 1 --shard 1/4
     python benchmarks/fast_sweeps.py --count 8 --rig        # recorded on the virtual rig, random fixtures
+    python benchmarks/fast_sweeps.py --count 100 --unknown  # as if nobody had described the specimen
 
-Each specimen has other masses, damping and gap; each sweep another range, rate, direction and level. Impacts
-are those of the simulation. Wrong is a collision without an impact, or a sweep with impacts in ten intervals
+Each specimen has other masses, damping and gap; each sweep another range, rate, direction and level; half of
+them are logarithmic. Impacts are those of the simulation. Wrong is a collision without an impact, or a sweep with impacts in ten intervals
 that is said to show none; "not determined" is never wrong.
 """
 
@@ -44,6 +45,7 @@ class FastSweep:
     duration_s: float
     amplitude_m: float
     seed: int
+    is_logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,23 +75,27 @@ class Outcome:
 def fast_sweep(number: int, seed: int = 1) -> FastSweep:
     """Draw a sweep across or beside a resonance of another specimen."""
     rng = np.random.default_rng((seed, number))
-    nominal = gong2025(damping_time_s=float(10 ** rng.uniform(-5.5, -4.4)), gap_m=rng.uniform(20e-6, 80e-6))
+    nominal = gong2025(damping_time_s=float(10 ** rng.uniform(-6.5, -4.4)), gap_m=rng.uniform(20e-6, 80e-6))
     masses = tuple(float(each) for each in np.array(nominal.masses) * rng.uniform(0.7, 1.4, 3))
     specimen = replace(nominal, masses=masses)
     middle_hz = float(rng.choice(specimen.natural_frequencies_hz) * rng.uniform(0.9, 1.1))
-    width_hz = min(float(rng.uniform(20, 100)), 1.2 * middle_hz)
+    width_hz = min(float(10 ** rng.uniform(1.3, 2.6)), 1.5 * middle_hz)
     duration_s = float(np.clip(width_hz / 10 ** rng.uniform(0, 1.5), 3, 30))
     ends = np.array([max(middle_hz - width_hz / 2, 30.0), middle_hz + width_hz / 2])
     start_hz, stop_hz = (float(each) for each in (ends if rng.random() < 0.5 else ends[::-1]))
-    return FastSweep(specimen, start_hz, stop_hz, duration_s, float(10 ** rng.uniform(-7, -4.7)), number)
+    level_m, is_logarithmic = float(10 ** rng.uniform(-7, -4.7)), bool(rng.random() < 0.5)
+    return FastSweep(specimen, start_hz, stop_hz, duration_s, level_m, number, is_logarithmic)
 
 
-def judged(sweep: FastSweep, contact: str) -> Outcome:
-    """Simulate a sweep after a settled sine, and analyse it as one of a known specimen."""
+def judged(sweep: FastSweep, contact: str, known: Specimen | None) -> Outcome:
+    """Simulate a sweep after a settled sine, and analyse it, with the specimen that is known of it."""
     lead, tail = round(LEAD_S * RATE_HZ), round(TAIL_S * RATE_HZ)
     time_s = np.arange(lead + round(sweep.duration_s * RATE_HZ) + tail) / RATE_HZ
     swept = np.maximum(time_s - LEAD_S, 0) / sweep.duration_s
-    phase = 2 * np.pi * np.cumsum(sweep.start_hz + (sweep.stop_hz - sweep.start_hz) * swept) / RATE_HZ
+    steady_hz = sweep.start_hz + (sweep.stop_hz - sweep.start_hz) * swept
+    if sweep.is_logarithmic:
+        steady_hz = sweep.start_hz * (sweep.stop_hz / sweep.start_hz) ** swept
+    phase = 2 * np.pi * np.cumsum(steady_hz) / RATE_HZ
     rise, fall = (np.clip(each / length, 0, 1) for each, length in ((time_s, RAMP_S), (time_s[::-1], TAIL_S)))
     moved_m = sweep.amplitude_m * (1 - np.cos(np.pi * rise)) * (1 - np.cos(np.pi * fall)) / 4 * np.sin(phase)
     law = gong2025(contact=contact).contact
@@ -104,7 +110,8 @@ def judged(sweep: FastSweep, contact: str) -> Outcome:
     before = lead // sums.neighbour_samples * sums.neighbour_samples
     sums.add_neighbour(data[:, lead - before : lead])
     sums.add(data[:, lead : data.shape[1] - tail])
-    found = sums.response(linear=lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0])
+    linear = None if known is None else lambda at_hz: base_transmissibility(known, at_hz)[:, 0]
+    found = sums.response(linear=linear)
     return outcome(sweep, found, collisions(found), path.impacts.times_s - LEAD_S)
 
 
@@ -154,6 +161,7 @@ def main() -> None:
     parser.add_argument("--shard", default="1/1", help="which part: 3/10 is the third of ten")
     parser.add_argument("--save", type=Path, metavar="FILE.json")
     parser.add_argument("--rig", action="store_true", help="record on the virtual rig, without stops")
+    parser.add_argument("--unknown", action="store_true", help="analyse without a specimen")
     asked = parser.parse_args()
     part, of = (int(each) for each in asked.shard.split("/"))
     is_begun = asked.save is not None and asked.save.exists()
@@ -168,7 +176,7 @@ def main() -> None:
                 said = (
                     recorded(sweep, contact, Path(folder) / "fast.h5")
                     if asked.rig
-                    else judged(sweep, contact)
+                    else judged(sweep, contact, None if asked.unknown else sweep.specimen)
                 )
             found[name] = asdict(said) | {"is_wrong": said.is_wrong}
             if said.is_wrong:
@@ -179,7 +187,7 @@ def main() -> None:
     steady = [
         each["largest_ii"] * each["steady_over_swept"] / each["steady_ii"] - 1
         for each in every
-        if not each["struck"] and not asked.rig
+        if not each["struck"] and not asked.rig and not asked.unknown
     ]
     print(f"{len(every)} sweeps, {sum(each['struck'] > 0 for each in every)} with impacts")
     print(f"wrong: {sum(each['is_wrong'] for each in every)}")

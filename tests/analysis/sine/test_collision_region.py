@@ -155,13 +155,23 @@ def test_without_a_specimen_ringing_and_weak_impacts_are_not_told_apart():
 def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact):
     """Drawn so that `benchmarks/fast_sweeps.py` does the same for hours."""
     scene = fast_sweep(seed)
-    outcome = judged(scene, contact)
+    outcome = judged(scene, contact, scene.specimen)
     assert not outcome.is_wrong, outcome
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_a_mode_that_rings_on_at_twice_the_drive_is_no_collision(is_known):
+    """Collisions from 46 to 39 Hz were reported of a specimen without stops, whose mode at 82 Hz rang on."""
+    specimen = gong2025(damping_time_s=3.5e-6)
+    outcome = judged(
+        FastSweep(specimen, 125.0, 40.0, 12.0, 1e-5, 1), "linear", specimen if is_known else None
+    )
+    assert outcome.colliding == 0
 
 
 def test_steady_sines_reach_as_far_as_the_linear_specimen_says():
     """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
-    outcome = judged(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear")
+    outcome = judged(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))
     assert outcome.largest_ii < 0.98 * steady
     assert outcome.largest_ii * outcome.steady_over_swept == pytest.approx(steady, rel=2e-3)

@@ -20,7 +20,9 @@ _RINGING = 2.0
 _TOO_FAST = 0.5
 """Residual over order 1 that collisions exceed in most intervals: ringing that may be more can hide them."""
 _IMPACTS = 0.1
-"""Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05."""
+"""Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05 where neither meets a mode."""
+_RING_CYCLES = 5_000.0
+"""After which a mode with a damping ratio of 0.02 % has faded to a five-hundredth."""
 _ENOUGH = 0.25
 """Part of a run in which impacts show themselves so, where no specimen tells how it rings."""
 _SMOOTH_AT_MOST = 0.1
@@ -102,7 +104,8 @@ def collisions(sweep: SweptMotion) -> Collisions:
     base motion. The noise is the larger of what the sixth difference of the samples shows and of the quietest
     tenth of the sweep (as far as that may be smooth at all). Single intervals are outvoted by their
     neighbourhood, and those with drop-outs of the laser are taken as their neighbours. Orders 2 and 3 above
-    a tenth of order 1 show impacts, not ringing; where no specimen is known, they must be seen.
+    a tenth of order 1, and above twice those without contact, show impacts. Where no specimen is known, they
+    must be seen, at frequencies whose double and triple the sweep has not just left.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -115,8 +118,9 @@ def collisions(sweep: SweptMotion) -> Collisions:
             f"more than {votes}"
         )
     ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
-    impacts = np.hypot(*(np.abs(sweep.velocity.order(each)) for each in (2.0, 3.0))) > _IMPACTS * fundamental
     # Within a vote: resonances may lie a little beside where the specimen's description puts them.
+    rung = maximum_filter1d(_RINGING * np.nan_to_num(sweep.linear_impacts), votes)
+    impacts = sweep.velocity.impacts > np.maximum(_IMPACTS, rung)
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
     smooth = np.maximum(_DISTORTION, most) * fundamental
     threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
@@ -126,7 +130,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
     regions = []
     for run in _merge_runs(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
         first, last = _trim_run(above, *run, votes)
-        if is_known or np.mean(impacts[first : last + 1]) >= _ENOUGH:
+        if is_known or np.mean(_seen_impacts(sweep)[first : last + 1]) >= _ENOUGH:
             regions.append(_region(sweep, residual / threshold, first, last))
             inside[first : last + 1] = True
     hz, is_unclear = sweep.frequency_hz, _majority(above | (ringing > _TOO_FAST), votes) & ~inside
@@ -139,6 +143,22 @@ def collisions(sweep: SweptMotion) -> Collisions:
         too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(is_unclear)),
         noise_rms=noise,
     )
+
+
+def _seen_impacts(sweep: SweptMotion) -> Flags:
+    """Return where order 2 or 3 shows impacts of a specimen that is not known.
+
+    A mode that the drive has passed may still ring at the double or triple of its frequency.
+    """
+    hz, time_s = sweep.frequency_hz, sweep.time_s
+    rising = np.argsort(hz)
+    seen = np.zeros(hz.size, dtype=np.bool_)
+    for order in (2.0, 3.0):
+        passed_s = np.interp(order * hz, hz[rising], time_s[rising], right=np.inf)
+        may_ring = (passed_s < time_s) & (order * hz * (time_s - passed_s) < _RING_CYCLES)
+        share = np.abs(sweep.velocity.order(order) / sweep.velocity.order(1.0))
+        seen |= (share > _IMPACTS) & ~may_ring
+    return seen
 
 
 def _noise(sweep: SweptMotion, residual: Reals, fundamental: Reals) -> float:

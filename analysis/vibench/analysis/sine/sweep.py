@@ -168,6 +168,8 @@ class SweptMotion(Labelled):
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
     """Residual over order 1 of the specimen without contact in this sweep, NaN where no specimen is known."""
+    linear_impacts: Reals
+    """Orders 2 and 3 over order 1 of the same: a mode that rings on while the drive passes half of it."""
     steady_over_swept: float
     """Largest Response II of the specimen without contact, under steady sines over in this sweep; or NaN."""
     interval_s: float
@@ -357,7 +359,8 @@ class SweepSums:
         base, velocity = track((data[-2], data[-1]))
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
-        residual, steady_over_swept = np.full(upper.size, np.nan), np.nan
+        residual = impacts = np.full(upper.size, np.nan)
+        steady_over_swept = np.nan
         if linear is not None:
             # Order 1 alone: noise of the accelerometer would ring in a linear specimen too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
@@ -367,7 +370,7 @@ class SweepSums:
             moved = whole[-2].copy()
             moved[inside] = cosine * np.cos(phase.phase_rad) - sine * np.sin(phase.phase_rad)
             (swept,) = track((self._linear_velocity(moved, linear)[inside],))
-            residual = swept.residual_rms / np.abs(swept.order(1.0))
+            residual, impacts = swept.residual_rms / np.abs(swept.order(1.0)), swept.impacts
             played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
             of_base = np.abs(swept.order(1.0) / base.order(1.0))
             largest = np.max(2 * np.pi * frequency_hz * of_base)
@@ -413,6 +416,7 @@ class SweepSums:
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
             is_clear=np.asarray(~bridged.any(axis=1)),
             linear_residual=residual,
+            linear_impacts=impacts,
             steady_over_swept=steady_over_swept,
             interval_s=self._interval / self._rate_hz,
         )

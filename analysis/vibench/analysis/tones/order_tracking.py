@@ -57,6 +57,11 @@ class TrackedOrders(Labelled):
         chosen: Complexes = self.value[self.orders.index(number)]
         return chosen
 
+    @property
+    def impacts(self) -> Reals:
+        """Orders 2 and 3 over order 1, shape (intervals,)."""
+        return np.asarray(np.hypot(*np.abs([self.order(2.0), self.order(3.0)])) / np.abs(self.order(1.0)))
+
 
 def tracked_orders(
     samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
