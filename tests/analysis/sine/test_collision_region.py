@@ -169,6 +169,24 @@ def test_a_mode_that_rings_on_at_twice_the_drive_is_no_collision(is_known):
     assert outcome.colliding == 0
 
 
+def test_what_rings_louder_than_the_drive_is_no_collision_of_an_unknown_specimen():
+    """Collisions from 97 to 118 Hz were reported of a specimen without stops, which rings."""
+    specimen = gong2025(damping_time_s=4e-7)
+    sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
+    assert judged(sweep, "linear", None).colliding == 0
+
+
+@pytest.mark.parametrize(("damping_time_s", "is_stated"), [(3e-6, True), (2e-7, False)])
+def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(damping_time_s, is_stated):
+    """32 % too much was stated where the specimen still rang of what was before the recording."""
+    specimen = gong2025(damping_time_s=damping_time_s)
+    outcome = judged(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)
+    if is_stated:
+        found = outcome.largest_ii * outcome.steady_over_swept
+        assert found == pytest.approx(outcome.steady_ii, rel=0.03)
+    assert np.isfinite(outcome.steady_over_swept) == is_stated
+
+
 def test_steady_sines_reach_as_far_as_the_linear_specimen_says():
     """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
     outcome = judged(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())

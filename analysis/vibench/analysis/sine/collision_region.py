@@ -148,16 +148,17 @@ def collisions(sweep: SweptMotion) -> Collisions:
 def _seen_impacts(sweep: SweptMotion) -> Flags:
     """Return where order 2 or 3 shows impacts of a specimen that is not known.
 
-    A mode that the drive has passed may still ring at the double or triple of its frequency.
+    A mode that the drive has passed may still ring at the double or triple of its frequency, and what rings
+    louder than order 1 leaks into all orders.
     """
     hz, time_s = sweep.frequency_hz, sweep.time_s
+    least = _IMPACTS * np.maximum(np.abs(sweep.velocity.order(1.0)), sweep.velocity.residual_rms)
     rising = np.argsort(hz)
     seen = np.zeros(hz.size, dtype=np.bool_)
     for order in (2.0, 3.0):
         passed_s = np.interp(order * hz, hz[rising], time_s[rising], right=np.inf)
         may_ring = (passed_s < time_s) & (order * hz * (time_s - passed_s) < _RING_CYCLES)
-        share = np.abs(sweep.velocity.order(order) / sweep.velocity.order(1.0))
-        seen |= (share > _IMPACTS) & ~may_ring
+        seen |= (np.abs(sweep.velocity.order(order)) > least) & ~may_ring
     return seen
 
 

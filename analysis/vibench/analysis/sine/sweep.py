@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 from scipy import fft
+from scipy.signal import argrelmax
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import far_from
@@ -113,6 +114,9 @@ _BAND_ABOVE = 0.3
 _LINEAR_ABOVE = 5.5
 """Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
 _STEADY_POINTS = 10_001
+_PEAK_POINTS = 401
+_SAME_LARGEST = 0.03
+"""Difference of the largest Response II from that of the linear run, above which it is another motion."""
 _LINES = 1 << 15
 """At which linear motion is computed together."""
 _BRIDGE_PERIODS = 3.0
@@ -171,7 +175,8 @@ class SweptMotion(Labelled):
     linear_impacts: Reals
     """Orders 2 and 3 over order 1 of the same: a mode that rings on while the drive passes half of it."""
     steady_over_swept: float
-    """Largest Response II of the specimen without contact, under steady sines over in this sweep; or NaN."""
+    """Largest Response II of the specimen without contact, under steady sines over in this sweep; NaN where
+    the sweep's own is another one, as where the specimen still rings of an earlier motion."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -371,10 +376,11 @@ class SweepSums:
             moved[inside] = cosine * np.cos(phase.phase_rad) - sine * np.sin(phase.phase_rad)
             (swept,) = track((self._linear_velocity(moved, linear)[inside],))
             residual, impacts = swept.residual_rms / np.abs(swept.order(1.0)), swept.impacts
-            played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
-            of_base = np.abs(swept.order(1.0) / base.order(1.0))
-            largest = np.max(2 * np.pi * frequency_hz * of_base)
-            steady_over_swept = float(np.max(np.abs(linear(played_hz))) / largest)
+            over_base = [each.order(1.0) / base.order(1.0) for each in (swept, velocity)]
+            reached, measured = (float(np.max(frequency_hz * np.abs(each))) for each in over_base)
+            if abs(measured / reached - 1) < _SAME_LARGEST:
+                steady = _largest_steady(linear, frequency_hz.min(), frequency_hz.max())
+                steady_over_swept = float(steady / (2 * np.pi * reached))
         omega = 2 * np.pi * frequency_hz
         fundamental = ORDERS.index(1.0)
         amplitude_m = np.abs(base.order(1.0)) / omega**2
@@ -452,6 +458,14 @@ class SweepSums:
         omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]
         scaled = replace(tracked, value=tracked.value / (1j * omega), sd=tracked.sd / omega)
         return scaled, frequency_hz
+
+
+def _largest_steady(linear: Transmission, low_hz: float, high_hz: float) -> float:
+    """Return the largest magnitude between two frequencies, narrow modes included."""
+    hz, step_hz = np.linspace(low_hz, high_hz, _STEADY_POINTS, retstep=True)
+    steady = np.abs(linear(hz))
+    near_hz = hz[argrelmax(steady)[0], np.newaxis] + step_hz * np.linspace(-1, 1, _PEAK_POINTS)
+    return float(np.max(np.append(steady, np.abs(linear(near_hz.ravel())))))
 
 
 def _means(values: Reals, length: int) -> Reals:
