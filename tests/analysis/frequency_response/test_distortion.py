@@ -113,7 +113,10 @@ def test_what_drifts_from_realisation_to_realisation_is_not_called_distortion(an
     assert found.distortion_share < 3 * found.noise_share
     (remark,) = [each.text for each in analysis.checks if each.what == "Drift"]
     assert named in remark
-    assert "drift" in distortion_caption(analysis.response.periodic)
+    assert ("gain" in remark) == (named == "gain"), "a mode that moves is no drift of a gain"
+    caption = distortion_caption(analysis.response.periodic)
+    assert "drift" in caption
+    assert ("distortion at most" in caption) == (named == "frequencies")
 
 
 @pytest.mark.parametrize("distorted", [np.zeros_like, lambda v: 0.02 * v**3, lambda v: 0.05 * v**2])

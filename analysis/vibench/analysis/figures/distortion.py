@@ -131,7 +131,9 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     if found.distortion_share is None:
         said.append("; one realisation cannot show distortion.")
     else:
-        said.append(f", distortion {_percent(found.distortion_share)}.")
+        # Neighbouring lines do not follow a narrow mode that moves: some of the drift is left.
+        most = "at most " if found.drift and found.drift.frequency_share else ""
+        said.append(f", distortion {most}{_percent(found.distortion_share)}.")
     if periodic.drift is not None:
         said.append(f" The {periodic.drift.text}; this is not distortion.")
     return "".join(said) + _quiet_text(found)

@@ -283,26 +283,29 @@ def _without_drift(
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
     """
     count, lines = off.shape
-    stretch = frequency_hz * np.gradient(value, frequency_hz) / value if lines > 1 else np.zeros_like(value)
+    # The ratio of the displacements moves with the modes; velocity over acceleration has the frequency below.
+    moved = value * frequency_hz
+    stretch = frequency_hz * np.gradient(moved, frequency_hz) / moved if lines > 1 else np.zeros_like(value)
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
     weight = 1 / sd[known, None]
     shapes = weight * np.stack((np.ones_like(stretch), stretch), axis=1)[known]
     target = weight * off[:, known].T
     by_noise = (noise_variance / np.abs(value) ** 2)[known, None]
     excess = float(np.sum(np.abs(target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
-    left, shares = target, [0.0, 0.0]
-    for used in range(1, shapes.shape[1] + 1):
-        factors = np.linalg.lstsq(shapes[:, :used], target, rcond=None)[0]
-        rest = target - shapes[:, :used] @ factors
+    left, shares = target, np.zeros(2)
+    for used in ([0], [1], [0, 1]):
+        factors = np.linalg.lstsq(shapes[:, used], target, rcond=None)[0]
+        rest = target - shapes[:, used] @ factors
         before, after = (float(np.sum(np.abs(each) ** 2)) for each in (left, rest))
         if before - after > max(_OVER_CHANCE * before / lines, _MOST * excess):
             left, excess = rest, excess - (before - after)
-            shares[:used] = np.sqrt(np.sum(np.abs(factors) ** 2, axis=1) / (count - 1)).tolist()
-    if not any(shares):
+            shares[:] = 0.0
+            shares[used] = np.sqrt(np.sum(np.abs(factors) ** 2, axis=1) / (count - 1))
+    if not np.any(shares):
         return None, off
     off = off.copy()
     off[:, known] = (left / weight).T
-    return Drift(*shares), off
+    return Drift(*shares.tolist()), off
 
 
 @dataclass(frozen=True)
