@@ -13,6 +13,7 @@ from math import inf
 from pathlib import Path
 
 from . import (
+    doubtful_recordings,
     engine_messages,
     imported_files,
     instrument_messages,
@@ -32,6 +33,8 @@ TARGETS: dict[str, Attack] = {
     "flips": recordings_flips.attack,
     "kills": recordings_kills.attack,
     "calls": recordings_kills.attack_calls,
+    "drifts": doubtful_recordings.attack_drifts,
+    "steps": doubtful_recordings.attack_steps,
 }
 """What can be attacked, each by its own file."""
 
