@@ -147,6 +147,10 @@ _MOST = 0.5
 """Part of the scatter beyond noise that a drift explains at least."""
 
 
+_SMALL = 0.03
+"""Deviation of a line up to which a drift is found by it; about a narrow mode that moves it is larger."""
+
+
 class Scatter(StrEnum):
     """What the bounds of a periodic transmission were measured from."""
 
@@ -285,18 +289,17 @@ def _without_drift(
     count, lines = off.shape
     # The ratio of the displacements moves with the modes; velocity over acceleration has the frequency below.
     moved = value * frequency_hz
-    stretch = frequency_hz * np.gradient(moved, frequency_hz) / moved if lines > 1 else np.zeros_like(value)
+    stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
-    weight = 1 / sd[known, None]
-    shapes = weight * np.stack((np.ones_like(stretch), stretch), axis=1)[known]
-    target = weight * off[:, known].T
+    shapes, target = np.stack((np.ones_like(stretch), stretch), axis=1)[known], off[:, known].T
+    weight = np.all(np.abs(target) < _SMALL, axis=1, keepdims=True) / sd[known, None]
     by_noise = (noise_variance / np.abs(value) ** 2)[known, None]
-    excess = float(np.sum(np.abs(target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
+    excess = float(np.sum(np.abs(weight * target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
     left, shares = target, np.zeros(2)
     for used in ([0], [1], [0, 1]):
-        factors = np.linalg.lstsq(shapes[:, used], target, rcond=None)[0]
+        factors = np.linalg.lstsq(weight * shapes[:, used], weight * target, rcond=None)[0]
         rest = target - shapes[:, used] @ factors
-        before, after = (float(np.sum(np.abs(each) ** 2)) for each in (left, rest))
+        before, after = (float(np.sum(np.abs(weight * each) ** 2)) for each in (left, rest))
         if before - after > max(_OVER_CHANCE * before / lines, _MOST * excess):
             left, excess = rest, excess - (before - after)
             shares[:] = 0.0
@@ -304,8 +307,22 @@ def _without_drift(
     if not np.any(shares):
         return None, off
     off = off.copy()
-    off[:, known] = (left / weight).T
+    off[:, known] = left.T
     return Drift(*shares.tolist()), off
+
+
+def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
+    """Return the slope at each line: that of the quotient of two straight lines that one mode is nearby."""
+    if value.size == 1:
+        return np.zeros_like(value)
+    slope = np.gradient(value, frequency_hz)
+    steps = np.diff(value) / np.diff(frequency_hz)
+    across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
+    product = steps[1:] * steps[:-1]
+    # Larger at a smooth extremum, where no such quotient is, and with a mode in the middle of three lines.
+    is_mode = np.abs(product) < np.abs(across) ** 2
+    slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
+    return np.asarray(slope)
 
 
 @dataclass(frozen=True)
