@@ -9,7 +9,6 @@ from itertools import islice
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from vibench.acquisition.plan import Measurement
@@ -20,7 +19,7 @@ from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RESPONSE, RecordedChannels
-from ..signals.arrays import Complexes, Reals
+from ..signals.arrays import Reals, Samples
 from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
 from .shaker_fit import FittedShaker
@@ -42,9 +41,6 @@ _SURELY = 20.0
 """Power of a line over that of noise, which exceeds it once in 5e8 lines."""
 
 
-Singles = NDArray[np.float32]
-
-
 class PlayedVoltage:
     """A recorded voltage without its converter's noise, as far as that can be told.
 
@@ -61,17 +57,21 @@ class PlayedVoltage:
         self._frames = 1 - (-volts.size // self._hop)
         """They overlap by half; the first begins and the last ends half a frame outside."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
-        halves = self._window.reshape(2, self._hop)
-        self._back = (halves / np.sum(halves**2, axis=0)).ravel()
-        """Window of synthesis, with which frames that overlap by half add up to what was taken apart."""
         self._likely, self._roots = (volts, []) if converter_rms_v == 0.0 else self._parts(volts)
 
-    def _parts(self, volts: Reals) -> tuple[Reals, list[Singles]]:
+    def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
         """Give the likely voltage, and roots of the recorded shares, by line in batches of frames."""
         own = self._own_v**2 * float(np.sum(self._window**2))
-        roots: list[Singles] = []
+        halves = self._window.reshape(2, self._hop)
+        # Window of synthesis, with which frames that overlap by half add up to what was taken apart.
+        back = (halves / np.sum(halves**2, axis=0)).ravel()
+        recorded = np.zeros((self._frames + 1, self._hop), np.float32)
+        recorded.ravel()[self._hop : self._hop + volts.size] = volts
+        roots: list[Samples] = []
 
-        def filtered(lines: Complexes) -> Complexes:
+        def likely(first: int, last: int) -> Samples:
+            whole = np.concatenate([recorded[first:last], recorded[first + 1 : last + 1]], axis=1)
+            lines = fft.rfft(whole * self._window)
             power = np.abs(lines) ** 2
             # The median of exponentially distributed powers is log 2 of their mean.
             level = np.concatenate(
@@ -84,39 +84,38 @@ class PlayedVoltage:
             total = np.maximum(level, own)
             share = np.where(power > _SURELY * total, 1.0, 1.0 - own / np.where(total > 0.0, total, 1.0))
             roots.append(np.sqrt(share, dtype=np.float32))
-            return share * lines
+            return np.asarray(
+                fft.irfft(share * lines, self._window.size, overwrite_x=True) * back, np.float32
+            )
 
-        recorded = np.zeros((self._frames + 1, self._hop))
-        recorded.ravel()[self._hop : self._hop + volts.size] = volts
-        rows = iter(recorded)
-        return self._through(filtered, lambda count: np.array(list(islice(rows, count)))), roots
+        return self._joined(likely), roots
 
-    def drawn(self, rng: np.random.Generator) -> Reals:
+    def drawn(self, rng: np.random.Generator) -> Samples:
         """Return a voltage that may have been played, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
-        share = iter(self._roots)
-        drawn = self._through(
-            lambda lines: next(share) * lines,
-            lambda count: self._own_v * rng.standard_normal((count, self._hop)),
-        )
+        # What is not known of a frame is noise of its own: fading into the next one keeps its power.
+        fade = np.sqrt(self._window, dtype=np.float32)
+        size = np.float32(self._own_v * np.sqrt(self._hop))
+        roots = iter(self._roots)
+
+        def unknown(_first: int, _last: int) -> Samples:
+            root = next(roots)
+            lines = rng.standard_normal((*root.shape, 2), np.float32).view(np.complex64)[..., 0]
+            lines *= size * root
+            return np.asarray(fft.irfft(lines, self._window.size, overwrite_x=True) * fade)
+
+        drawn = self._joined(unknown)
         drawn += self._likely
         return drawn
 
-    def _through(self, change: Callable[[Complexes], Complexes], following: Callable[[int], Reals]) -> Reals:
-        """Change the lines of frames, shape (frames, lines) in batches.
-
-        ``following`` gives this many further halves of frames, shape (halves, samples).
-        """
+    def _joined(self, frames: Callable[[int, int], Samples]) -> Samples:
+        """Add frames that overlap by half; ``frames`` gives those of a batch."""
         hop = self._hop
-        result = np.zeros((self._frames + 1, hop))
-        halves = following(1)
+        result = np.zeros((self._frames + 1, hop), np.float32)
         for first in range(0, self._frames, _BATCH_FRAMES):
             last = min(first + _BATCH_FRAMES, self._frames)
-            halves = np.concatenate([halves[-1:], following(last - first)])
-            whole = np.concatenate([halves[:-1], halves[1:]], axis=1)
-            lines = change(fft.rfft(whole * self._window, overwrite_x=True))
-            whole = fft.irfft(lines, self._window.size, overwrite_x=True) * self._back
+            whole = frames(first, last)
             result[first:last] += whole[:, :hop]
             result[first + 1 : last + 1] += whole[:, hop:]
         return result.ravel()[hop : hop + self._samples]
@@ -191,9 +190,9 @@ _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17
 """Samples that get their noise together."""
-_MOST_BYTES = 1.1e9
+_MOST_BYTES = 0.35e9
 """That the draws under way at a time may take."""
-_BYTES_PER_SAMPLE = 50
+_BYTES_PER_SAMPLE = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +288,7 @@ def voltage_source(
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     volts = recorded_voltage(recording, rig)
-    drive_v = volts if rig.role == DRIVE else recording.read(DRIVE)
+    drive_v = np.asarray(volts if rig.role == DRIVE else recording.read(DRIVE), np.float32)
     noise = channel_noise(recording, tuple(recording.roles))
     voltage = PlayedVoltage(volts, noise.converter_v * abs(recording.channel(rig.role).physical_per_volt))
     return DrawSource(
@@ -371,7 +370,7 @@ def _drawn_channels(
     rig: DrivenRig,
     fitted: FittedShaker | None,
     voltage: PlayedVoltage,
-    drive_v: Reals,
+    drive_v: Samples,
     noise: ChannelNoise,
     number: int,
 ) -> SimulatedChannels:
@@ -390,7 +389,7 @@ def _drawn_channels(
 
 
 def _moved(
-    rig: DrivenRig, volts: Reals, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
+    rig: DrivenRig, volts: Samples, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
 ) -> SampledMotion:
     """Move rig and specimen from a random start; the channels of base and m0 get their noise."""
     try:
@@ -405,7 +404,9 @@ def _moved(
     for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity)):
         for first in range(0, seen.size, _BLOCK):
             block = seen[first : first + _BLOCK]
-            block += noise.rms[role] * rng.standard_normal(block.size)
+            drawn = rng.standard_normal(block.size, np.float32)
+            drawn *= np.float32(noise.rms[role])
+            block += drawn
     return motion
 
 
@@ -450,7 +451,9 @@ class StretchDraws:
         rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
         noise = ChannelNoise(rms, self.noise.converter_v)
         motion = _moved(rig, self.volts, self.recording, noise, rng)
-        return np.stack([motion.base_acceleration[self.kept], motion.m0_velocity[self.kept]])
+        return np.stack(
+            [motion.base_acceleration[self.kept], motion.m0_velocity[self.kept]], dtype=np.float64
+        )
 
 
 def stretch_draws(

@@ -14,7 +14,7 @@ from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch
-from ..signals.arrays import Complexes, Flags, Integers, Reals
+from ..signals.arrays import Complexes, Flags, Integers, Reals, Samples
 from ..signals.quantity import Quantity, converted_signal
 
 LOWEST_PART = 0.25
@@ -97,15 +97,15 @@ class SimulatedChannels:
     """A draw of what was recorded, in the shape of the recording: the same estimator takes both."""
 
     recorded: RecordedChannels
-    velocity: Reals
+    velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
     """Times since the first sample [s], and contacts started up to them."""
     response_delay_s: float
     """Lag of the response channel behind the base channel."""
-    base_acceleration: Reals
+    base_acceleration: Samples
     """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
-    drive_v: Reals
+    drive_v: Samples
     """Recorded drive voltage, shape (samples,) [V]."""
     sensors: Callable[[Reals], Complexes]
     """Gain of the response's sensor over that of the base's, without their delays."""
@@ -130,7 +130,8 @@ class SimulatedChannels:
 
     def read(self, start: int, stop: int) -> Reals:
         """Return drive, base acceleration and simulated velocity, shape (3, samples)."""
-        return np.stack([each[start:stop] for each in (self.drive_v, self.base_acceleration, self.velocity)])
+        channels = (self.drive_v, self.base_acceleration, self.velocity)
+        return np.stack([each[start:stop] for each in channels], dtype=np.float64)
 
     def overloaded(self, start: int, stop: int) -> Flags:
         """Where the recording was overloaded: what is compared must rest on the same samples."""

@@ -17,6 +17,7 @@ from ..specimen.specimen import Specimen
 from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
 
 ComplexArray = NDArray[np.complex128]
+Singles = NDArray[np.float32]
 Gain = Callable[[FloatArray], ComplexArray]
 """Complex gain of a sensor over frequency [Hz], shape kept."""
 
@@ -26,7 +27,7 @@ _PASS_PART = 0.45
 """Part of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
 _MARGIN = 2048
 """Samples on either side of a piece: the filters' memory beyond is below 1e-8."""
-_PIECE = 1 << 17
+_PIECE = 1 << 15
 """Samples that are filtered together."""
 _BLOCK_S = 0.02
 """Impacts are counted in blocks of this length."""
@@ -55,11 +56,11 @@ class DrivenTable:
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """What the sensors show, shape (samples,)."""
+    """What the sensors show, shape (samples,); single precision, far below any converter's noise."""
 
-    base_acceleration: FloatArray
+    base_acceleration: Singles
     """[m/s2]"""
-    m0_velocity: FloatArray
+    m0_velocity: Singles
     """[m/s]"""
     impact_times_s: FloatArray
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
@@ -69,7 +70,7 @@ class SampledMotion:
 
 def follow_voltage(
     table: DrivenTable,
-    volts: FloatArray,
+    volts: FloatArray | Singles,
     sample_rate_hz: float,
     *,
     start: ArrayLike = (0.0,) * 6,
@@ -95,7 +96,7 @@ def follow_voltage(
     step_s = 1 / (sample_rate_hz * ratio)
     shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
     gains = (table.base_sensor, table.m0_sensor)
-    kept = np.empty((len(gains), volts.size))
+    kept = np.empty((len(gains), volts.size), np.float32)
     half_turn = np.tan(np.pi * table.base_low_cut_hz / sample_rate_hz)
     high_pass = [1.0, -1.0] / (1 + half_turn), [1.0, -(1 - half_turn) / (1 + half_turn)]
     memory = np.zeros(1)
@@ -136,7 +137,7 @@ class _Resampling:
         # The pieces of a record are of one length, but the last.
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
-    def stretches(self, volts: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+    def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
         """Yield the end of each stretch of samples, and the voltage's means over their steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
