@@ -5,6 +5,7 @@
     python benchmarks/twin_agreement.py --rigs 10 --json
     python benchmarks/twin_agreement.py --sweeps 6           # sweeps of 20 s: false alarms
     python benchmarks/twin_agreement.py --wrong 1            # the same under four wrong specimens
+    python benchmarks/twin_agreement.py --stop 200           # verdicts of 16 draws and of fewer
 
 Every measurement is made on the virtual rig with another seed of its noise, and analysed with 19 draws. Of an
 agreeing twin every rank is as likely as any other, and one set of values in a hundred lies outside its limit.
@@ -16,6 +17,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -26,6 +28,7 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
+from vibench.analysis.overlay import draws as drawing
 from vibench.analysis.overlay.ensemble import EnsembleCurve, z_limit
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import Specimen, gong2025
@@ -33,6 +36,7 @@ from vibench.sim import Specimen, gong2025
 RIG = load_rig(Path(__file__).parents[1] / "hardware_configs" / "virtual_rig.toml")
 DRAWS = 19
 DRAWS_OF_SWEEPS = 24
+drawing.FIRST_DRAWS = DRAWS_OF_SWEEPS  # statistics of draws need all of them
 BINS = 5
 """Of the ranks: 20 seeds fill four to a bin."""
 
@@ -199,6 +203,36 @@ def false_alarms(
     return found
 
 
+def stopped_early(trials: int, seed: int) -> Iterator[dict[str, object]]:
+    """Compare the verdicts of 16 draws with those of the first that agree clearly, on synthetic values."""
+    rng = np.random.default_rng(seed)
+    tails = {
+        "normal": rng.standard_normal,
+        "Student's t of 6": lambda shape: rng.standard_t(6, shape) / np.sqrt(1.5),
+    }
+    for values, off_by, (name, tail) in product((1, 4, 100), (0.0, 4.0, 6.0), tails.items()):
+        alarms = np.zeros((trials, 2), dtype=bool)
+        made = np.zeros(trials)
+        for trial in range(trials):
+            roots = 10.0 + tail((17, values))
+            roots[0, : max(1, values // 10)] += off_by
+            curves = [
+                EnsembleCurve("value", np.arange(values), roots[0] ** 2, roots[1 : 1 + count] ** 2)
+                for count in (8, 12, 16)
+            ]
+            stopped = next((each for each in curves if each.agrees_clearly), curves[-1])
+            made[trial] = len(stopped.draws)
+            alarms[trial] = not curves[-1].agrees, not stopped.agrees
+        yield {
+            "values": values,
+            "distribution": name,
+            "a_tenth_is_off_by_sd": off_by,
+            "alarms_of_16_draws": float(alarms[:, 0].mean()),
+            "alarms_when_stopped": float(alarms[:, 1].mean()),
+            "draws": float(made.mean()),
+        }
+
+
 def summary(found: list[Compared]) -> dict[str, object]:
     """Count what lies outside, and test the ranks."""
     with_values = [each for each in found if each.compared]
@@ -224,6 +258,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--sweeps", type=int, default=0)
     parser.add_argument("--wrong", type=int, default=0, metavar="SEEDS")
+    parser.add_argument("--stop", type=int, default=0, metavar="TRIALS")
     asked = parser.parse_args()
     found, curves = [], {}
     for scenes in (
@@ -241,6 +276,8 @@ def main() -> None:
                 f"(limit {each.limit_z:.1f}{place}): {verdict}"
             )
             print(text, file=sys.stderr if asked.json else sys.stdout, flush=True)
+    for each in stopped_early(asked.stop, asked.seed) if asked.stop else ():
+        print(json.dumps(each), file=sys.stderr, flush=True)
     if asked.json:
         print(json.dumps({"summary": summary(found), "compared": [asdict(each) for each in found]}))
     else:

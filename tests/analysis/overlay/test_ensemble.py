@@ -147,3 +147,16 @@ def test_an_end_that_all_runs_share_is_an_edge_and_no_chance():
     # A sweep's last plateau without a contact: the collisions went on as long as there was a sweep.
     lasting[3] = Ending("collisions", 0.0, 89.8, ended=True)
     assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.45])
+def test_half_of_the_draws_give_the_verdict_of_all_where_they_agree_clearly(shift):
+    """So a wrong twin is not passed for want of draws: `benchmarks/twin_agreement.py --stop`."""
+    rng = np.random.default_rng(12)
+    decided = 0
+    for _ in range(200):
+        whole = curve(rng, 16, 40, shift=shift)
+        half = EnsembleCurve(whole.name, whole.frequency_hz, whole.measured, whole.draws[:8])
+        decided += half.agrees_clearly
+        assert whole.agrees or not half.agrees_clearly
+    assert decided > 100 if shift == 0.0 else decided < 20

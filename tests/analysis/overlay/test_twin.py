@@ -58,7 +58,8 @@ def chaotic(recordings):
 
 def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     run = chaotic.laid.run
-    assert (run.driven, run.draws) == (Driven.AMPLIFIER, 16)
+    assert run.driven is Driven.AMPLIFIER
+    assert run.draws in {8, 12, 16}
     assert run.impact_rate_hz > 300
     assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
 
@@ -89,7 +90,7 @@ def test_json_and_figures_hold_the_draws(chaotic):
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]
     assert all(abs(each["z"][0]) <= each["limit_z"] for each in said["ensemble"])
     drawn = dwells_figure([(chaotic.analysis, chaotic.laid)])
-    assert "16 draws" in drawn.caption
+    assert f"{chaotic.laid.run.draws} draws" in drawn.caption
     assert "95 % of draws" in [each.get_label() for each in drawn.figure.axes[2].collections]
 
 

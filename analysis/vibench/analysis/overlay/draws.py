@@ -1,11 +1,10 @@
 """Draws of a recording: rig and specimen under its voltage, from slightly different starts."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -176,8 +175,10 @@ def _white(samples: Reals) -> float:
 
 DRAWS = 16
 """Number of draws of a colliding motion: its band of 95 % is then known to a fifth of its width."""
-DRAWS_WITHOUT_IMPACTS = 8
-"""Number of draws of one that never collides, whose draws differ by noise and clocks alone."""
+FIRST_DRAWS = 8
+"""They suffice where they agree clearly with the measurement, or never collide: then noise alone differs."""
+_FURTHER_DRAWS = 4
+"""Made before it is looked at again whether they are enough."""
 START_M = 5e-9
 """Standard deviation of each mass' place at the start."""
 CLOCK_TOLERANCE = 50e-6
@@ -318,23 +319,26 @@ def drawn(
 ) -> Drawn[R]:
     """Estimate from every draw what was estimated from the recording.
 
-    Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
-    many are made. Raises UnusableData when a simulation did not reach its end.
+    Fewer are made where the first ones agree clearly. Where most of what was ``measured`` is of a kind of
+    motion that few draws come to, up to three times as many are made. Raises UnusableData when a simulation
+    did not reach its end.
     """
+    responses: list[R] = []
 
-    def estimated(number: int) -> Draw[R]:
-        return estimate(source.channels(number))
+    def estimated(number: int) -> Draw[None]:
+        draw = estimate(source.channels(number))
+        if number == 0:
+            responses.append(draw.response)
+        return Draw(None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
 
     workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * source.samples))))
     with ThreadPoolExecutor(workers) as pool:
-        # No more than are computed at a time wait with their whole estimates.
-        begun = pool.map(estimated, range(min(workers, source.most)))
-        first = next(begun)
-        found = [_without_response(each) for each in (first, *begun)]
-        others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
-        numbers = _numbers(others, others if source.most == 1 else _MORE * others, found, measured)
-        while batch := list(islice(numbers, workers)):
-            found += map(_without_response, pool.map(estimated, batch))
+        found = list(pool.map(estimated, range(min(FIRST_DRAWS, source.most))))
+        usual = source.most if found[0].impacts else len(found)
+        most = usual if source.most == 1 else _MORE * usual
+        while len(found) < most and not _are_enough(found, usual, measured):
+            stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
+            found += pool.map(estimated, range(len(found), stop))
     run = SimulatedRun(
         specimen=source.specimen,
         driven=source.driven,
@@ -342,27 +346,20 @@ def drawn(
         base_band_hz=source.base_band_hz,
         draws=len(found),
         impacts=float(np.mean([each.impacts for each in found])),
-        played_s=first.played_s,
+        played_s=found[0].played_s,
         why=source.why,
     )
     return Drawn(
-        run, first.response, tuple(each.quantities for each in found), tuple(each.endings for each in found)
+        run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
     )
 
 
-def _numbers(usual: int, most: int, found: list[Draw[None]], measured: Sequence[Quantity]) -> Iterator[int]:
-    """Yield the numbers of the draws that are still to be made."""
-    for number in range(len(found), most):
-        if number >= usual:
-            curves = ensemble_curves(measured, [each.quantities for each in found])
-            count = np.concatenate([each.count for each in curves])
-            if np.median(count) >= FEWEST_DRAWS:
-                return
-        yield number
-
-
-def _without_response(draw: Draw[R]) -> Draw[None]:
-    return Draw(None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
+def _are_enough(found: list[Draw[None]], usual: int, measured: Sequence[Quantity]) -> bool:
+    """Return whether further draws would hardly change what is said of the measurement."""
+    curves = ensemble_curves(measured, [each.quantities for each in found])
+    if np.median(np.concatenate([each.count for each in curves])) < FEWEST_DRAWS:
+        return False
+    return len(found) >= usual or all(each.agrees_clearly for each in curves)
 
 
 def _drawn_channels(

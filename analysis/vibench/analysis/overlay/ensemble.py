@@ -22,6 +22,8 @@ MIXED = -1
 """State of a value that holds some of either motion: it is not compared."""
 FEWEST_DRAWS = 5
 """Of one kind of motion, below which a value is not compared: two draws more than a mean and a scatter."""
+_CLEAR = 0.75
+"""Part of the normal limit: values within it after half of the draws lie within the limit after all."""
 _FEWEST_POINTS = 30
 """Below them the largest of a draw is hardly of Gumbel's distribution."""
 
@@ -139,6 +141,11 @@ class EnsembleCurve(Labelled):
     def agrees(self) -> bool:
         """Whether the measured values could be one more draw."""
         return self.outside == 0
+
+    @property
+    def agrees_clearly(self) -> bool:
+        """Whether more draws would hardly change that they agree (`benchmarks/twin_agreement.py --stop`)."""
+        return abs(self.largest_z) <= _CLEAR * z_limit(self.compared)
 
     @property
     def verdict(self) -> bool | None:
