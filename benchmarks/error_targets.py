@@ -18,15 +18,16 @@ import numpy as np
 from vibench.sim import (
     Accuracy,
     FixedDuration,
-    Given,
     Harmonic,
     MotionKind,
+    Outcome,
     Scene,
     StartMemory,
     Target,
     gong2025,
     solve_scene,
 )
+from vibench.sim.scene.followed_run import FollowedRun, observe_window
 from vibench.sim.scene.several_starts import pushes
 
 LAWS = (
@@ -99,16 +100,21 @@ def truth_of(scene, found):
         return responses(true), stated(true), true
     drawn = []
     began = time.process_time()
-    starts = pushes(scene.specimen, scene.drive, TRUE_STARTS, 99)
-    for push in starts:
+    frequency_hz = scene.drive.frequency_hz
+    periods, windows = round(found.window_s * frequency_hz), found.target.windows
+    first = round(found.duration_s * frequency_hz) - periods * windows
+    for push in pushes(scene.specimen, scene.drive, TRUE_STARTS, 99):
         if len(drawn) >= FEWEST_TRUE and time.process_time() - began > TRUE_S:
             break
-        start = Given(tuple(float(each) for each in push))
         # In chaos no accuracy changes a mean: the quick level gives ten times as many starts.
-        asked = Scene(scene.specimen, scene.drive, accuracy=Accuracy.QUICK, duration=named, start=start)
-        true = solve_scene(asked, "motion")
-        if true.response_i is not None:
-            drawn.append(responses(true))
+        run = FollowedRun(scene.specimen, scene.drive, Accuracy.QUICK.tolerance, push)
+        run.follow(first / frequency_hz)
+        seen = [
+            observe_window(run, (first + (k + 1) * periods) / frequency_hz - run.time_s)
+            for k in range(windows)
+        ]
+        if run.outcome is Outcome.REACHED_END:
+            drawn.append(np.mean([each.responses_m for each in seen], axis=0) / scene.drive.amplitude_m)
     values = np.array(drawn)
     mean = values.mean(axis=0)
     return mean, 1.96 * values.std(axis=0, ddof=1) / math.sqrt(len(drawn)) / mean, None
@@ -142,7 +148,7 @@ def judged(scene, time_s):
             row["targets"].append({"error": error, "refusal": found.ended})
             continue
         # Truths of one motion or window serve every error.
-        key = (kind, found.duration_s, found.window_s) if kind != "periodic" else kind
+        key = (kind, found.duration_s, found.window_s, found.target.windows) if kind != "periodic" else kind
         if key not in known:
             known[key] = truth_of(scene, found)
         true, own, reference = known[key]
@@ -156,6 +162,7 @@ def judged(scene, time_s):
                 "taken_s": taken_s,
                 "time_s": found.target.time_s,
                 "starts": found.target.starts,
+                "windows": found.target.windows,
                 "needed_s": found.target.needed_s,
                 "covered": [bool(each) for each in off <= stated(found) + own],
                 "times": float(np.max(off / (stated(found) + own))),

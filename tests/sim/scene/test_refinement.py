@@ -151,7 +151,7 @@ def test_a_window_may_be_named_beside_a_target():
 def test_the_error_of_a_mean_holds_in_nineteen_cases_of_twenty():
     random = np.random.default_rng(3)
     held = [
-        abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values])[0] * values.mean()
+        abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values], None)[0] * values.mean()
         for values in random.gumbel(1.0 - 0.05 * np.euler_gamma, 0.05, (400, 12))
     ]
     assert np.mean(held) > 0.92

@@ -101,6 +101,8 @@ class TargetReport:
     """Since the request."""
     starts: int
     """Number of starts that are averaged; 1 where the start is not forgotten."""
+    windows: int
+    """Number of windows of each start, one after the other, that are averaged."""
     is_met: bool
     """The error is what was requested, or less."""
     needed_s: tuple[float, float, float] | None

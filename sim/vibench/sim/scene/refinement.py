@@ -29,7 +29,7 @@ from .followed_run import (
 )
 from .plan import LinearMotion, linear_motion, never_touches, plan_of
 from .prediction import Method, MotionKind, ScenePrediction, StartMemory, State, TargetReport
-from .repetition import MOST_PERIODS, Pace, pace_of
+from .repetition import MOST_PERIODS, Pace, Repetition, Sharpness, pace_of
 from .scatter import COVERED
 from .scene import PAPER_DURATION_S, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
@@ -47,6 +47,8 @@ FIRST_CYCLES = 1e4
 """Cycles of the fastest mode that are followed before the first look, at most."""
 CLOSE = 3e-3
 """Change from one of its periods to the next, over its size, at which Newton's iteration is tried."""
+KNOWN = 0.03
+"""Distance from a periodic motion that another start came to, over its size, at which that one is tried."""
 RETURNED = 1e-10
 """A motion is periodic when it comes back this close, over its size."""
 ITERATIONS = 8
@@ -55,13 +57,15 @@ MOST_PUSH = 1000.0
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """The motion from the start is looked at after this many drive periods, whenever its time has doubled up to
 looks of this length, and then after this share of its way."""
+LOOKS = 8
+"""At another start before its window begins."""
 LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
 SAME, ALIKE = 1e-3, 1e-2
 """Relative differences of states up to which a motion repeats, and of responses up to which starts count as
 one motion: some are still settling."""
 OTHER_DIFFERS = 1.0
 """Relative difference of a motion that no start has come to yet: chaos beside a motion without impacts."""
-FEWEST_STARTS, MOST_STARTS = 16, 1_000_000
+FIRST_STARTS, FEWEST_STARTS, MOST_STARTS = 6, 16, 1_000_000
 MOST_FREEDOM = 200
 """Degrees of freedom beyond which Student's quantile hardly changes."""
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
@@ -91,11 +95,44 @@ class _Orbit:
     period: int
     run: FollowedRun
     """On it."""
+    section: Floats
+    """States once a drive period, shape (period, 6)."""
     responses_m: Floats
     """Shape (4,)."""
     errors: Floats
     """Of them, relative."""
     impacts: int
+
+
+@dataclass(eq=False)
+class _Path:
+    """A motion on its way, and the periodic motion that it may approach."""
+
+    run: FollowedRun
+    recent: Floats
+    """States once a drive period, shape (n, 6)."""
+    orbit: _Orbit | None = None
+    distance: float = math.inf
+    """From that motion at the last look, over the size of the motion."""
+    closest: float = CLOSE
+    """Change over one of its periods below which Newton's iteration is tried next."""
+
+
+@dataclass(eq=False)
+class _Start:
+    """One of the starts that nobody can tell apart, and what its windows showed."""
+
+    run: FollowedRun
+    windows: list[Floats]
+    """Responses, shape (4,) each; a periodic motion has one for all."""
+    repeats: Repetition | None
+    """Of a motion that is periodic, or nearly: its windows are alike."""
+    impacts: int
+    """In the first window."""
+
+    def mean(self, windows: int) -> Floats:
+        """Return the mean of the responses over the first windows, shape (4,)."""
+        return np.asarray(np.mean(self.windows[:windows], axis=0))
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
@@ -148,12 +185,14 @@ class _Refinement:
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
         """Where both motions were last seen."""
-        self._orbit: _Orbit | None = None
-        self._closest = CLOSE
+        self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
+        self._orbits: list[_Orbit] = []
+        """All that were found."""
         self._size_m = self._spent_s = 0.0
         self._has_answered = False
-        self._recent = np.empty((0, 6))
-        """States once a drive period, shape (n, 6)."""
+        self._path = _Path(self._main, np.empty((0, 6)))
+        self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
+        """States that a path keeps."""
 
     def answers(self) -> Iterator[ScenePrediction]:
         """Follow the motion from its start, and go on by what it turns out to be."""
@@ -169,11 +208,8 @@ class _Refinement:
 
     def _all(self) -> Iterator[ScenePrediction]:
         settle_s = self._settle_s
-        kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
         while self._main.time_s < settle_s:
-            made = round(self._main.time_s * self._frequency_hz)
-            look = max(LOOK_PERIODS, LOOK_SHARE * made, min(LOOK_S * self._frequency_hz, made))
-            look_s = (made + math.ceil(look)) / self._frequency_hz
+            look_s = self._next_look_s(self._main)
             ours, other = self._followed(self._main, look_s), self._followed(self._twin, look_s)
             if self._is_lost:
                 yield self._lost()
@@ -185,13 +221,17 @@ class _Refinement:
             if self._have_parted(ours, other):
                 yield from self._many_starts()
                 return
-            self._recent = recent = np.concatenate([self._recent, states_of(ours)])[-kept:]
-            if self._approaches(recent):
+            if self._approaches(self._path, ours):
                 yield self._on_orbit()
                 return
             if self._clock.taken_s > self._due_s and not self._has_answered:
                 yield from self._interim()
         yield from self._one_start()
+
+    def _next_look_s(self, run: FollowedRun) -> float:
+        made = round(run.time_s * self._frequency_hz)
+        look = max(LOOK_PERIODS, LOOK_SHARE * made, min(LOOK_S * self._frequency_hz, made))
+        return (made + math.ceil(look)) / self._frequency_hz
 
     def _drawn(self, count: int) -> Floats:
         """Draw small changes of the start, shape (count, 6), far below a motion that is itself small."""
@@ -245,36 +285,50 @@ class _Refinement:
         size_m = max(self._size_m, LEAST_SIZE * gap_m if math.isfinite(gap_m) else 0.0)
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
-    def _approaches(self, recent: Floats) -> bool:
-        """Whether the motion is seen to approach a stable periodic motion, which is then kept."""
+    def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
+        """Whether a motion, of which more was seen, approaches a stable periodic motion, which is kept."""
+        path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False
         points = recent / self._scales
-        points = points / float(np.abs(points).max(initial=1e-300))
-        changes = np.abs(points[-MOST_PERIODS - 1 : -1] - points[-1]).max(axis=1)[::-1]
-        near = np.flatnonzero(changes < self._closest)
-        if len(near) > 0:
-            period = int(near[0]) + 1
-            self._closest = 0.3 * float(changes[near[0]])
-            self._orbit = self._newton(period) or self._orbit
-        if self._orbit is None:
+        size = float(np.abs(points).max(initial=1e-300))
+        changes = np.abs(points[-MOST_PERIODS - 1 : -1] - points[-1]).max(axis=1)[::-1] / size
+        near = np.flatnonzero(changes < path.closest)
+        now = self._away_from(path.orbit, recent[-1], size)
+        if not changes.min() < CLOSE:
+            path.closest = CLOSE
+        elif len(near) > 0 and not now < path.distance:
+            path.closest = 0.3 * float(changes[near[0]])
+            known = self._nearest(recent[-1], KNOWN * size)
+            path.orbit = known or self._newton(path.run, int(near[0]) + 1) or path.orbit
+            now = self._away_from(path.orbit, recent[-1], size)
+        path.distance = now
+        if path.orbit is None:
             return False
-        lag = self._orbit.period * math.ceil(self._pace.forgetting_periods / self._orbit.period)
+        lag = path.orbit.period * math.ceil(self._pace.forgetting_periods / path.orbit.period)
         if len(recent) <= lag:
             return False
-        place, size = self._orbit.run.state, np.abs(recent / self._scales).max(initial=1e-300)
-        now, before = (
-            float(np.abs((recent[index] - place) / self._scales).max()) / size for index in (-1, -1 - lag)
-        )
-        return bool(now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE))
+        before = self._away_from(path.orbit, recent[-1 - lag], size)
+        return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
-    def _newton(self, period: int) -> _Orbit | None:
-        """Find the stable motion of this many drive periods, or of fewer, near where the motion is now."""
-        cost_s = NEWTON_COST * self._main.cost_s / self._main.time_s * period / self._frequency_hz
+    def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
+        """How far a state is from a periodic motion, over a size; infinite where there is none."""
+        if orbit is None:
+            return math.inf
+        return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
+
+    def _nearest(self, state: Floats, within: float) -> _Orbit | None:
+        """Find the nearest of the periodic motions that are known; None where none is so near."""
+        found = min(self._orbits, key=lambda each: self._away_from(each, state, 1.0), default=None)
+        return found if self._away_from(found, state, 1.0) < within else None
+
+    def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
+        """Find the stable motion of this many drive periods, or of fewer, near where a motion is now."""
+        cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
         try:
-            found = self._fixed_point(period)
+            found = self._fixed_point(near, period)
             if found is None:
                 return None
             run, away = found
@@ -290,20 +344,25 @@ class _Refinement:
         same = SAME * float(np.abs(states).max(initial=1e-300))
         for shorter in range(1, period):
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
-                return self._newton(shorter)
+                return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
         # What roundings of the state at the end of a period may come to, through the inverse of the map.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
-        return _Orbit(period, strict, second, errors, windows[1].impacts)
+        section = states_of(windows[1].stretches)
+        known = self._nearest(section[-1], same)
+        if known is None:
+            known = _Orbit(period, strict, section, second, errors, windows[1].impacts)
+            self._orbits.append(known)
+        return known
 
-    def _fixed_point(self, period: int) -> tuple[FollowedRun, Floats] | None:
+    def _fixed_point(self, near: FollowedRun, period: int) -> tuple[FollowedRun, Floats] | None:
         """Solve for a motion that comes back; gives it, and the inverse of what the map leaves of a change.
 
         None where there is none near, or it is unstable. Raises ValueError where a state is not allowed.
         """
-        run, scales, gone = self._main.apart(TIGHT), self._scales, math.inf
+        run, scales, gone = near.apart(TIGHT), self._scales, math.inf
         size = float(np.abs(run.state / scales).max(initial=1e-300))
         for _ in range(ITERATIONS):
             image, slope = run.image(period)
@@ -319,7 +378,7 @@ class _Refinement:
         return None
 
     def _on_orbit(self) -> ScenePrediction:
-        orbit = self._orbit
+        orbit = self._path.orbit
         assert orbit is not None
         period_s = orbit.period / self._frequency_hz
         found = replace(
@@ -357,7 +416,7 @@ class _Refinement:
     @property
     def _unsettled(self) -> float:
         """How far the motion still has to go, over its size, by how it changed in a forgetting time."""
-        points = self._recent / self._scales
+        points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
         if len(before) == 0:
@@ -419,73 +478,123 @@ class _Refinement:
         each_s = begins_s + self._window_periods / self._frequency_hz
         if self._clock.taken_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
             yield from self._interim()
-        first = self._observed_start(0, begins_s)
-        if first is None:
-            yield from [self._lost()] if self._is_lost else []
-            return
-        seen = [first.responses_m]
-        wanted = 2
-        while len(seen) < MOST_STARTS:
-            window = self._observed_start(len(seen), begins_s)
-            if window is not None:
-                seen.append(window.responses_m)
-            is_over = window is None or self._clock.is_over
+        starts: list[_Start] = []
+        wanted, windows = FIRST_STARTS, 1
+        while len(starts) < MOST_STARTS:
+            is_over = not self._goes_on(starts, wanted, windows, begins_s) or self._clock.is_over
             is_due = not self._has_answered and self._clock.taken_s > self._due_s
-            if len(seen) == 1:
+            is_complete = len(starts) == wanted and _windows_of(starts) == windows
+            if len(starts) > 1 and (is_complete or is_due or is_over):
+                found = self._mean(starts, begins_s)
+                yield found
+                assert found.target is not None
+                is_enough = len(starts) >= FIRST_STARTS and self._target.error is not None
+                if is_enough and found.target.is_met:
+                    return
+            if is_over:
+                if self._is_lost and not self._has_answered:
+                    yield self._lost()
                 return
-            if not (len(seen) >= wanted or is_due or is_over):
-                continue
-            found = self._mean(seen, first)
-            yield found
-            assert found.target is not None
-            if is_over or (self._target.error is not None and found.target.is_met):
-                return
-            wanted = max(2 * len(seen), FEWEST_STARTS)
-            if self._target.error is not None:
-                wanted = max(min(wanted, self._starts_needed(seen)), len(seen) + 2, FEWEST_STARTS)
+            if is_complete:
+                wanted, windows = self._next_size(starts, begins_s)
 
-    def _observed_start(self, number: int, begins_s: float) -> ObservedWindow | None:
-        """Observe the named window of a start; None where time has run out, or the motion was lost."""
+    def _goes_on(self, starts: list[_Start], wanted: int, windows: int, begins_s: float) -> bool:
+        """Observe one more window of a start, or a new start; False where time has run out."""
+        for each in starts:
+            if each.repeats is None and len(each.windows) < windows:
+                window = self._observed(each.run, self._window_periods)
+                if window is not None:
+                    each.windows.append(window.responses_m)
+                return window is not None
+        if len(starts) == wanted:
+            return True
+        number = len(starts)
         if number > len(self._pushes):
             self._pushes = self._drawn(2 * number)
         run = self._main if number == 0 else self._begin.pushed(self._pushes[number - 1])
-        if self._followed(run, begins_s) is None:
-            return None
-        return self._observed(run, self._window_periods)
+        path = self._path if number == 0 else _Path(run, np.empty((0, 6)))
+        while run.time_s < begins_s:
+            look_s = math.ceil((run.time_s + begins_s / LOOKS) * self._frequency_hz) / self._frequency_hz
+            seen = self._followed(run, min(begins_s, look_s))
+            if seen is None:
+                return False
+            if self._approaches(path, seen):
+                orbit = path.orbit
+                assert orbit is not None
+                impacts = orbit.impacts * self._window_periods // orbit.period
+                starts.append(_Start(run, [orbit.responses_m], Repetition(orbit.period, 0.0), impacts))
+                return True
+        window = self._observed(run, self._window_periods)
+        if window is not None:
+            repeats = self._nearly.repeats(window.stretches)
+            starts.append(_Start(run, [window.responses_m], repeats, window.impacts))
+        return window is not None
 
-    def _starts_needed(self, seen: Sequence[Floats]) -> int:
-        """Estimate how many starts reach the requested error."""
+    def _next_size(self, starts: Sequence[_Start], begins_s: float) -> tuple[int, int]:
+        """Choose how many starts and windows of each come next: at most twice as much motion as so far."""
+        windows = _windows_of(starts)
+        if len(starts) < FEWEST_STARTS:
+            return FEWEST_STARTS, windows
+        more = 2.0 if self._target.error is None else min(2.0, self._more_needed(starts))
+        if self._windows_help(starts, begins_s):
+            return len(starts), max(windows + 1, math.ceil(windows * more))
+        return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
+
+    def _windows_help(self, starts: Sequence[_Start], begins_s: float) -> bool:
+        """Whether further windows of the same starts reduce the error at a lower cost than further starts.
+
+        Further starts find rare motions too: windows are preferred only where they cost half as much or less.
+        """
+        windows = _windows_of(starts)
+        is_soon = begins_s * self._frequency_hz < self._window_periods
+        if is_soon or any(each.repeats is not None for each in starts):
+            return False
+        if windows == 1:
+            return True
+        worst = int(np.argmax(_mean_error(starts)))
+        values = np.array([each.windows[:windows] for each in starts])[:, :, worst]
+        within = float(values.var(axis=1, ddof=1).mean()) / windows
+        return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
+
+    def _more_needed(self, starts: Sequence[_Start]) -> float:
+        """Estimate how many times as much motion reaches the requested error."""
         assert self._target.error is not None
-        ratio = float(mean_error(seen).max()) / self._target.error
-        power = 2.0 if _others(seen) is None else 1.0
-        return math.ceil(min(1.05 * len(seen) * math.pow(ratio, power), MOST_STARTS))
+        power = 2.0 if _others(starts) is None else 1.0
+        return 1.05 * math.pow(float(_mean_error(starts).max()) / self._target.error, power)
 
-    def _mean(self, seen: Sequence[Floats], window: ObservedWindow) -> ScenePrediction:
-        """Answer with the mean over the starts so far; ``window`` is that of the first."""
-        run = self._main
-        responses = np.array(seen)
-        mean = responses.mean(axis=0)
-        found = self._prediction(mean, mean_error(seen), run.time_s, window.length_s, window.impacts)
-        repeats = self._pace.repeats(window.stretches) if _others(seen) == 0 else None
-        begins_s = run.time_s - window.length_s
+    def _mean(self, starts: Sequence[_Start], begins_s: float) -> ScenePrediction:
+        """Answer with the mean over the starts and windows so far."""
+        windows, window_s = _windows_of(starts), self._window_periods / self._frequency_hz
+        means = [each.mean(windows) for each in starts]
+        responses, mean = np.array(means), np.mean(means, axis=0)
+        ends_s = begins_s + windows * window_s
+        found = self._prediction(mean, _mean_error(starts), ends_s, window_s, starts[0].impacts)
+        first = starts[0].repeats if _others(starts) == 0 else None
+        is_periodic = first is not None and first.distance < self._pace.sharpness.tolerance
+        each_observed = f"observed from {begins_s:.4g} to {ends_s:.4g} s"
+        if windows > 1:
+            each_observed += f", in {windows} windows of {window_s:.4g} s"
         found = replace(
             found,
-            motion=MotionKind.CHAOTIC_SO_FAR if repeats is None else MotionKind.PERIODIC,
-            period=None if repeats is None else repeats.period,
-            ended=f"mean of {len(seen)} starts, each observed from {begins_s:.4g} to {run.time_s:.4g} s",
-            final_state=_state(run.state),
+            motion=MotionKind.PERIODIC if is_periodic else MotionKind.CHAOTIC_SO_FAR,
+            period=first.period if first is not None and is_periodic else None,
+            ended=f"mean of {len(starts)} starts, each {each_observed}",
+            final_state=_state(starts[0].run.state),
             memory=StartMemory.LOST,
             scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
         )
         needed = None
         if self._target.error is not None:
-            per_start_s = self._clock.taken_s / len(seen)
-            starts = self._starts_needed(seen)
+            per_s = self._clock.taken_s / sum(each.run.time_s for each in starts)
+            more = self._more_needed(starts) - 1.0
+            part_s = len(starts) * windows * window_s
+            if not self._windows_help(starts, begins_s):
+                part_s = sum(each.run.time_s for each in starts)
             # The deviation of n draws is itself known to 1 / sqrt(2 n).
-            off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(seen)))
-            about_s = per_start_s * starts
+            off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
+            about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
-        return _reported(found, self._target, self._clock, len(seen), needed)
+        return _reported(found, self._target, self._clock, len(starts), needed, windows)
 
     def _lost(self) -> ScenePrediction:
         """Say that the motion could not be followed on."""
@@ -535,18 +644,19 @@ class _Refinement:
         return never_touches(self._scene.specimen, self._motion)
 
 
-def mean_error(seen: Sequence[Floats]) -> Floats:
+def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     """Return how far the mean over starts may be from that over all starts, relatively, shape (4,).
 
     Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
     Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
-    most came to one motion that repeats, others may have the share that Wilson's interval leaves.
+    most came to one motion that repeats, and ``others`` did not, more may have the share that Wilson's
+    interval leaves.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
     mean, count = responses.mean(axis=0), len(seen)
     times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
-    others, unseen = _others(seen), 0.0
+    unseen = 0.0
     if others is not None:
         share = wilson_share(others, count)
         unseen = (share.high - share.share) * max(
@@ -555,12 +665,24 @@ def mean_error(seen: Sequence[Floats]) -> Floats:
     return np.asarray(times * padded.std(axis=0, ddof=1) / mean + unseen + ROUNDING)
 
 
-def _others(seen: Sequence[Floats]) -> int | None:
+def _mean_error(starts: Sequence[_Start]) -> Floats:
+    windows = _windows_of(starts)
+    return mean_error([each.mean(windows) for each in starts], _others(starts))
+
+
+def _windows_of(starts: Sequence[_Start]) -> int:
+    """Count the windows that all starts have; those of a periodic motion are alike."""
+    return min((len(each.windows) for each in starts if each.repeats is None), default=1)
+
+
+def _others(starts: Sequence[_Start]) -> int | None:
     """Count the starts that did not come to the motion of most; None where most came to none that repeats."""
-    responses = np.array(seen)
-    middle = np.median(responses, axis=0)
-    others = int(np.sum(np.any(np.abs(responses - middle) > ALIKE * middle, axis=1)))
-    return others if 2 * others <= len(seen) else None
+    settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
+    if 2 * len(settled) < len(starts) or len(settled) == 0:
+        return None
+    middle = np.median(settled, axis=0)
+    alike = int(np.sum(np.all(np.abs(settled - middle) <= ALIKE * middle, axis=1)))
+    return len(starts) - alike if 2 * alike >= len(starts) else None
 
 
 def _reported(
@@ -569,10 +691,11 @@ def _reported(
     clock: _Clock,
     starts: int,
     needed: tuple[float, float, float] | None,
+    windows: int = 1,
 ) -> ScenePrediction:
     error = found.error_estimate
     is_met = error is not None and (target.error is None or error <= target.error)
-    report = TargetReport(target.error, target.time_s, error, clock.taken_s, starts, is_met, needed)
+    report = TargetReport(target.error, target.time_s, error, clock.taken_s, starts, windows, is_met, needed)
     return replace(found, target=report)
 
 
