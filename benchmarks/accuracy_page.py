@@ -5,14 +5,11 @@
 
 import argparse
 import json
-import os
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 
-from vibench.analysis.report import tradeoff_figure
-from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark.figures import (
+from accuracy_motions import (
     LEAST_GAIN,
     AccuracyBenchmark,
     LevelFigures,
@@ -20,9 +17,12 @@ from vibench.sim.accuracy_benchmark.figures import (
     MotionBenchmark,
     SolverFigures,
     StatedShare,
+    Thoroughness,
     TransientFigures,
+    measure_accuracy,
 )
-from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
+
+from vibench.sim import Accuracy
 
 _HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
@@ -32,20 +32,12 @@ _LOTTERY_HEAD = (
 ABSENT = "–"
 
 
-def accuracy_document(benchmark: AccuracyBenchmark, picture: str) -> str:
-    """Write the page.
-
-    Parameters
-    ----------
-    trade
-        What was measured.
-    picture
-        Path of the figure, relative to the page.
-    """
-    return "\n".join(_lines(benchmark, picture)) + "\n"
+def accuracy_document(benchmark: AccuracyBenchmark) -> str:
+    """Write the page."""
+    return "\n".join(_lines(benchmark)) + "\n"
 
 
-def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
+def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
@@ -66,8 +58,6 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
         "independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the responses",
         "are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6; the numbers",
         "are simulated seconds per second and the error of the state. Times are of one core.",
-        "",
-        f"![Error of the state over cost, for every level and solver]({picture})",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -195,15 +185,13 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def main() -> None:
-    """Measure, and write the page with its picture."""
+    """Measure, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
     parser.add_argument("--span", type=float, default=2.0, help="length of the motion compared [s]")
     given = parser.parse_args()
     benchmark = measure_accuracy(Thoroughness(span_s=given.span), print)
-    pictures = tradeoff_figure(benchmark).save(given.markdown.parent / "images")
-    picture = Path(os.path.relpath(pictures[0], given.markdown.parent)).as_posix()
-    given.markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
+    given.markdown.write_text(accuracy_document(benchmark), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -22,10 +22,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from accuracy_motions import MOTIONS, Regime, settled_state
 from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
-from vibench.sim.accuracy_benchmark.figures import MOTIONS, Regime
 from vibench.sim.accuracy_benchmark.independent_solution import (
     Place,
     independent_state,
@@ -34,7 +34,6 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
     rates_at,
     state_error,
 )
-from vibench.sim.accuracy_benchmark.measuring import settled_state
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.specimen.state import Floats
 

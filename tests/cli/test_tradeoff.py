@@ -24,7 +24,7 @@ def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibenc
     ("arguments", "said"),
     [
         (("--amplitude", 5e-6), "a scene needs both --amplitude and --frequency"),
-        (("--error", "1%"), "a scene needs both --amplitude and --frequency"),
+        (("--frequency", 100), "a scene needs both --amplitude and --frequency"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0"),
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
@@ -35,3 +35,12 @@ def test_a_scene_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_pat
     (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
     assert said in line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_scene_the_four_cases_of_the_paper_are_measured(vibench_here, tmp_path):
+    ran = vibench_here("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    scenes = json.loads(ran.stdout)["scenes"]
+    assert [each["scene"] for each in scenes] == [f"hertz, 260 Hz, {um} µm" for um in (1, 5, 10, 50)]
+    assert all(sum(point["is_chosen"] for point in each["points"]) == 1 for each in scenes)
+    assert (tmp_path / "new" / "tradeoff.png").is_file()

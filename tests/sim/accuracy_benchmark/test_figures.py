@@ -2,8 +2,8 @@
 
 import pytest
 
+from benchmarks.accuracy_motions import LevelFigures, Motion, MotionBenchmark, Regime
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark.figures import LevelFigures, Motion, MotionBenchmark, Regime
 
 
 def benchmark(*state_errors, regime=Regime.PERIODIC):

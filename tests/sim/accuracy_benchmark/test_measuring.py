@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
+from benchmarks.accuracy_motions import (
+    MOTIONS,
+    SOLVERS,
+    Motion,
+    Regime,
+    Thoroughness,
+    measure_motion,
+    settled_state,
+)
 from vibench.sim import Accuracy, integrate
-from vibench.sim.accuracy_benchmark.figures import MOTIONS, Motion, Regime
 from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark.measuring import SOLVERS, Thoroughness, measure_motion, settled_state
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 

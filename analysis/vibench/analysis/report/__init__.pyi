@@ -36,7 +36,6 @@ from ._figures import (
     map_figure as map_figure,
     new_figure as new_figure,
     styled as styled,
-    tradeoff_figure as tradeoff_figure,
 )
 from ._page import (
     Agreement as Agreement,

@@ -20,7 +20,7 @@ from ..figures.style import (
     new_figure,
     styled,
 )
-from ..figures.tradeoff import curve_figure, tradeoff_figure
+from ..figures.tradeoff import curve_figure
 
 __all__ = [
     "COLLIDING",
@@ -43,5 +43,4 @@ __all__ = [
     "map_figure",
     "new_figure",
     "styled",
-    "tradeoff_figure",
 ]

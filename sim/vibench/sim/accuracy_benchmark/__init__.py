@@ -1,15 +1,12 @@
-"""What a level of accuracy costs and what it buys, measured on this machine, regime by regime.
+"""What an error costs for one scene, by every method that can answer it, measured on this machine.
 
-`measure_accuracy` runs free, periodic and chaotic motions (`MOTIONS`) at every level of accuracy and with
-general solvers of scipy, interleaved so that a busy machine slows all alike; it takes minutes. Cost is
-processor time over simulated time; errors are measured against a solution that shares nothing with the
-engine: DOP853 on the paper's equations as a textbook writes them. The result for one machine is
-docs/accuracy.md.
+`vibench.sim.accuracy_benchmark.curve` has the curve of error over time, and
+`vibench.sim.accuracy_benchmark.independent_solution` a solution that shares nothing with the engine: DOP853
+on the paper's equations as a textbook writes them.
 
->>> from vibench.sim.accuracy_benchmark.figures import MOTIONS
->>> for motion in MOTIONS[:3]:
-...     print(motion.regime, "-", motion.name)
-no contact - hertz, 260 Hz, 1 µm
-periodic - hertz, 130 Hz, 20 µm
-periodic - linear_gap, 130 Hz, 20 µm
+>>> from vibench.sim import Harmonic, Scene, Target, gong2025
+>>> from vibench.sim.accuracy_benchmark.curve import scene_curve
+>>> scene = Scene(gong2025(contact="linear"), Harmonic(260.0, 1e-6), target=Target(error=0.01))
+>>> next(scene_curve(scene)).method
+'closed form'
 """

@@ -1,0 +1,541 @@
+"""Cost and error of every level on known motions, interleaved, so that a busy machine slows all alike.
+
+The motions are one of each kind, named by how they are driven. Cost is processor time over simulated time;
+errors are against `vibench.sim.accuracy_benchmark.independent_solution`, which shares nothing with the
+engine. `accuracy_page.py` makes docs/accuracy.md from it. SI units.
+"""
+
+import math
+import os
+import platform
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from vibench.sim.accuracy_benchmark.independent_solution import (
+    STATE_UNITS,
+    Place,
+    independent_state,
+    law_of,
+    numbers_of,
+    rates_at,
+    state_error,
+)
+from vibench.sim.exponents.lyapunov import lyapunov_exponent
+from vibench.sim.motion.integrate import integrate
+from vibench.sim.motion.poincare import flow_derivative, smallest_period, stroboscopic_section
+from vibench.sim.motion.response import steady_response
+from vibench.sim.scene.prediction import Ensemble, FoundMotion, MotionKind, ScenePrediction
+from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Scene
+from vibench.sim.scene.solve import solve_ensemble, solve_scene
+from vibench.sim.specimen.accuracy import Accuracy
+from vibench.sim.specimen.drive import Harmonic
+from vibench.sim.specimen.specimen import Specimen, gong2025, state_scales
+from vibench.sim.specimen.state import Floats
+from vibench.sim.study import software
+
+SEED = 4242
+"""Another draw of starts than an answer's own."""
+PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
+"""Which of these a start is called depends on how long it was followed."""
+SAME = 1e-3
+"""Relative difference of Response I of one motion that repeats, as an answer tells motions apart."""
+
+
+@dataclass(frozen=True)
+class Lottery:
+    """A scene in which it is chance which motion is reached, or when."""
+
+    about: str
+    model: str
+    frequency_hz: float
+    amplitude_m: float
+    gap_m: float | tuple[float, float] = 45e-6
+    damping_time_s: float = 2e-5
+
+    @property
+    def scene(self) -> Scene:
+        """As it is asked."""
+        specimen = gong2025(self.damping_time_s, self.gap_m, self.model)
+        return Scene(specimen, Harmonic(self.frequency_hz, self.amplitude_m), duration=AutomaticDuration())
+
+    @property
+    def name(self) -> str:
+        """How tables call it."""
+        return f"{self.model}, {self.frequency_hz:g} Hz, {1e6 * self.amplitude_m:g} µm"
+
+
+LOTTERIES = (
+    Lottery("chaos that lasts", "hertz", 260.0, 5e-6),
+    Lottery("chaos that dies out", "hertz", 242.0, 5e-6, damping_time_s=3e-5),
+    Lottery("chaos that soon dies out", "linear_gap", 562.8, 20e-6),
+    Lottery("several motions, gaps of 289 and 98 µm", "hertz", 475.2, 154.1e-6, (289e-6, 98e-6)),
+)
+
+
+@dataclass(frozen=True)
+class StatedShare:
+    """A motion, its share as an answer states it, and the share of many starts."""
+
+    motion: FoundMotion
+    of_many: float
+
+    @property
+    def is_covered(self) -> bool:
+        """The interval that is stated holds the share of the many."""
+        return self.motion.share.low <= self.of_many <= self.motion.share.high
+
+
+@dataclass(frozen=True)
+class LotteryFigures:
+    """What was found of one scene."""
+
+    lottery: Lottery
+    answered: ScenePrediction
+    shares: tuple[StatedShare, ...]
+    starts: int
+    """The many."""
+    cost: float
+    """Cost of the answer over that of one without a budget."""
+
+
+def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
+    """Answer a scene, and follow many more starts of it.
+
+    Raises ArithmeticError when its start is not forgotten.
+    """
+    scene = lottery.scene
+    solve_scene(replace(scene, budget_s=0.0))
+    alone_s, _ = _time_run(lambda: solve_scene(replace(scene, budget_s=0.0)))
+    taken_s, answered = _time_run(lambda: solve_scene(scene))
+    many = solve_ensemble(scene, starts, SEED)
+    if answered.ensemble is None or many is None:
+        raise ArithmeticError(f"{lottery.name} is called a lottery, but its start is {answered.memory}")
+    shares = tuple(StatedShare(each, _share_in(many, each)) for each in answered.ensemble.motions)
+    return LotteryFigures(lottery, answered, shares, many.starts, taken_s / alone_s)
+
+
+def _share_in(many: Ensemble, motion: FoundMotion) -> float:
+    return sum(each.share.share for each in many.motions if _is_same(each, motion))
+
+
+def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
+    if one.motion in PENDING or other.motion in PENDING:
+        return one.motion in PENDING and other.motion in PENDING
+    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
+    return one.period == other.period and is_near
+
+
+def _time_run(run: Callable[[], ScenePrediction]) -> tuple[float, ScenePrediction]:
+    before = time.thread_time()
+    found = run()
+    return time.thread_time() - before, found
+
+
+class Regime(StrEnum):
+    """What a motion is like; what accuracy buys depends on it."""
+
+    FREE = "no contact"
+    PERIODIC = "periodic"
+    CHAOTIC = "chaos"
+    TRANSIENT = "from rest"
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion of one model."""
+
+    regime: Regime
+    model: str
+    """Name of the contact law in `vibench.sim.specimen`."""
+    frequency_hz: float
+    amplitude_m: float
+
+    @property
+    def specimen(self) -> Specimen:
+        """The paper's, with this model's contact."""
+        return gong2025(contact=self.model)
+
+    @property
+    def drive(self) -> Harmonic:
+        """U = A0 sin(omega t)."""
+        return Harmonic(self.frequency_hz, self.amplitude_m)
+
+    @property
+    def name(self) -> str:
+        """How tables call it."""
+        return f"{self.model}, {self.frequency_hz:g} Hz, {1e6 * self.amplitude_m:g} µm"
+
+
+MOTIONS = (
+    Motion(Regime.FREE, "hertz", 260.0, 1e-6),
+    Motion(Regime.PERIODIC, "hertz", 130.0, 20e-6),
+    Motion(Regime.PERIODIC, "linear_gap", 130.0, 20e-6),
+    Motion(Regime.PERIODIC, "power:3", 150.0, 10e-6),
+    Motion(Regime.PERIODIC, "power:7", 100.0, 5e-6),
+    Motion(Regime.PERIODIC, "power:47", 100.0, 5e-6),
+    Motion(Regime.CHAOTIC, "hertz", 260.0, 5e-6),
+)
+"""Kinds were found by scanning; `settled_state` refuses a periodic motion that is none."""
+TRANSIENTS = tuple(
+    Motion(Regime.TRANSIENT, model, 130.0, 20e-6)
+    for model in ("hertz", "linear_gap", "power:7", "power:47", "power:201")
+)
+"""Followed from rest, while a small change grows a thousandfold."""
+LEAST_GAIN = 2.0
+"""A level whose error is not smaller than the one before it by this factor buys nothing."""
+
+
+@dataclass(frozen=True)
+class LevelFigures:
+    """One level of accuracy on one motion."""
+
+    accuracy: Accuracy
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """State error of the state at the end of the span, as `state_error` measures it; None in chaos."""
+    response_i_error: float | None
+    """Relative, against the reference level; None in chaos."""
+    response_ii_error: float | None
+    response_i: float
+    """Mean over all starts in chaos."""
+    response_i_scatter: float
+    """Relative standard deviation of Response I over starts; 0 where all agree."""
+    exponent_per_s: float
+    exponent_error_per_s: float
+    """Standard error of the exponent itself, whatever the accuracy."""
+
+
+@dataclass(frozen=True)
+class SolverFigures:
+    """A general solver on one motion."""
+
+    name: str
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """Over its own, shorter span, against the independent solution."""
+
+
+@dataclass(frozen=True)
+class MotionBenchmark:
+    """The trade on one motion."""
+
+    motion: Motion
+    span_s: float
+    solver_span_s: float
+    levels: tuple[LevelFigures, ...]
+    solvers: tuple[SolverFigures, ...]
+
+    @property
+    def advice(self) -> str:
+        """Say in a sentence which level to take."""
+        match self.motion.regime:
+            case Regime.FREE:
+                return "Flight is exact: all levels are the same."
+            case Regime.PERIODIC | Regime.TRANSIENT:
+                return self._periodic_advice()
+            case Regime.CHAOTIC:
+                return (
+                    "Quick is as good as any: with the start of the motion Response I scatters by "
+                    f"{self.levels[0].response_i_scatter:.1%}, which no accuracy lessens."
+                )
+
+    @property
+    def without_gain(self) -> tuple[tuple[LevelFigures, LevelFigures], ...]:
+        """Levels whose state is no better than that of the level before, each with that one."""
+        return tuple(
+            (level, before)
+            for before, level in pairwise(self.levels)
+            if self.motion.regime is Regime.PERIODIC and not _is_better(level, before)
+        )
+
+    def _periodic_advice(self) -> str:
+        quick, standard, reference = self.levels
+        steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
+        errors = f"{steps} of the state"
+        price = f"costs {reference.cost / quick.cost:.1f} times the first"
+        match [level.accuracy for level, _ in self.without_gain]:
+            case []:
+                return f"Each level buys digits: {errors}; the last {price}."
+            case [Accuracy.STANDARD]:
+                return f"Standard is no better than quick, reference is: {errors}; the last {price}."
+            case [Accuracy.REFERENCE]:
+                return f"Standard buys digits, reference no more: {errors}; the last {price}."
+            case _:
+                return f"No level buys digits: {errors}; the last {price}."
+
+
+def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
+    if level.state_error is None or before.state_error is None:
+        return False
+    return LEAST_GAIN * level.state_error < before.state_error
+
+
+@dataclass(frozen=True)
+class TransientFigures:
+    """One level of accuracy on a motion that has forgotten nothing yet."""
+
+    motion: Motion
+    accuracy: Accuracy
+    growth: float
+    """Largest factor by which a small change of the state grows on the way, up to the end."""
+    state_error: float
+    """At the end, as `state_error` measures it."""
+    response_error: float
+    """Relative, the largest of the four responses, against the reference level."""
+    stated_error: float
+    """What the answer says of them."""
+
+    @property
+    def promise(self) -> float:
+        """What the level promises here: its error of a settled motion, as often as a small change grows."""
+        return self.accuracy.promise * max(1.0, self.growth)
+
+
+@dataclass(frozen=True)
+class AccuracyBenchmark:
+    """Everything that was measured in one run."""
+
+    motions: tuple[MotionBenchmark, ...]
+    machine: str
+    """Processor and cores."""
+    software: str
+    lotteries: tuple[LotteryFigures, ...] = ()
+    transients: tuple[TransientFigures, ...] = ()
+
+    def worst_error(self, accuracy: Accuracy) -> float:
+        """Return the largest error of the state that a level made on any motion that is not chaotic."""
+        levels = [level for each in self.motions for level in each.levels if level.accuracy is accuracy]
+        return max((each.state_error for each in levels if each.state_error is not None), default=0.0)
+
+
+LEVELS = tuple(Accuracy)
+Solver = Literal["DOP853", "LSODA", "Radau"]
+SOLVERS: tuple[Solver, ...] = ("DOP853", "LSODA", "Radau")
+SOLVER_RTOL, SOLVER_ATOL = 1e-6, 1e-12
+SETTLE_S = 8.0
+"""Thirty times the slowest decay of the specimen without contact."""
+PERIODS_SEEN = 100
+REPEATS = 3
+TIMED_S = 10.0
+RESPONSE_S, WINDOW_S = 3.0, 2.0
+STARTS = 8
+EXPONENT_S = 10.0
+TRANSIENT_S = 0.1
+LOOKS = 20
+"""Instants up to which, and from which on, the growth of a small change is taken."""
+RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
+START_SPREAD_M = 1e-6
+
+Step = Callable[[str], None]
+"""Told, in a few words, what is being measured."""
+
+
+@dataclass(frozen=True)
+class Thoroughness:
+    """How long the compared motions are: longer ones cost more and prove more."""
+
+    span_s: float = 0.5
+    """Span of the comparison with the independent solution."""
+    solver_span_s: float = 0.05
+    """Solver span of general solvers, which are slow."""
+    starts: int = 200
+    """Followed of a scene whose start is forgotten."""
+
+
+def measure_accuracy(
+    thoroughness: Thoroughness = Thoroughness(),
+    step: Step = lambda _: None,
+    motions: tuple[Motion, ...] = MOTIONS,
+    lotteries: tuple[Lottery, ...] = LOTTERIES,
+    transients: tuple[Motion, ...] = TRANSIENTS,
+) -> AccuracyBenchmark:
+    """Measure cost and error on every motion.
+
+    Raises
+    ------
+    ArithmeticError
+        When a motion is not of the kind it is called, or the independent solution gives up.
+    """
+    found: list[MotionBenchmark] = []
+    for motion in motions:
+        step(motion.name)
+        found.append(measure_motion(motion, thoroughness))
+    drawn = []
+    for lottery in lotteries:
+        step(lottery.name)
+        drawn.append(measure_attractors(lottery, thoroughness.starts))
+    from_rest: list[TransientFigures] = []
+    for motion in transients:
+        step(f"from rest: {motion.name}")
+        from_rest += measure_transient(motion)
+    return AccuracyBenchmark(tuple(found), _machine(), software(), tuple(drawn), tuple(from_rest))
+
+
+def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
+    """Measure the trade on one motion, from its settled state."""
+    start = settled_state(motion)
+    span_s = _whole(thoroughness.span_s, motion)
+    solver_span_s = _whole(thoroughness.solver_span_s, motion)
+    is_chaotic = motion.regime is Regime.CHAOTIC
+    truths = [None if is_chaotic else _truth(motion, span, start) for span in (span_s, solver_span_s)]
+    costs = _costs(motion, start)
+    responses = {level: _responses(motion, level, start) for level in LEVELS}
+    levels = tuple(
+        _level(motion, level, costs[level], responses, start, span_s, truths[0]) for level in LEVELS
+    )
+    solvers = tuple(_solver(name, motion, start, solver_span_s, truths[1]) for name in SOLVERS)
+    return MotionBenchmark(motion, span_s, solver_span_s, levels, solvers)
+
+
+def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
+    """Measure what every level errs by from rest, and what its answers say of it."""
+    rest = np.zeros(6)
+    truth = independent_state(motion.specimen, motion.drive, TRANSIENT_S, rest)
+    duration = FixedDuration(TRANSIENT_S, 0.5 * TRANSIENT_S)
+    found = {
+        level: solve_scene(Scene(motion.specimen, motion.drive, accuracy=level, duration=duration))
+        for level in LEVELS
+    }
+    seen = {level: np.array([getattr(each, name) for name in RESPONSES]) for level, each in found.items()}
+    growth = _growth(motion)
+    return tuple(
+        TransientFigures(
+            motion,
+            level,
+            growth,
+            state_error(_follow(motion, level, rest, TRANSIENT_S), truth),
+            float(np.max(np.abs(seen[level] / seen[Accuracy.REFERENCE] - 1.0))),
+            found[level].error_estimate or math.nan,
+        )
+        for level in LEVELS
+    )
+
+
+def _growth(motion: Motion) -> float:
+    """Largest factor by which a change of the state, in its units, grows from some instant on."""
+    ends = TRANSIENT_S * np.arange(1.0, LOOKS + 1.0) / LOOKS
+    derivatives = [np.eye(6)] + [
+        flow_derivative(motion.specimen, motion.drive, np.zeros(6), float(end_s))[1] for end_s in ends
+    ]
+    scale = STATE_UNITS / STATE_UNITS[:, None]
+    onto_end = [derivatives[-1] @ np.linalg.inv(each) for each in derivatives[:-1]]
+    return max(float(np.linalg.norm(each * scale, 2)) for each in (*derivatives, *onto_end))
+
+
+def settled_state(motion: Motion) -> Floats:
+    """State at the drive's phase zero after the transient, shape (6,)."""
+    periods = math.ceil(SETTLE_S * motion.frequency_hz)
+    section = stroboscopic_section(motion.specimen, motion.drive, periods, Accuracy.REFERENCE)
+    period = smallest_period(section[-PERIODS_SEEN:], state_scales(motion.specimen, motion.drive))
+    if (period is None) != (motion.regime is Regime.CHAOTIC):
+        raise ArithmeticError(f"{motion.name} is called {motion.regime.value}, but its period is {period}")
+    return np.asarray(section[-1])
+
+
+def _whole(span_s: float, motion: Motion) -> float:
+    return max(1, round(span_s * motion.frequency_hz)) / motion.frequency_hz
+
+
+def _truth(motion: Motion, span_s: float, start: Floats) -> Floats:
+    return independent_state(motion.specimen, motion.drive, span_s, start)
+
+
+def _run_time_s(run: Callable[[], object]) -> float:
+    before = time.thread_time()
+    run()
+    return time.thread_time() - before
+
+
+def _costs(motion: Motion, start: Floats) -> dict[Accuracy, float]:
+    """Least processor time of each level over simulated time; not of the first round, which makes tables."""
+    best = dict.fromkeys(LEVELS, math.inf)
+    for repeat in range(REPEATS + 1):
+        for level in LEVELS:
+            taken = _run_time_s(lambda level=level: _follow(motion, level, start, TIMED_S))  # type: ignore[misc]
+            if repeat > 0:
+                best[level] = min(best[level], taken / TIMED_S)
+    return best
+
+
+def _follow(motion: Motion, level: Accuracy, start: Floats, span_s: float) -> Floats:
+    return integrate(motion.specimen, motion.drive, span_s, level, start).final_state
+
+
+def _responses(motion: Motion, level: Accuracy, start: Floats) -> Floats:
+    """Responses I and II from one start, or in chaos from several, shape (starts, 2)."""
+    rng = np.random.default_rng(1)
+    starts = STARTS if motion.regime is Regime.CHAOTIC else 1
+    found = []
+    for number in range(starts):
+        moved = start.copy()
+        if number > 0:
+            moved[:3] += START_SPREAD_M * rng.standard_normal(3)
+        seen = steady_response(motion.specimen, motion.drive, level, RESPONSE_S, WINDOW_S, moved)
+        found.append((seen.response_i, seen.response_ii))
+    return np.array(found)
+
+
+def _level(
+    motion: Motion,
+    level: Accuracy,
+    cost: float,
+    responses: dict[Accuracy, Floats],
+    start: Floats,
+    span_s: float,
+    truth: Floats | None,
+) -> LevelFigures:
+    mean, exact = responses[level].mean(axis=0), responses[Accuracy.REFERENCE].mean(axis=0)
+    off = np.abs(mean / exact - 1.0)
+    exponent = lyapunov_exponent(motion.specimen, motion.drive, level, EXPONENT_S, 0.5, start)
+    is_chaotic = truth is None
+    return LevelFigures(
+        accuracy=level,
+        cost=cost,
+        state_error=None if truth is None else state_error(_follow(motion, level, start, span_s), truth),
+        response_i_error=None if is_chaotic else float(off[0]),
+        response_ii_error=None if is_chaotic else float(off[1]),
+        response_i=float(mean[0]),
+        response_i_scatter=float(np.std(responses[level][:, 0], ddof=1) / mean[0]) if is_chaotic else 0.0,
+        exponent_per_s=exponent.exponent_per_s,
+        exponent_error_per_s=exponent.standard_error_per_s,
+    )
+
+
+def _solver(
+    name: Solver, motion: Motion, start: Floats, span_s: float, truth: Floats | None
+) -> SolverFigures:
+    rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
+    rates(0.0, start)
+    ends: list[Floats] = []
+
+    def run() -> None:
+        found = solve_ivp(
+            rates, (0.0, span_s), start, method=name, rtol=SOLVER_RTOL, atol=SOLVER_ATOL, t_eval=[span_s]
+        )
+        ends.append(found.y[:, -1])
+
+    cost = _run_time_s(run) / span_s
+    return SolverFigures(name, cost, None if truth is None else state_error(ends[0], truth))
+
+
+def _machine() -> str:
+    return f"{next(_processor_names(), platform.machine())}, {os.cpu_count()} cores"
+
+
+def _processor_names() -> Iterator[str]:
+    described = Path("/proc/cpuinfo")
+    if described.exists():
+        for line in described.read_text(encoding="utf-8").splitlines():
+            key, _, value = line.partition(":")
+            if key.strip() == "model name":
+                yield value.strip()
