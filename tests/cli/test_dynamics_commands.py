@@ -192,3 +192,13 @@ def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
 def test_numbers_that_no_specimen_has_are_refused_at_once(arguments, told):
     """They were tracebacks, warnings of numpy, or took minutes."""
     assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
+
+
+def test_branches_reach_a_requested_error_and_say_so(vibench_here, tmp_path):
+    asked = ("branches", "--model", "power:5", "--amplitude", 5e-6, "--frequency", "50:60", "--places", 2)
+    ran = vibench_here(*asked, "--method", "balance", "--error", "1 %", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "motions reached 1 %" in " ".join(ran.stdout.split())
+    refused = vibench_here(*asked, "--method", "first-order", "--error", "1 %", cwd=tmp_path)
+    assert refused.returncode != 0
+    assert "one harmonic cannot be made more exact" in " ".join(refused.stderr.split())

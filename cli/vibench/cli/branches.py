@@ -58,6 +58,9 @@ def branches(
     ] = None,
     *,
     options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
+    error: Annotated[
+        str | None, option("Relative error to reach, as 1%, by a balance; shooting is far more exact.", "E")
+    ] = None,
     holdable: Annotated[
         Path | None,
         option("Report which unstable motions the feedback of this bench can hold.", "BENCH.toml"),
@@ -71,7 +74,8 @@ def branches(
         if resonance is None
         else _resonance(amplitude, frequency, like, resonance)
     )
-    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
+    wish = {} if error is None else {"error": error}
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive, **wish)
     if holdable is not None:
         lowest_hz = request.start if request.along is Parameter.FREQUENCY else request.frequency_hz
         if request.resonance_band_hz is not None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from vibench.sim import Hertz, MotionKind, gong2025, integrate
 from vibench.sim.engine.batch import batches_pay
@@ -239,3 +240,36 @@ def test_random_starts_are_not_computed_where_the_start_varies(other):
     for asked in (estimate_map, solve_map):
         with pytest.raises(InvalidStudy, match="same states at every y_m, which varies"):
             asked(plan)
+
+
+def test_a_map_with_an_error_keeps_the_errors_of_its_points():
+    plan = Map(
+        frequency_hz=Range(start=120, stop=140, points=3),
+        amplitude_m=Range(start=1e-6, stop=2e-5, points=2),
+        refinement="full",
+        error="1 %",
+    )
+    results = solve_map(plan)
+    assert results.is_complete
+    assert np.all(results.arrays["error_estimate"] <= 0.01)
+    assert "error_estimate" not in {column.name for column in plan.model_copy(update={"error": None}).columns}
+
+
+def test_a_diagram_with_an_error_keeps_states_once_a_drive_period():
+    plan = Map(frequency_hz=Range(start=120, stop=140, points=3), amplitude_m=2e-5, error=0.01, chain=["up"])
+    results = solve_map(plan)
+    assert np.all(np.isfinite(results.arrays["section_x"][:, 0]))
+    assert np.all(results.arrays["error_estimate"] <= 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"accuracy": "quick"}, "accuracy was given with an error or a time"),
+        ({"observe": ["response", "lyapunov"]}, "a target is not allowed with lyapunov"),
+        ({"error": 2.0}, "less than or equal to 1"),
+    ],
+)
+def test_what_a_target_of_a_map_decides_is_not_given_beside_it(given, said):
+    with pytest.raises(ValidationError, match=f"(?i){said}"):
+        Map(**{"frequency_hz": Range(start=120, stop=140, points=3), "error": 0.01, **given})

@@ -189,10 +189,14 @@ class BranchDiagram(Labelled):
             return f"{self._none_found}; {self.elapsed_s:.1f} s."
         isolated = sum(line.is_isolated for line in self.lines)
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
+        wanted, reached = self.request.error, ""
+        if wanted is not None:
+            met = sum(int(np.sum(line.error_estimate <= wanted)) for line in self.lines)
+            reached = f" {met} of {self.points} motions reached {100.0 * wanted:g} %."
         return (
             f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
             f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the "
-            f"middle of the worst branch, {worst:.1g} at the worst point."
+            f"middle of the worst branch, {worst:.1g} at the worst point.{reached}"
         )
 
     @property

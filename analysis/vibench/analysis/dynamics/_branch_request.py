@@ -19,6 +19,7 @@ from vibench.sim import (
     RigidStops,
 )
 from vibench.sim.branches import MotionSearch
+from vibench.sim.study import TargetError
 
 from ..errors import NotEnoughData
 from ..signals.arrays import Reals
@@ -54,6 +55,9 @@ class BranchRequest(SpecimenChoice):
     """Lower end of the range, in Hz or in m."""
     stop: PositiveFloat = 600.0
     """Upper end of the range, in Hz or in m."""
+    error: TargetError | None = None
+    """Relative error that every motion is to reach, 0.01 or "1 %". Shooting reaches 1e-8 or less in any case;
+    a balance takes as many harmonics as it needs; absent: 1e-4 of the fundamental of p."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest that a balance may use."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
@@ -89,6 +93,11 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(
                 "rigid stops push with no finite force, so that they have no harmonic balance; take the "
                 "method shooting"
+            )
+        if self.error is not None and self.method is BranchMethod.FIRST_ORDER:
+            raise ValueError(
+                f"an error of {self.error:g} was given, and one harmonic cannot be made more exact; take "
+                "the method balance or shooting, or leave out the error"
             )
         self._refuse_other_resonances()
         pairs = self.recorded_level
@@ -135,7 +144,7 @@ class BranchRequest(SpecimenChoice):
         lower, upper = self.shaken.gaps_m
         kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
         most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
-        return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=EXACT_ENOUGH)
+        return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)
 
     @property
     def title(self) -> str:

@@ -13,7 +13,7 @@ from ..engine.batch import batches_pay
 from ..scene.cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
-from ..scene.solve import InBatches, Question, Solved, settle_scene
+from ..scene.solve import InBatches, Question, Solved, settle_scene, solve_scene
 from ..specimen.outcome import Outcome
 from ..specimen.state import Floats
 from ..study import (
@@ -50,8 +50,11 @@ def map_solver(plan: Map) -> Solver:
     """Choose what computes the points of a map: batches, or one point after the other.
 
     Batches follow motions of one specimen that do not wait for each other, and pay where a processor has the
-    registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one.
+    registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one, as do
+    points with a target.
     """
+    if plan.target is not None:
+        return solve_scene
     is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
     return (
         InBatches(Question.MOTION) if is_one_specimen and not plan.chain and batches_pay() else settle_scene

@@ -13,13 +13,23 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
 from ..scene.prediction import MotionKind, ScenePrediction
-from ..scene.scene import AutomaticDuration, Given, Observable, Rest, Scene
+from ..scene.scene import BUDGET_S, AutomaticDuration, Given, Observable, Rest, Scene, Target
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.frozen_model import FrozenModel
 from ..specimen.specimen import Specimen, Triple
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
-from ..study import COLUMNS, MESSAGE, Cell, Column, GridPlan, Start, StudyAxis
+from ..study import (
+    COLUMNS,
+    MESSAGE,
+    Cell,
+    Column,
+    GridPlan,
+    Start,
+    StudyAxis,
+    TargetError,
+    TargetTime,
+)
 
 KEPT = (
     "response_i",
@@ -41,6 +51,8 @@ KEPT = (
     "state",
 )
 """Columns of a study."""
+ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
+"""Columns of a study, kept of a map with a target."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
@@ -259,6 +271,10 @@ class Map(GridPlan):
     """With "lyapunov" the largest exponent too, over up to 25 s at every point: tens of times the work."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of every point."""
+    error: TargetError | None = None
+    """Relative error that each point is to reach, 0.01 or "1 %"; the accuracy follows from it."""
+    time_s: TargetTime | None = None
+    """Time in which each point is answered as exactly as possible, 2 or "2 s"; a minute when absent."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
     """Drive periods after which a motion that does not repeat is followed no longer."""
     window_periods: Annotated[int, Field(ge=10)] = 200
@@ -269,8 +285,15 @@ class Map(GridPlan):
     """Steps between the points that are computed first, halved until it is 1; absent: 16, or as many as leave
     eight such steps on each axis. What lies between points that agree is filled in."""
 
+    @property
+    def target(self) -> Target | None:
+        """Of every point; None where neither an error nor a time was given."""
+        return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
+
     @model_validator(mode="after")
     def _varies(self) -> Self:
+        if self.target is not None:
+            self.require_target_alone("accuracy")
         names = [each.field for each in self.varied]
         if len(names) not in (1, 2):
             have = "none" if not names else ", ".join(names)
@@ -367,8 +390,11 @@ class Map(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is kept of each point; states once a drive period only of a map along one quantity."""
-        return columns_with(SECTION_COLUMNS if len(self.varied) == 1 else ())
+        """What is kept of each point: errors only with a target, states once a drive period only along one
+        quantity.
+        """
+        errors = () if self.target is None else tuple(_OF_STUDIES[name] for name in ERRORS)
+        return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
 
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
         """Make the scene at a place of the grid, from its own start or another.
@@ -397,7 +423,8 @@ class Map(GridPlan):
             accuracy=self.accuracy,
             duration=AutomaticDuration(self.window_periods / frequency_hz, self.periods / frequency_hz),
             start=start or self._start(place, said, specimen, drive),
-            budget_s=0.0,
+            budget_s=0.0 if self.target is None else BUDGET_S,
+            target=self.target,
         )
 
     def frequency_at(self, place: tuple[int, ...]) -> float:

@@ -31,7 +31,7 @@ from .plan import LinearMotion, linear_motion, never_touches, plan_of
 from .prediction import Method, MotionKind, ScenePrediction, StartMemory, State, TargetReport
 from .repetition import MOST_PERIODS, Pace, Repetition, Sharpness, pace_of
 from .scatter import COVERED
-from .scene import PAPER_DURATION_S, Scene, Target
+from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
 from .shares import student_quantile, wilson_share
 from .solve import Question, in_closed_form
@@ -128,7 +128,9 @@ class _Start:
     repeats: Repetition | None
     """Of a motion that is periodic, or nearly: its windows are alike."""
     impacts: int
-    """In the first window."""
+    """In the first window, as the next."""
+    section: Floats
+    """States once a drive period, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
         """Return the mean of the responses over the first windows, shape (4,)."""
@@ -389,8 +391,13 @@ class _Refinement:
             ended=f"it repeats after {orbit.period} drive period(s)",
             final_state=_state(orbit.run.state),
             memory=StartMemory.KEPT,
+            section=self._section(orbit.section),
         )
         return _reported(found, self._target, self._clock, 1, None)
+
+    def _section(self, states: Floats) -> Floats | None:
+        """Keep states once a drive period where they are observed."""
+        return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
         """Answer for a window that begins where both motions were last seen."""
@@ -443,6 +450,7 @@ class _Refinement:
             final_state=_state(run.state),
             memory=StartMemory.UNKNOWN if is_parted else StartMemory.KEPT,
             integration_error=float(off.max()),
+            section=self._section(states_of(window.stretches)),
         )
         return _reported(found, self._target, self._clock, 1, None)
 
@@ -521,13 +529,15 @@ class _Refinement:
             if self._approaches(path, seen):
                 orbit = path.orbit
                 assert orbit is not None
+                repeats = Repetition(orbit.period, 0.0)
                 impacts = orbit.impacts * self._window_periods // orbit.period
-                starts.append(_Start(run, [orbit.responses_m], Repetition(orbit.period, 0.0), impacts))
+                starts.append(_Start(run, [orbit.responses_m], repeats, impacts, orbit.section))
                 return True
         window = self._observed(run, self._window_periods)
         if window is not None:
             repeats = self._nearly.repeats(window.stretches)
-            starts.append(_Start(run, [window.responses_m], repeats, window.impacts))
+            section = states_of(window.stretches)
+            starts.append(_Start(run, [window.responses_m], repeats, window.impacts, section))
         return window is not None
 
     def _next_size(self, starts: Sequence[_Start], begins_s: float) -> tuple[int, int]:
@@ -582,6 +592,7 @@ class _Refinement:
             final_state=_state(starts[0].run.state),
             memory=StartMemory.LOST,
             scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
+            section=self._section(starts[0].section),
         )
         needed = None
         if self._target.error is not None:

@@ -208,7 +208,7 @@ class Scene:
             if is_given:
                 msg = f"A target and its own {name} are not allowed together: leave out one of the two."
                 raise ValueError(msg)
-        observed = [each for each in self.observe if each not in (Observable.RESPONSE, Observable.SCATTER)]
+        observed = [each for each in self.observe if each in (Observable.LYAPUNOV, Observable.SPECTRUM)]
         if observed:
             msg = f"A target is not allowed with {observed[0]}: ask for {observed[0]} without it."
             raise ValueError(msg)

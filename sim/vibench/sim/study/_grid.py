@@ -301,6 +301,12 @@ class GridPlan(FrozenModel, ABC):
         place = self.grid.place(number)
         return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
 
+    def require_target_alone(self, *names: str) -> None:
+        """Refuse fields that a requested error or time decides by itself; ValueError names the first."""
+        for name in names:
+            if getattr(self, name) != type(self).model_fields[name].default:
+                raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
+
     def differences(self, other: Self) -> tuple[str, ...]:
         """Names of what differs between two plans."""
         mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")

@@ -239,11 +239,8 @@ class Study(GridPlan):
 
     @model_validator(mode="after")
     def _target_stands_alone(self) -> Self:
-        if self.target is None:
-            return self
-        for name in ("accuracy", "duration_s", "budget_s"):
-            if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
+        if self.target is not None:
+            self.require_target_alone("accuracy", "duration_s", "budget_s")
         return self
 
     @model_validator(mode="after")
