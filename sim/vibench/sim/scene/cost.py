@@ -11,6 +11,7 @@ import math
 import platform
 import threading
 import time
+from collections import deque
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -22,8 +23,10 @@ from .plan import ScenePlan, plan_scene
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
-MEMORY = 30
+MEMORY = 12
 """This many runs later a run counts for a third of a new one."""
+SURPRISE = math.log(2.5)
+"""One run counts as farther off than this by no more: which motion is reached may be chance."""
 FEWEST = 3
 """Runs of a kind without which nothing is said of its scatter."""
 UNKNOWN_FACTOR = 10.0
@@ -43,12 +46,17 @@ class _Kind:
     mean: float = 0.0
     variance: float = 0.0
 
+    def off(self, ratio: float) -> float:
+        """Return how far one run is off, in logarithms; all of it while little is known."""
+        off = math.log(ratio) - self.mean
+        return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
+
     def after(self, ratio: float) -> Self:
         """Learn from one more run; the mean and variance fade (West, Comm. ACM 22 (1979) 532)."""
         runs = min(self.runs + 1, MEMORY)
         off, share = math.log(ratio) - self.mean, 1.0 / runs
         spread = (1.0 - share) * (self.variance + share * off * off)
-        return type(self)(runs, self.mean + share * off, spread)
+        return type(self)(runs, self.mean + share * self.off(ratio), spread)
 
 
 @dataclass(frozen=True)
@@ -83,17 +91,19 @@ class CostLedger:
         self._kinds = _read(path)
         self._saved_s = time.monotonic()
         self._is_new = False
+        self._lately = deque[float](maxlen=MEMORY)
+        """How far the last runs of any kind were off: a machine that is slower now slows all kinds."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
         """Return how long planned work of a kind will take here; a new kind as what its name begins with."""
         with self._lock:
-            known = next((self._kinds[name] for name in _names(kind) if self._is_known(name)), _Kind())
+            known, drift = self._known(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
             # The mean itself is as uncertain as the scatter over the root of the runs.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
-        return Expected(planned_s * math.exp(known.mean), factor, known.runs)
+        return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def runs_of(self, kind: str) -> int:
         """How many runs of just this kind were learnt from."""
@@ -105,14 +115,28 @@ class CostLedger:
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
+            known = self._known(kind)
+            if known.runs >= FEWEST:
+                self._lately.append(known.off(taken_s / planned_s))
             for name in _names(kind):
                 self._kinds[name] = self._kinds.get(name, _Kind()).after(taken_s / planned_s)
             self._is_new = True
         if time.monotonic() - self._saved_s > SAVED_EVERY_S:
             self.save()
 
-    def _is_known(self, name: str) -> bool:
-        return name in self._kinds and self._kinds[name].runs >= FEWEST
+    def _known(self, kind: str) -> _Kind:
+        """Return what is known of a kind, or else of what its name begins with."""
+        enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
+        return next((each for each in enough if each.runs >= FEWEST), _Kind())
+
+    @property
+    def _drift(self) -> float:
+        """How far the last runs of all kinds were off together; 0 unless that is certain."""
+        if len(self._lately) < MEMORY:
+            return 0.0
+        mean = math.fsum(self._lately) / MEMORY
+        variance = math.fsum((each - mean) ** 2 for each in self._lately) / (MEMORY - 1)
+        return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
 
     def save(self) -> None:
         """Keep what is new; where the folder cannot be written to, the next process begins again."""
