@@ -82,9 +82,8 @@ def models_figure(rows):
     with styled():
         figure = new_figure(4.2)
         axes = figure.subplots()
-        for amplitude_m, colour, line in zip(AMPLITUDES_M, LEVELS, LEVEL_STYLES, strict=False):
+        for amplitude_m, colour in zip(AMPLITUDES_M, LEVELS, strict=False):
             own = [row for row in rows if row[1] == amplitude_m]
-            label = f"{1e6 * amplitude_m:g} µm"
             axes.plot(
                 [1e3 * row[2] for row in own],
                 [100.0 * row[3] for row in own],
@@ -92,7 +91,7 @@ def models_figure(rows):
                 linestyle="none",
                 marker="osD^"[AMPLITUDES_M.index(amplitude_m)],
                 markersize=4,
-                label=label,
+                label=f"{1e6 * amplitude_m:g} µm",
             )
         for name in ("hertz", *(f"n = {order}" for order in ORDERS)):
             own = [row for row in rows if row[0] == name]
@@ -183,16 +182,16 @@ def section(curves, models, chaos):
     yield from (
         HEADING,
         "",
-        "Ask for an error, a time, or both: `vibench predict --error 1% --time 2s`. Figures and tables of this",
-        "section are made by `python benchmarks/error_curves.py --markdown docs/accuracy.md`, with vibench",
-        f"{json.loads(software())['vibench']}. Times are processor time of one core.",
+        "Ask for an error, a time, or both: `vibench predict --error 1% --time 2s`. Figures and tables of",
+        "this section are made by `python benchmarks/error_curves.py --markdown docs/accuracy.md`, with",
+        f"vibench {json.loads(software())['vibench']}. Times are processor time of one core.",
         "",
         "![Error over time of every method, the paper's four cases](images/tradeoff.png)",
         "",
-        "`vibench tradeoff --out DIR` draws this picture on your machine, and with `--amplitude` and `--frequency`",
-        "that of your own scene. Without contact the answer is a closed form. A motion that approaches a stable",
-        "periodic one is completed by Newton's iteration: 1e-6 costs what 1e-2 costs. In chaos the error is the",
-        "scatter of a mean over starts, and no accuracy reduces it.",
+        "`vibench tradeoff --out DIR` draws this picture on your machine; `--amplitude` and `--frequency`",
+        "name your own scene. Without contact the answer is a closed form. A motion that approaches a stable",
+        "periodic one is completed by Newton's iteration: 1e-6 costs what 1e-2 costs. In chaos the error is",
+        "the scatter of a mean over starts, and no accuracy reduces it.",
         "",
         "| scene | requested | stated | time | 30 s at standard: stated | time |",
         "|---|---|---|---|---|---|",
@@ -204,14 +203,14 @@ def section(curves, models, chaos):
         yield f"| {name} | 1 % | {chosen.error:.1e} | {chosen.time_s:.2g} s {rest}"
     yield from (
         "",
-        "![Similarity of continuous models with the stops, over the time of a point](images/model_similarity.png)",
+        "![Similarity of continuous models with the stops over their cost](images/model_similarity.png)",
         "",
-        f"The paper's own trade: Response I from {GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz, 30 s from",
-        "rest, similarity as in the paper's eqs. 6 and 7. A continuous model saves no time: the stops are faster,",
-        "because flight between contacts is exact.",
+        f"The paper's own trade: Response I from {GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz,",
+        "30 s from rest, similarity as in the paper's eqs. 6 and 7. A continuous model saves no time: the",
+        "stops are faster, because flight between contacts is exact.",
         "",
         "| model | time of a point | "
-        + " | ".join(f"R at {1e6 * each:g} µm" for each in AMPLITUDES_M)
+        + " | ".join(f"R at {1e6 * amplitude_m:g} µm" for amplitude_m in AMPLITUDES_M)
         + " |",
         "|---|---|" + "---|" * len(AMPLITUDES_M),
     )
@@ -223,11 +222,11 @@ def section(curves, models, chaos):
         "",
         "![Error of the mean over time, by window and starts](images/chaos_error.png)",
         "",
-        f"Chaos at {PAPER_HZ:g} Hz and 5 µm: the largest stated error of the four responses, after a lead of",
-        f"{LEAD_S:g} s. It falls as the root of the number of starts. A shorter window costs less for the same",
-        "error, but Response I is the largest value in it: the window is part of the question, and the planner",
-        "keeps 5 s unless `--window` names another. Where settling takes longer than a window, several windows",
-        "of one start share it.",
+        f"Chaos at {PAPER_HZ:g} Hz and 5 µm: the largest stated error of the four responses, after a lead",
+        f"of {LEAD_S:g} s. It falls as the root of the number of starts. A shorter window costs less for the",
+        "same error, but Response I is the largest value in it: the window is part of the question. The",
+        "planner keeps 5 s unless `--window` names another. Where settling takes longer than a window,",
+        "several windows of one start share it.",
         "",
         "| window | " + " | ".join(f"{count} starts" for count in COUNTS) + " |",
         "|---|" + "---|" * len(COUNTS),

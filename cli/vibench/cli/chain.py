@@ -48,6 +48,12 @@ def chain(
     ] = None,
     *,
     options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
+    error: Annotated[
+        str | None, option("Relative error of each transmission to reach under a steady sine, as 1%.", "E")
+    ] = None,
+    time_limit: Annotated[
+        str | None, option("Time for each steady run, as 2s: the best answer by then.", "T", name="--time")
+    ] = None,
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -60,6 +66,7 @@ def chain(
         others=tuple(read_specimen(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),
+        **{name: value for name, value in (("error", error), ("time_s", time_limit)) if value is not None},
     )
     from vibench.analysis.report import chain_figure
 
@@ -133,6 +140,8 @@ def _run_in_words(run: ChainRun) -> str:
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "
+    if not math.isnan(run.transmission_error[0]):
+        across += f"error {100.0 * run.transmission_error.max():.2g} % at most; "
     exponent = (
         ""
         if math.isnan(run.exponent_per_s)

@@ -7,6 +7,7 @@ from pydantic import ValidationError
 
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import ChainDrive, ChainRequest, chain_answer, write_chain
+from vibench.analysis.dynamics._chain_computing import _error_of_lines
 from vibench.analysis.report import chain_figure
 from vibench.sim import LinearSweep, SpecimenTable, gong2025
 from vibench.sim.chain import chain_energies, chain_of, chain_transmissibility, integrate_chain
@@ -96,3 +97,36 @@ def test_cells_take_turns_and_what_is_replaced_is_replaced_in_all():
 def test_what_cannot_be_asked_is_refused_in_one_sentence(options, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**options)
+
+
+def test_a_steady_chain_reaches_a_requested_error():
+    request = ChainRequest(lengths=(2,), start_hz=220.0, stop_hz=220.0, amplitude_m=5e-6, error="5 %")
+    (run,) = chain_answer(request).runs
+    assert np.all(run.transmission_error <= 0.05)
+    longer = ChainRequest(
+        lengths=(2,), start_hz=220.0, stop_hz=220.0, amplitude_m=5e-6, settle_s=5.0, duration_s=40.0
+    )
+    (truth,) = chain_answer(longer).runs
+    off = np.abs(run.transmission[0] / truth.transmission[0] - 1.0)
+    assert np.all(off <= 1.5 * run.transmission_error)
+    assert np.all(np.isnan(truth.transmission_error))
+
+
+def test_the_error_of_lines_holds_in_nineteen_cases_of_twenty():
+    random = np.random.default_rng(5)
+    drawn = random.standard_normal((400, 16, 2)) @ np.array([1.0, 1j])
+    held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= _error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]
+    assert np.mean(held) > 0.94
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"accuracy": "quick"}, "accuracy was given with an error or a time"),
+        ({"duration_s": 3.0}, "duration_s was given with an error or a time"),
+        ({"drive": "swept", "stop_hz": 300.0}, "needs a steady drive, not swept"),
+    ],
+)
+def test_what_a_target_of_a_chain_decides_is_not_given_beside_it(given, said):
+    with pytest.raises(ValidationError, match=said):
+        ChainRequest(**{"error": 0.01, **given})

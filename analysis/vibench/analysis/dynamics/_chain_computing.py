@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
-from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled
+from vibench.sim import Accuracy, Harmonic, LinearSweep, Outcome, Sampled
 from vibench.sim.chain import (
     BandGap,
     Chain,
+    ChainResponse,
     ChainTrajectory,
     band_frequencies_hz,
     band_gaps,
@@ -26,6 +27,8 @@ from vibench.sim.chain import (
     integrate_chain,
     mean_energies,
 )
+from vibench.sim.scene.scatter import COVERED
+from vibench.sim.scene.shares import student_quantile
 
 from ..errors import InvalidRequest
 from ..frequency_response.transmissibility import transmissibility
@@ -52,8 +55,8 @@ class ChainRun(Labelled):
     """One chain under one drive; arrays by cell, counted from the base."""
 
     DOCUMENT: ClassVar = (
-        "cells frequency_hz over_hz transmission impacts observed_s energy_j energy_error_j outcome "
-        "elapsed_s largest_p_m=largest_m lyapunov_per_s=exponent_per_s "
+        "cells frequency_hz over_hz transmission transmission_error impacts observed_s energy_j "
+        "energy_error_j outcome elapsed_s largest_p_m=largest_m lyapunov_per_s=exponent_per_s "
         "lyapunov_error_per_s=exponent_error_per_s"
     )
 
@@ -64,6 +67,8 @@ class ChainRun(Labelled):
     """Frequencies of the transmission, shape (m,): one under a steady sine."""
     transmission: Reals
     """|x of m0 at that frequency| over the base's, shape (m, cells)."""
+    transmission_error: Reals
+    """Relative error of it, shape (cells,); NaN without a requested error or time."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell while observed, shape (cells,)."""
     impacts: NDArray[np.int64]
@@ -180,9 +185,13 @@ class ChainAnswer(Labelled):
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
         complaint = f"; {lost} did not reach their end" if lost else ""
+        exactly = f"; contacts to {self.request.accuracy.promise:g} of 100 µm and 0.1 m/s"
+        if self.request.error is not None:
+            met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
+            exactly = f"; {met} reached an error of {100.0 * self.request.error:g} %"
         return (
-            f"{said} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts observed; contacts "
-            f"to {self.request.accuracy.promise:g} of 100 µm and 0.1 m/s{complaint}."
+            f"{said} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts "
+            f"observed{exactly}{complaint}."
         )
 
 
@@ -198,6 +207,12 @@ ENERGY_S = 0.5
 SWEEP_PARTS = 120
 """Frequencies at which a swept transmission is read, but each over `FEWEST_PERIODS` or more."""
 FEWEST_PERIODS = 12
+WINDOW_S, FEWEST_WINDOWS = 0.25, 16
+"""Length of the windows that are compared where an error is requested, about, and their least number [s]."""
+TOLERANCE_PART = 0.1
+"""Part of a requested error that the accuracy of contacts may use."""
+LONGEST_S = 60.0
+"""Time after which an answer is refined no further, where none was requested [s]."""
 SEGMENTS = 8
 """Number of segments of a recorded motion, in the average that gives the transmission."""
 X, VX = 0, 3
@@ -251,14 +266,19 @@ def _timed_run(
 
 def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     """Responses are observed in a run from rest; energies and the picture over some time after it."""
-    whole_s = request.settle_s + request.duration_s
-    found = chain_response(chain, drive, request.accuracy, whole_s, request.duration_s)
+    whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
+    relative_error = np.full(chain.size, math.nan)
+    if request.has_target:
+        found, relative_error, whole_s = _windows_to_target(chain, request, drive)
+        observed_s = found.window_s
+    else:
+        found = chain_response(chain, drive, request.accuracy, whole_s, observed_s)
     if found.outcome is not Outcome.REACHED_END:
         return _lost_run(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
-    after_s = min(request.duration_s, ENERGY_S)
+    after_s = min(observed_s, ENERGY_S)
     after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
     run = integrate_chain(
-        chain, drive, after_s, request.accuracy, found.final_state,
+        chain, drive, after_s, found.accuracy, found.final_state,
         _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
     )  # fmt: skip
     if run.outcome is not Outcome.REACHED_END:
@@ -266,7 +286,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     exponent = error = math.nan
     if request.exponent_s > 0.0:
         growth = chain_lyapunov_exponent(
-            chain, drive, duration_s=request.exponent_s, settle_s=request.settle_s
+            chain, drive, duration_s=request.exponent_s, settle_s=whole_s - observed_s
         )
         exponent, error = growth.exponent_per_s, growth.standard_error_per_s
     base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.frequency_hz * run.time_s + drive.phase_rad)
@@ -278,9 +298,10 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         frequency_hz=drive.frequency_hz,
         over_hz=np.array([drive.frequency_hz]),
         transmission=found.response_ii[None, :, X],
+        transmission_error=relative_error,
         largest_m=found.largest_m[:, -1],
         impacts=found.impacts,
-        observed_s=request.duration_s,
+        observed_s=observed_s,
         energy_j=energy,
         energy_error_j=energy_error,
         exponent_per_s=exponent,
@@ -292,6 +313,59 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         outcome=run.outcome.text,
         elapsed_s=0.0,
     )
+
+
+def _windows_to_target(
+    chain: Chain, request: ChainRequest, drive: Harmonic
+) -> tuple[ChainResponse, Reals, float]:
+    """Observe windows one after the other until the later half of them tells the lines as exactly as wished.
+
+    Returns the responses over the later half, the relative error of their transmission for 19 cases of 20,
+    shape (cells,), and the time that was followed in all [s].
+    """
+    began_s, limit_s = time.monotonic(), LONGEST_S if request.time_s is None else request.time_s
+    wanted = 0.0 if request.error is None else request.error
+    fine_enough = [level for level in Accuracy if level.promise <= TOLERANCE_PART * wanted]
+    accuracy = fine_enough[0] if fine_enough else Accuracy.REFERENCE
+    window_s = max(1, math.floor(WINDOW_S * drive.frequency_hz)) / drive.frequency_hz
+    windows: list[ChainResponse] = []
+    while True:
+        state = windows[-1].final_state if windows else None
+        windows.append(chain_response(chain, drive, accuracy, window_s, window_s, state))
+        is_over = time.monotonic() - began_s > limit_s or windows[-1].outcome is not Outcome.REACHED_END
+        count = len(windows)
+        if not is_over and (count < FEWEST_WINDOWS or count & (count - 1)):
+            continue
+        used = windows[count // 2 :]
+        lines = np.array([each.lines_m for each in used])
+        errors = _error_of_lines(lines[:, :, X]) + accuracy.promise
+        if is_over or (request.error is not None and np.all(errors <= wanted)):
+            return (
+                replace(
+                    windows[-1],
+                    window_s=len(used) * window_s,
+                    lines_m=lines.mean(axis=0),
+                    largest_m=np.max([each.largest_m for each in used], axis=0),
+                    impacts=np.sum([each.impacts for each in used], axis=0),
+                ),
+                errors,
+                count * window_s,
+            )
+
+
+def _error_of_lines(lines: NDArray[np.complex128]) -> Reals:
+    """Find how far the amplitude of the mean of lines may be off, relatively, from shape (windows, cells).
+
+    Scatter of neighbouring pairs, by Student's interval; while a chain settles, the halves are apart.
+    """
+    count = len(lines) // 2
+    if count < 2:
+        return np.full(lines.shape[1], math.inf)
+    mean = lines.mean(axis=0)
+    pairs = 0.5 * (lines[-2 * count :: 2] + lines[-2 * count + 1 :: 2])
+    scatter = student_quantile(count - 1, COVERED) * pairs.std(axis=0, ddof=1) / math.sqrt(count)
+    apart = np.abs(lines[: len(lines) // 2].mean(axis=0) - lines[len(lines) // 2 :].mean(axis=0))
+    return np.asarray(np.maximum(scatter, apart) / np.abs(mean))
 
 
 def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
@@ -340,6 +414,7 @@ def _lost_run(
         frequency_hz=frequency_hz,
         over_hz=np.array([frequency_hz]),
         transmission=unknown[None, :],
+        transmission_error=unknown,
         largest_m=unknown,
         impacts=impacts,
         observed_s=observed_s,
@@ -367,6 +442,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
         frequency_hz=math.nan,
         over_hz=over_hz,
         transmission=ratio,
+        transmission_error=np.full(chain.size, math.nan),
         largest_m=np.max(np.abs(p), axis=0),
         impacts=run.impacts.per_cell,
         observed_s=run.end_time_s,

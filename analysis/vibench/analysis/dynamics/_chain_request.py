@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from vibench.sim import Accuracy, SpecimenTable
 from vibench.sim.chain import MOST_CELLS, Chain
-from vibench.sim.study import frequency_range
+from vibench.sim.study import TargetError, TargetTime, frequency_range
 
 from ._specimen_choice import SpecimenChoice
 
@@ -58,10 +58,16 @@ class ChainRequest(SpecimenChoice):
     """Over which the largest Lyapunov exponent is averaged under a steady sine; 0 for none."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every level."""
+    error: TargetError | None = None
+    """Relative error of the transmission of every cell that is to be reached under a steady sine, 0.01 or
+    "1 %"; accuracy, settling and duration follow from it."""
+    time_s: TargetTime | None = None
+    """Time for each run under a steady sine, 2 or "2 s"; a minute when absent."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
+        self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(
                 f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower first, "
@@ -77,6 +83,21 @@ class ChainRequest(SpecimenChoice):
         if self.drive is ChainDrive.RECORDED and not self.recording:
             raise ValueError("no recording was given whose base motion drives the chain; give its path")
         return self
+
+    @property
+    def has_target(self) -> bool:
+        """Whether an error or a time was requested."""
+        return self.error is not None or self.time_s is not None
+
+    def _refuse_beside_target(self) -> None:
+        """Refuse what a requested error or time decides by itself, and drives that it cannot be met for."""
+        if not self.has_target:
+            return
+        if self.drive is not ChainDrive.STEADY:
+            raise ValueError(f"an error or a time needs a steady drive, not {self.drive}; leave it out")
+        for name in ("accuracy", "duration_s", "settle_s"):
+            if getattr(self, name) != type(self).model_fields[name].default:
+                raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
 
     @cached_property
     def unit(self) -> Chain:
@@ -114,7 +135,9 @@ class ChainRequest(SpecimenChoice):
         names = ", ".join([self.specimen_text, *(each.name for each in self.others)])
         times = {
             ChainDrive.NONE: "",
-            ChainDrive.STEADY: f", {self.duration_s:g} s after {self.settle_s:g} s",
+            ChainDrive.STEADY: f", {self.duration_s:g} s after {self.settle_s:g} s"
+            if not self.has_target
+            else "",
             ChainDrive.SWEPT: f", {self.duration_s:g} s long",
             ChainDrive.RECORDED: f", {self.duration_s:g} s at most",
         }[self.drive]

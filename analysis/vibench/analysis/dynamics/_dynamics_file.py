@@ -61,6 +61,7 @@ _CHAIN_UNITS = {
     "impacts": "1",
     "energy_j": "J",
     "energy_error_j": "J",
+    "transmission_error": "1",
     "time_s": "s",
     "motion_m": "m",
     "impact_time_s": "s",
