@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.scene.cost import FEWEST, CostLedger
+from vibench.sim.scene.cost import FEWEST, MEMORY, CostLedger
 
 KIND = "event driven/hertz/standard"
 
@@ -82,3 +82,20 @@ def test_times_that_no_clock_saw_teach_nothing(ledger):
     ledger.learn(KIND, 1.0, 0.0)
     ledger.learn(KIND, 0.0, 1.0)
     assert ledger.runs_of(KIND) == 0
+
+
+def test_a_kind_that_was_not_run_lately_follows_a_machine_that_has_slowed(ledger):
+    random = np.random.default_rng(8)
+    kinds = [f"method {number}/law" for number in range(6)]
+    for run in range(60):
+        ledger.learn(kinds[run % 6], 1.0, math.exp(0.2 * random.standard_normal()))
+    for run in range(MEMORY):
+        ledger.learn(kinds[run % 3], 1.0, 2.0 * math.exp(0.2 * random.standard_normal()))
+    assert 1.2 < ledger.expected(kinds[5], 1.0).time_s < 2.6
+
+
+def test_one_surprise_moves_a_plan_by_little(ledger):
+    for _ in range(10):
+        ledger.learn(KIND, 1.0, 1.0)
+    ledger.learn(KIND, 1.0, 100.0)
+    assert ledger.expected(KIND, 1.0).time_s < 1.1

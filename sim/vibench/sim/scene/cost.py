@@ -23,7 +23,7 @@ from .plan import ScenePlan, plan_scene
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
-MEMORY = 12
+MEMORY = 20
 """This many runs later a run counts for a third of a new one."""
 SURPRISE = math.log(2.5)
 """One run counts as farther off than this by no more: which motion is reached may be chance."""

@@ -135,8 +135,10 @@ TANGENT = 1.5
 SETTLING_S = 10.0
 """Duration that an automatic one is planned as [s]."""
 TOUCHING = 0.6
-"""Steady p without stops, over the gap, from which most motions forget their start: 73 of 82 random scenes,
-and 2 of 38 below (`benchmarks/planned_costs.py`)."""
+"""Steady p without stops, over the gap, from which most motions forget their start: 84 of 93 random scenes,
+and 3 of 49 below (`benchmarks/planned_costs.py`)."""
+SLOW = 0.9
+"""Drive frequency over the lowest natural one, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
 """Where p would just reach a stop; it grows as the cube root of how far p would pass it."""
@@ -322,7 +324,9 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
 
 def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     """Name the runs that take about as long as their plans say, or are all off alike."""
-    contact = "touching" if _share(scene, motion) > TOUCHING else "free"
+    contact = "free"
+    if _share(scene, motion) > TOUCHING:
+        contact = "slow" if _is_slow(scene, motion) else "touching"
     contact += ", undamped" if motion.slowest_rate >= 0.0 else ""
     match scene.duration:
         case FixedDuration():
@@ -365,4 +369,10 @@ def _share(scene: Scene, motion: LinearMotion) -> float:
 
 def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
     """Plan the work for other starts, where the start is probably forgotten [s]."""
-    return min(scene.budget_s, (FEWEST - 1) * run_s) if _share(scene, motion) > TOUCHING else 0.0
+    is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
+    return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
+
+
+def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
+    """Whether the drive is below all modes: most motions keep their start then, with or without impacts."""
+    return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))
