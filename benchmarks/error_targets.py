@@ -56,11 +56,9 @@ SHORT, SMALL = 0.1, 1e-3
 """Share of the time for errors up to this where the start is forgotten: no mean reaches them soon."""
 KINDS = ("periodic", "named window", "forgotten")
 HEADING, LAST = "## Requested errors", "## Other solvers"
-INTRODUCTION = """`vibench predict --error 1% --time 2s` answers to a requested error, within a time. A motion
-that approaches a stable periodic one is completed by Newton's iteration. One that keeps its start but does
-not repeat is observed in a window that the answer names. Where the start is forgotten, the answer is the
-mean over starts in a named window, and the error is the uncertainty of this mean. `vibench tradeoff
---amplitude 5e-6 --frequency 260` draws error over time for your own scene. This section is made by `python
+INTRODUCTION = """A motion that keeps its start but does not repeat is observed in a window that the answer
+names. Where the start is forgotten, the answer is the mean over starts in a named window, and the error is
+the uncertainty of this mean. This section is made by `python
 benchmarks/error_targets.py --save FILE`, then `--sum FILE --markdown docs/accuracy.md`."""
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 

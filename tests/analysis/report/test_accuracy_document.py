@@ -33,7 +33,7 @@ def benchmark():
 
 def test_the_page_begins_with_its_answer(benchmark, page_of):
     for page in (PAGE.read_text(encoding="utf-8"), page_of(benchmark)):
-        assert page.index("`standard` is the default") < page.index("| level | promised |") < 500
+        assert page.index("`standard` is the default") < 100 < page.index("| level | promised |")
         assert page.index("## How it was measured") < page.index(
             "Made by `python benchmarks/accuracy_page.py`"
         )

