@@ -7,10 +7,10 @@ from pydantic import ValidationError
 
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import ChainDrive, ChainRequest, chain_answer, write_chain
-from vibench.analysis.dynamics._chain_computing import _error_of_lines
 from vibench.analysis.report import chain_figure
 from vibench.sim import LinearSweep, SpecimenTable, gong2025
 from vibench.sim.chain import chain_energies, chain_of, chain_transmissibility, integrate_chain
+from vibench.sim.chain._target import error_of_lines
 
 pytestmark = pytest.mark.timeout(300)
 """The first run compiles the kernels of chains."""
@@ -115,7 +115,7 @@ def test_a_steady_chain_reaches_a_requested_error():
 def test_the_error_of_lines_holds_in_nineteen_cases_of_twenty():
     random = np.random.default_rng(5)
     drawn = random.standard_normal((400, 16, 2)) @ np.array([1.0, 1j])
-    held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= _error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]
+    held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]
     assert np.mean(held) > 0.94
 
 

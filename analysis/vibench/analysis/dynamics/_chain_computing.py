@@ -12,23 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
-from vibench.sim import Accuracy, Harmonic, LinearSweep, Outcome, Sampled
+from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled
 from vibench.sim.chain import (
     BandGap,
     Chain,
-    ChainResponse,
     ChainTrajectory,
     band_frequencies_hz,
     band_gaps,
     bloch_factor,
     chain_lyapunov_exponent,
     chain_response,
+    chain_response_to,
     chain_transmissibility,
     integrate_chain,
     mean_energies,
 )
-from vibench.sim.scene.scatter import COVERED
-from vibench.sim.scene.shares import student_quantile
 
 from ..errors import InvalidRequest
 from ..frequency_response.transmissibility import transmissibility
@@ -207,12 +205,6 @@ ENERGY_S = 0.5
 SWEEP_PARTS = 120
 """Frequencies at which a swept transmission is read, but each over `FEWEST_PERIODS` or more."""
 FEWEST_PERIODS = 12
-WINDOW_S, FEWEST_WINDOWS = 0.25, 16
-"""Length of the windows that are compared where an error is requested, about, and their least number [s]."""
-TOLERANCE_PART = 0.1
-"""Part of a requested error that the accuracy of contacts may use."""
-LONGEST_S = 60.0
-"""Time after which an answer is refined no further, where none was requested [s]."""
 SEGMENTS = 8
 """Number of segments of a recorded motion, in the average that gives the transmission."""
 X, VX = 0, 3
@@ -269,7 +261,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error = np.full(chain.size, math.nan)
     if request.has_target:
-        found, relative_error, whole_s = _windows_to_target(chain, request, drive)
+        found, relative_error, whole_s = chain_response_to(chain, drive, request.error, request.time_s)
         observed_s = found.window_s
     else:
         found = chain_response(chain, drive, request.accuracy, whole_s, observed_s)
@@ -313,59 +305,6 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         outcome=run.outcome.text,
         elapsed_s=0.0,
     )
-
-
-def _windows_to_target(
-    chain: Chain, request: ChainRequest, drive: Harmonic
-) -> tuple[ChainResponse, Reals, float]:
-    """Observe windows one after the other until the later half of them tells the lines as exactly as wished.
-
-    Returns the responses over the later half, the relative error of their transmission for 19 cases of 20,
-    shape (cells,), and the time that was followed in all [s].
-    """
-    began_s, limit_s = time.monotonic(), LONGEST_S if request.time_s is None else request.time_s
-    wanted = 0.0 if request.error is None else request.error
-    fine_enough = [level for level in Accuracy if level.promise <= TOLERANCE_PART * wanted]
-    accuracy = fine_enough[0] if fine_enough else Accuracy.REFERENCE
-    window_s = max(1, math.floor(WINDOW_S * drive.frequency_hz)) / drive.frequency_hz
-    windows: list[ChainResponse] = []
-    while True:
-        state = windows[-1].final_state if windows else None
-        windows.append(chain_response(chain, drive, accuracy, window_s, window_s, state))
-        is_over = time.monotonic() - began_s > limit_s or windows[-1].outcome is not Outcome.REACHED_END
-        count = len(windows)
-        if not is_over and (count < FEWEST_WINDOWS or count & (count - 1)):
-            continue
-        used = windows[count // 2 :]
-        lines = np.array([each.lines_m for each in used])
-        errors = _error_of_lines(lines[:, :, X]) + accuracy.promise
-        if is_over or (request.error is not None and np.all(errors <= wanted)):
-            return (
-                replace(
-                    windows[-1],
-                    window_s=len(used) * window_s,
-                    lines_m=lines.mean(axis=0),
-                    largest_m=np.max([each.largest_m for each in used], axis=0),
-                    impacts=np.sum([each.impacts for each in used], axis=0),
-                ),
-                errors,
-                count * window_s,
-            )
-
-
-def _error_of_lines(lines: NDArray[np.complex128]) -> Reals:
-    """Find how far the amplitude of the mean of lines may be off, relatively, from shape (windows, cells).
-
-    Scatter of neighbouring pairs, by Student's interval; while a chain settles, the halves are apart.
-    """
-    count = len(lines) // 2
-    if count < 2:
-        return np.full(lines.shape[1], math.inf)
-    mean = lines.mean(axis=0)
-    pairs = 0.5 * (lines[-2 * count :: 2] + lines[-2 * count + 1 :: 2])
-    scatter = student_quantile(count - 1, COVERED) * pairs.std(axis=0, ddof=1) / math.sqrt(count)
-    apart = np.abs(lines[: len(lines) // 2].mean(axis=0) - lines[len(lines) // 2 :].mean(axis=0))
-    return np.asarray(np.maximum(scatter, apart) / np.abs(mean))
 
 
 def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:

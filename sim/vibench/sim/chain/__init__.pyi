@@ -26,3 +26,7 @@ from ._response import (
     chain_response as chain_response,
     mean_energies as mean_energies,
 )
+from ._target import (
+    TargetedResponse as TargetedResponse,
+    chain_response_to as chain_response_to,
+)
