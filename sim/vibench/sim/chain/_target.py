@@ -17,7 +17,7 @@ from ._response import ChainResponse, chain_response
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
 """Length of the windows that are compared, about, and their least number [s]."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Pairs of windows without which nothing is said, and Student's quantile for so many: 19 cases of 20."""
+"""Pairs of windows without which nothing is said, and Student's quantile for it: 19 cases of 20."""
 TOLERANCE_PART = 0.1
 """Part of a requested error that the accuracy of contacts may use."""
 LONGEST_S = 60.0
