@@ -529,9 +529,9 @@ class _Refinement:
             if self._approaches(path, seen):
                 orbit = path.orbit
                 assert orbit is not None
-                repeats = Repetition(orbit.period, 0.0)
+                settled = Repetition(orbit.period, 0.0)
                 impacts = orbit.impacts * self._window_periods // orbit.period
-                starts.append(_Start(run, [orbit.responses_m], repeats, impacts, orbit.section))
+                starts.append(_Start(run, [orbit.responses_m], settled, impacts, orbit.section))
                 return True
         window = self._observed(run, self._window_periods)
         if window is not None:
