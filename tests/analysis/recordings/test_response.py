@@ -9,7 +9,7 @@ from vibench.acquisition.plan import WhiteNoise
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channels import RecordedChannels
-from vibench.analysis.recordings.response import ResponseChannel
+from vibench.analysis.recordings.response import ResponseChannel, derivative_kernel, integral_kernel
 
 RATE = synthetic.RATE
 ACCELERATION = ("m0_acceleration", "acceleration", "m s-2", 100.0)
@@ -33,6 +33,17 @@ def displacements(velocity):
 
 def analysed(path):
     return analyse_files([path], "response", Simulation.LEFT_OUT).results[0].analysis
+
+
+@pytest.mark.parametrize("rate_hz", [5120.0, 51200.0])
+@pytest.mark.parametrize("kernel", [integral_kernel, derivative_kernel])
+def test_a_kernel_is_exact_from_5_hz_to_four_tenths_of_the_rate(kernel, rate_hz):
+    weights = kernel(rate_hz)
+    turn = 2 * np.pi * np.geomspace(5.0, 0.4 * rate_hz, 60)
+    lags = np.arange(weights.size) - weights.size // 2
+    gain = np.exp(-1j * np.outer(turn / rate_hz, lags)) @ weights
+    ideal = 1 / (1j * turn) if kernel is integral_kernel else 1j * turn
+    assert np.abs(gain / ideal - 1).max() < 3e-5
 
 
 SENSORS = pytest.mark.parametrize(
