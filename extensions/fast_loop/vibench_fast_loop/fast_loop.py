@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition.errors import ConfigurationError, LimitExceeded
-from vibench.acquisition.rig import LoopInput, Rig, amplifier_of, shaker_of, specimen_of
+from vibench.acquisition.rig import LoopInput, Rig, SensorConfig, amplifier_of, shaker_of, specimen_of
 from vibench.sim import (
     ArcEnd,
     BifurcationKind,
@@ -75,7 +75,7 @@ class FastLoop:
         per_base, per_m0 = _units_per_volt(self.rig)
         base = np.array([[complex(*pair) for pair in block.base[1:]] for block in blocks])
         m0 = np.array([[complex(*pair) for pair in block.m0[1:]] for block in blocks])
-        delay = np.exp(turning * self.rig.vibrometer.delay_s)
+        delay = np.exp(turning * _vibrometer(self.rig).delay_s)
         return per_base * base * late / turning**2, per_m0 * m0 * late * delay / turning
 
 
@@ -149,7 +149,13 @@ def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
 
 def _units_per_volt(rig: Rig) -> tuple[float, float]:
     """Return base acceleration and m0 velocity per volt of their sensors [m/s2 per V, m/s per V]."""
-    return 1 / rig.accelerometer.sensitivity_v_per_m_per_s2, rig.vibrometer.range_mm_per_s_per_v * 1e-3
+    return rig.accelerometer.units_per_volt("m s-2"), _vibrometer(rig).units_per_volt("m s-1")
+
+
+def _vibrometer(rig: Rig) -> SensorConfig:
+    if rig.vibrometer is None:
+        raise ConfigurationError("the loop samples the velocity of m0; add the table [vibrometer] to the rig")
+    return rig.vibrometer
 
 
 def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.run.limit_monitor import HIGH_PASS_HZ, BaseTracker, SpecimenTracker
+from vibench.acquisition.rig import Role
+from vibench.acquisition.run.limit_monitor import HIGH_PASS_HZ, BaseMotion, BaseTracker, SpecimenTracker
 
 RATE_HZ = 51_200.0
 TIME_S = np.arange(round(3 * RATE_HZ)) / RATE_HZ
+STILL = BaseMotion(np.zeros(TIME_S.size), np.zeros(TIME_S.size))
 
 
 def amplitude(values):
@@ -48,7 +50,7 @@ def test_what_still_rings_when_a_run_begins_has_gone_no_further_than_it_rings(ph
     base, specimen = BaseTracker(RATE_HZ), SpecimenTracker(RATE_HZ)
     for block, seen in zip(np.split(acceleration, 4), np.split(velocity, 4), strict=True):
         motion = base.follow(block)
-        stretched = specimen.follow(seen, motion.velocity, np.zeros(seen.size, dtype=np.bool_))
+        stretched = specimen.follow(seen, motion, np.zeros(seen.size, dtype=np.bool_))
         assert np.max(np.abs(motion.displacement)) < 0.3e-3
         assert np.max(np.abs(stretched)) < 0.3e-3
 
@@ -58,23 +60,34 @@ def test_a_constant_offset_moves_nothing():
     assert np.max(np.abs(motion.displacement)) < 1e-12
 
 
+@pytest.mark.parametrize("role", [Role.M0_ACCELERATION, Role.M0_DISPLACEMENT])
+@pytest.mark.parametrize("frequency_hz", [10.0, 95.0, 500.0])
+def test_an_accelerometer_or_probe_on_m0_shows_the_same_stretch(role, frequency_hz):
+    turn, seen = 2 * np.pi * frequency_hz, np.zeros(TIME_S.size, dtype=np.bool_)
+    base = BaseTracker(RATE_HZ).follow(-1e-3 * turn**2 * np.sin(turn * TIME_S))
+    by_velocity = SpecimenTracker(RATE_HZ).follow(3e-3 * turn * np.cos(turn * TIME_S), base, seen)
+    factor = -(turn**2) if role is Role.M0_ACCELERATION else 1.0
+    found = SpecimenTracker(RATE_HZ, role).follow(factor * 3e-3 * np.sin(turn * TIME_S), base, seen)
+    assert amplitude(found) == pytest.approx(amplitude(by_velocity), rel=2e-3)
+
+
 def test_a_mass_that_moves_with_the_base_stretches_no_spring():
     turn = 2 * np.pi * 10.0
     motion = BaseTracker(RATE_HZ).follow(15.0 * np.sin(turn * TIME_S))
     seen = np.zeros(TIME_S.size, dtype=np.bool_)
-    together = SpecimenTracker(RATE_HZ).follow(-15.0 / turn * np.cos(turn * TIME_S), motion.velocity, seen)
+    together = SpecimenTracker(RATE_HZ).follow(-15.0 / turn * np.cos(turn * TIME_S), motion, seen)
     assert amplitude(motion.displacement) > 3.7e-3
     assert amplitude(together) < 1e-5
 
 
 def test_a_mass_on_a_still_base_stretches_its_springs_by_its_own_displacement():
     turn = 2 * np.pi * 95.0
-    still, seen = np.zeros(TIME_S.size), np.zeros(TIME_S.size, dtype=np.bool_)
-    stretched = SpecimenTracker(RATE_HZ).follow(1e-3 * turn * np.cos(turn * TIME_S), still, seen)
+    seen = np.zeros(TIME_S.size, dtype=np.bool_)
+    stretched = SpecimenTracker(RATE_HZ).follow(1e-3 * turn * np.cos(turn * TIME_S), STILL, seen)
     assert amplitude(stretched) == pytest.approx(1e-3, rel=2e-3)
 
 
 def test_a_vibrometer_past_its_range_is_taken_for_blind_and_not_for_moving():
-    still, is_blind = np.zeros(TIME_S.size), np.ones(TIME_S.size, dtype=np.bool_)
-    stuck = SpecimenTracker(RATE_HZ).follow(np.full(TIME_S.size, 1.0), still, is_blind)
+    is_blind = np.ones(TIME_S.size, dtype=np.bool_)
+    stuck = SpecimenTracker(RATE_HZ).follow(np.full(TIME_S.size, 1.0), STILL, is_blind)
     assert np.max(np.abs(stuck)) == 0.0

@@ -60,6 +60,27 @@ def test_the_transmission_at_the_drive_is_the_ratio_of_displacements(view):
     assert view.spectrum() is view.spectrum()
 
 
+@pytest.mark.parametrize(("role", "power"), [("m0_acceleration", 1), ("m0_displacement", -1)])
+def test_another_sensor_on_m0_shows_the_same_responses(role, power):
+    channels = (*CHANNELS[:3], LiveChannel(role, "m/s²", 0.25, 5.0))
+    found = LiveView(channels, RATE, band_hz=(150.0, 350.0))
+    for first in range(0, 102_400, 2560):
+        block = volts(first, 2560)
+        moved = volts(first, 2560)[0] * CHANNELS[0].units_per_volt * 3 * A0
+        block[3] = moved * (-((2 * np.pi * 260) ** 2) if power > 0 else 1.0) / 0.25
+        found.add(first, block)
+    history = found.history()
+    assert np.allclose(history.response_ii, 3.0, rtol=3e-3)
+    assert np.allclose(history.response_i, 3.0, rtol=5e-3)
+    assert np.allclose(history.upper, 3 * A0 * 2 * np.pi * 260, rtol=5e-3)
+    assert np.allclose(found.section.displacement_m, 3 * A0, rtol=5e-3)
+    answer = found.frequency_response()
+    line = int(np.argmin(np.abs(answer.frequency_hz - 260.0)))
+    # The sine lies between lines: a line is converted at its own frequency, 0.9 % off, squared at most.
+    assert answer.magnitude[line] == pytest.approx(3.0, rel=0.025)
+    assert found.impacts == 0
+
+
 def test_meters_and_impacts_are_read(view):
     assert view.levels[0].peak_share == pytest.approx(0.1, rel=0.01)
     assert view.impacts == 0

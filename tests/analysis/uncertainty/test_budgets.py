@@ -132,7 +132,7 @@ def test_what_is_not_stated_is_said_and_is_not_zero(weak):
 
 def test_calibration_source_and_date_reach_the_document(weak):
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
-    stated = stated_uncertainties(facts.bench)
+    stated = stated_uncertainties(facts.bench, facts.response)
     assert stated.response[0].source == "vibrometer: certificate 17 (calibrated 2026-02-10)"
     tilts = np.radians([6.0, 3.0]) ** 2 / np.sqrt(20.0)
     assert stated.scale_sd == pytest.approx(np.linalg.norm([0.006, 0.01, 0.002, 0.003, *tilts]))

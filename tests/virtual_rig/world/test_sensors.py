@@ -6,58 +6,62 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.rig import load_rig
+from vibench.acquisition.rig import Role, load_rig
 from vibench.virtual_rig.world.sensors import (
     LONGEST_DELAY_S,
     PAGE,
-    Accelerometer,
     Disturbance,
+    MotionSensor,
     NoiseStream,
     RandomDropouts,
-    Vibrometer,
-    sensor_volts,
 )
 from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 GRID_RATE_HZ = USUAL_GRID.rate_hz
 FULL_SCALE_V = RIG.vibrometer.full_scale_v
-FULL_SCALE_M_PER_S = RIG.vibrometer.full_scale_m_per_s
+FULL_SCALE_M_PER_S = FULL_SCALE_V * RIG.vibrometer.units_per_volt("m s-1")
 
 
 def vibrometer(noise_density=0.0, dropouts_per_s=0.0, **config):
-    dropouts = RandomDropouts(dropouts_per_s, NoiseStream(1, "dropouts"))
-    return Vibrometer(
-        RIG.vibrometer.model_copy(update=config), noise_density, dropouts, NoiseStream(1, "vibrometer")
+    return MotionSensor(
+        RIG.vibrometer.model_copy(update=config),
+        Role.M0_VELOCITY,
+        noise_density * np.sqrt(GRID_RATE_HZ / 2),
+        NoiseStream(1, "vibrometer"),
+        dropouts=RandomDropouts(dropouts_per_s, NoiseStream(1, "dropouts")),
     )
 
 
 def accelerometer(noise_m_per_s2=0.0, **config):
-    return Accelerometer(
-        RIG.accelerometer.model_copy(update=config), noise_m_per_s2, NoiseStream(1, "accelerometer")
+    return MotionSensor(
+        RIG.accelerometer.model_copy(update=config),
+        Role.BASE_ACCELERATION,
+        USUAL_GRID.rms_per_step(noise_m_per_s2),
+        NoiseStream(1, "accelerometer"),
     )
 
 
 def test_a_steady_velocity_shows_as_volts_by_the_decoders_range():
-    volts = sensor_volts(vibrometer(), np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
+    volts = vibrometer().volts(np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
 
 def test_velocity_beyond_full_scale_is_clipped():
-    volts = sensor_volts(vibrometer(), np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
+    volts = vibrometer().volts(np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
     assert np.min(volts) == -FULL_SCALE_V
     assert np.count_nonzero(volts == -FULL_SCALE_V) > 190
 
 
 def test_the_vibrometers_noise_has_the_density_that_is_configured():
     density = 2e-8
-    volts = sensor_volts(vibrometer(noise_density=density), np.zeros(200_000), 0)
+    volts = vibrometer(noise_density=density).volts(np.zeros(200_000), 0)
     rms = np.std(volts) * FULL_SCALE_M_PER_S / FULL_SCALE_V
     assert rms == pytest.approx(density * np.sqrt(GRID_RATE_HZ / 2), rel=0.01)
 
 
 def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
-    acceleration = sensor_volts(accelerometer(noise_m_per_s2=0.005), np.zeros(200_000), 0)
+    acceleration = accelerometer(noise_m_per_s2=0.005).volts(np.zeros(200_000), 0)
     acceleration /= RIG.accelerometer.sensitivity_v_per_m_per_s2
     spectrum = np.abs(np.fft.rfft(acceleration)) ** 2 * 2 / len(acceleration) ** 2
     in_band = np.fft.rfftfreq(len(acceleration), 1 / GRID_RATE_HZ) < FULL_BAND_HZ
@@ -66,9 +70,7 @@ def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
 
 def test_the_accelerometer_clips_at_its_full_scale():
     limit = RIG.accelerometer.full_scale_v
-    volts = sensor_volts(
-        accelerometer(), np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0
-    )
+    volts = accelerometer().volts(np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0)
     assert volts[-1] == limit
 
 
@@ -87,7 +89,7 @@ def test_a_delay_that_cannot_be_simulated_is_refused():
 def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
     instrument = vibrometer()
     instrument.disturb(Disturbance(150, 160, 1.0))
-    first, second = (sensor_volts(instrument, np.full(100, 0.01), start) for start in (100, 200))
+    first, second = (instrument.volts(np.full(100, 0.01), start) for start in (100, 200))
     assert np.all(first[50:60] == FULL_SCALE_V)
     assert np.count_nonzero(first == FULL_SCALE_V) == 10
     quiet = 0.01 / FULL_SCALE_M_PER_S * FULL_SCALE_V
@@ -106,8 +108,8 @@ def test_dropouts_come_at_random_as_often_as_configured():
 
 def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
     steps = 5 * PAGE  # a multiple of 640
-    whole = sensor_volts(vibrometer(dropouts_per_s=200.0), np.zeros(steps), 0)
+    whole = vibrometer(dropouts_per_s=200.0).volts(np.zeros(steps), 0)
     instrument = vibrometer(dropouts_per_s=200.0)
-    parts = [sensor_volts(instrument, np.zeros(640), start) for start in range(0, steps, 640)]
+    parts = [instrument.volts(np.zeros(640), start) for start in range(0, steps, 640)]
     assert np.count_nonzero(whole) > 500
     assert np.array_equal(np.concatenate(parts), whole)

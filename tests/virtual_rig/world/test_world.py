@@ -86,7 +86,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_says(frequency_h
     s = 2j * np.pi * frequency_hz
     acceleration = base / RIG.accelerometer.sensitivity_v_per_m_per_s2
     delay = np.exp(-s * RIG.vibrometer.delay_s)
-    velocity = laser / delay * RIG.vibrometer.full_scale_m_per_s / RIG.vibrometer.full_scale_v
+    velocity = laser / delay * RIG.vibrometer.units_per_volt("m s-1")
     moved = base_transmissibility(specimen_of(QUIET), frequency_hz)[0, 0]
     # The coupling capacitor of the accelerometer's channel leads by its cut over the frequency.
     coupling = s / (s + 2 * np.pi * 0.5)
@@ -237,7 +237,7 @@ def test_a_disconnected_cable_goes_silent_and_comes_back():
 def test_a_dropout_on_demand_is_seen_by_the_vibrometer_alone():
     world = World(QUIET, Tone(260.0, 1.0))
     sampler = world.sample(INPUTS, 51_200.0)
-    world.disturb_vibrometer(0.01, 1.0)
+    world.disturb_response(0.01, 1.0)
     volts = sampler.read(2000)
     assert np.mean(volts[LASER] > 0.99 * RIG.vibrometer.full_scale_v) == pytest.approx(512 / 2000, abs=0.01)
     assert np.max(volts[DRIVE]) < 0.6

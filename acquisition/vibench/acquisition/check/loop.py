@@ -11,7 +11,7 @@ from ..bench.bench import Bench
 from ..bench.result import Bounds, Finding, Verdict, judged
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
-from ..rig import BaseQuantity, ComplexArray, RigModel, Role
+from ..rig import RESPONSE_ROLES, BaseQuantity, ComplexArray, RigModel, Role
 
 _PPM = 1e6
 _WINDOWS = 20
@@ -141,7 +141,6 @@ class LoopCheck:
             RigModel(bench.rig).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)
         )
         self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
-        self._m0_modelled = expected_under_check(bench.rig, self._terminal_v, BaseQuantity.M0_VELOCITY)
 
     def findings(self) -> list[Finding]:
         """Answer what can be answered with the channels that there are."""
@@ -157,8 +156,10 @@ class LoopCheck:
             found.append(self._base())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.BASE_ACCELERATION):
             found.append(self._sign(Role.BASE_ACCELERATION, self._base_modelled))
-        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.M0_VELOCITY):
-            found.append(self._sign(Role.M0_VELOCITY, self._m0_modelled, M0_PHASE_DEG))
+        for role in RESPONSE_ROLES:
+            if self._detects(Role.DRIVE_VOLTAGE) and self._detects(role):
+                modelled = expected_under_check(self._rig, self._terminal_v, BaseQuantity(role.value))
+                found.append(self._sign(role, modelled, M0_PHASE_DEG))
         return found
 
     def _detects(self, role: Role) -> bool:
@@ -175,9 +176,10 @@ class LoopCheck:
         fit = self._fit(role)
         is_detected = self._detects(role)
         advice = {
-            Role.M0_VELOCITY: "see whether the laser is on, focused, and its beam free",
-            Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
-        }.get(role, "see whether the cable is open or shorted, its source plugged in, and the amplifier on")
+            "voltage": "see whether the cable is open, its source plugged in, and the amplifier on",
+            "velocity": "see whether the laser is on, focused, and its beam free",
+            "acceleration": "see whether the accelerometer is plugged in and its current on",
+        }.get(role.quantity, "see whether the sensor is plugged in, in range, and its supply on")
         return Finding(
             name=hears_name(role),
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
@@ -252,11 +254,12 @@ class LoopCheck:
         off_deg = each_deg[np.argmin(np.abs(each_deg))]
         advice = {
             Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
-            Role.M0_VELOCITY: (
-                "if the base's sign is right, the vibrometer's is reversed (its direction, or the side "
-                "that the laser sees), or the specimen is not the one described"
-            ),
-        }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")
+            Role.AMPLIFIER_VOLTAGE: "swap the two wires of this input, or see whether the amplifier inverts",
+        }.get(
+            role,
+            "if the base's sign is right, that of this sensor is reversed (its direction, or the side that "
+            "a laser sees), or the specimen is not the one described",
+        )
         expected = f"0 deg within {bounds.well:g} deg"
         verdict = bounds.verdict(abs(off_deg))
         return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)

@@ -93,6 +93,27 @@ QUESTIONS = (
 """In the order in which they are asked."""
 
 
+def questions_for(text: str) -> tuple[Question, ...]:
+    """Return the questions that have a place in a template, those of other sensors before the last."""
+    roles = tomllib.loads(text).get("sensors", {})
+    others = [
+        Question(key, words.format(role.replace("_", " ")))
+        for role in roles
+        for key, words in (
+            (f"daq.channels.{role}.physical", "Which input reads the sensor of {}?"),
+            (f"sensors.{role}.model", "Model of the sensor of {}?"),
+            (f"sensors.{role}.serial", "Its serial number?"),
+            (
+                f"sensors.{role}.sensitivity",
+                "Its sensitivity, from its certificate [such as 100 mV/g]?",
+            ),
+            (f"sensors.{role}.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
+        )
+    ]
+    asked = (*QUESTIONS[:-1], *others, QUESTIONS[-1])
+    return tuple(each for each in asked if _table(text, each.key)[1])
+
+
 _KEY = r"^(?P<key>{key}[ \t]*=[ \t]*)(?P<value>{value})(?P<comment>[ \t]*(?:#.*)?)$"
 _VALUE = r"\"[^\"]*\"|\{[^}]*\}|[^\s#]+"
 _CHANNEL = "daq.channels."
@@ -239,14 +260,14 @@ def configure(
     seen: InstrumentList,
     ask: Ask,
     note: str,
-    questions: Sequence[Question] = QUESTIONS,
+    questions: Sequence[Question] | None = None,
     refuse: Refuse = refuse_at_once,
 ) -> Rig:
     """Ask all questions, write the configuration, and read it back.
 
-    Comments of ``template`` say CONFIRM for unchecked values. ``note``, with name and time, is added to each
-    answer. ``refuse`` receives the error of an answer, or of all together; when it returns, they are asked
-    again.
+    Without ``questions``, those that have a place in the template are asked. Comments of ``template`` say
+    CONFIRM for unchecked values. ``note``, with name and time, is added to each answer. ``refuse`` receives
+    the error of an answer, or of all together; when it returns, they are asked again.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
@@ -257,6 +278,7 @@ def configure(
             f"{target.absolute().parent} is not a folder; make it, or give another place"
         )
     text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is the template's
+    questions = questions_for(text) if questions is None else questions
     for question in questions:
         if len(choices := found_choices(question, seen)) == 1:
             text = with_answer(text, question.key, choices[0], "the only one seen")
@@ -363,8 +385,6 @@ FIRST_VPP = 5e-3
 _FROM = {
     Role.DRIVE_VOLTAGE: "T-piece at the output of the generator",
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, beside the shaker",
-    Role.BASE_ACCELERATION: "accelerometer on the base",
-    Role.M0_VELOCITY: "velocity output of the vibrometer",
 }
 Confirmed = Callable[[str], str]
 """Asks for the wiring of two ends; the answer is written on the page, and an empty one ends the procedure."""
@@ -438,7 +458,8 @@ def _pair(rig: Rig, channel: Channel) -> str:
     config = next(each for each in rig.daq.channels if each.role is channel.role)
     divider = f" over a divider of {config.attenuation:g}:1" if config.attenuation != 1 else ""
     current = f", IEPE {1e3 * config.iepe_current_a:g} mA" if config.iepe_current_a else ""
-    return f"{_FROM[channel.role]}{divider} to {channel.physical} ({channel.coupling}{current})"
+    source = _FROM.get(channel.role, f"{channel.sensor} ({channel.role.value.replace('_', ' ')})")
+    return f"{source}{divider} to {channel.physical} ({channel.coupling}{current})"
 
 
 def _chapter(title: str, report: BenchReport) -> Iterator[str]:

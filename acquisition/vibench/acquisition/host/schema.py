@@ -152,7 +152,7 @@ def _draft_4(part: Any) -> Any:
 
 
 _KEYS: Mapping[str, str] = {"$defs": "definitions"}
-_NEW = frozenset({"discriminator", "title", "examples"})
+_NEW = frozenset({"discriminator", "title", "examples", "propertyNames"})
 
 
 def _older(part: Json) -> Json:

@@ -55,8 +55,9 @@ OURS = tuple(
         (PlugInKind.DIGITIZER, "soundcard", f"{_DRIVERS}:SoundCardDigitizer"),
         (PlugInKind.OUTPUT, "soundcard", f"{_DRIVERS}:SoundCardOutput"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),
-        (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:accelerometer"),
-        (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:vibrometer"),
+        (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:transducer"),
+        (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:transducer"),
+        (PlugInKind.SENSOR, "transducer", f"{_SENSORS}:transducer"),
     )
 )
 

@@ -16,6 +16,7 @@ from ..excitation.steps import Segment, Tone
 from ..recording import SegmentLabel, open_recording
 from ..rig import (
     LARGEST_LEVEL_ERROR,
+    RESPONSE_ROLES,
     BaseQuantity,
     ComplexArray,
     OutputConfig,
@@ -324,14 +325,12 @@ def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCh
         name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain",
         load=BaseQuantity.AMPLIFIER_VOLTAGE,
     )  # fmt: skip
-    yield from _inputs(
-        rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[BaseQuantity.ACCELERATION].peak
-    )
+    yield from _inputs(rig, measurement.excitation.highest_amplitude_vpp, loads)
 
 
 def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
-    """Check the estimated motion of the specimen against its springs and the vibrometer."""
-    amplitude, velocity = loads[BaseQuantity.AMPLITUDE], loads[BaseQuantity.M0_VELOCITY]
+    """Check the estimated motion of the specimen against its springs and the sensors of m0."""
+    amplitude = loads[BaseQuantity.AMPLITUDE]
     limit = rig.specimen.amplitude_limit_m
     yield LimitCheck(
         f"the specimen's amplitude (about, {amplitude.cause})",
@@ -344,24 +343,27 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
     )
     flagged = measurement.limits.on_overload is OnOverload.FLAG
     for channel in channels_of(rig):
-        if channel.role is Role.M0_VELOCITY:
+        if channel.role in RESPONSE_ROLES:
+            moved = loads[BaseQuantity(channel.role.value)]
             yield LimitCheck(
-                f"the velocity of m0 (about, {velocity.cause})",
-                velocity.peak,
+                f"the {channel.quantity} of m0 (about, {moved.cause})",
+                moved.peak,
                 channel.full_scale_v * channel.units_per_volt,
                 channel.unit,
-                f"range of {channel.physical} and of the vibrometer",
-                "lower amplitude_vpp or widen the vibrometer's range",
+                f"range of {channel.physical} and of its sensor",
+                "lower amplitude_vpp or widen the range",
                 consequence=Consequence.TOLD if flagged else Consequence.REFUSED,
             )
 
 
-def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: float) -> Iterator[LimitCheck]:
+def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck]:
     """Check that the converter can show the predicted values."""
     peaks = {
         Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
-        Role.AMPLIFIER_VOLTAGE: amplifier_v,
-        Role.BASE_ACCELERATION: acceleration,
+        Role.AMPLIFIER_VOLTAGE: loads[BaseQuantity.AMPLIFIER_VOLTAGE].peak,
+        Role.BASE_ACCELERATION: loads[BaseQuantity.ACCELERATION].peak,
+        Role.BASE_VELOCITY: loads[BaseQuantity.VELOCITY].peak,
+        Role.BASE_DISPLACEMENT: loads[BaseQuantity.STROKE].peak,
     }
     for channel in channels_of(rig):
         if channel.role in peaks:

@@ -46,8 +46,8 @@ from ._tables import Columns
 # physical units, one after the other in time: drawn as a line they are the envelope of the recording.
 
 SIGNAL = "values"
-FIRST_CHOICE = "m0_velocity"
-"""What is plotted where nobody chooses a channel; without it, the last one."""
+FIRST_CHOICE = "m0_"
+"""Beginning of the role that is plotted where nobody chooses a channel; without it, the first one."""
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
@@ -55,7 +55,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
-    if "default" not in view.attrs or role == FIRST_CHOICE:
+    if "default" not in view.attrs or role.startswith(FIRST_CHOICE):
         write_attributes(file, {"NX_class": "NXroot", "default": layout.VIEW})
         write_attributes(view, {"NX_class": "NXentry", "default": role})
     channel = read_attributes(file[role])

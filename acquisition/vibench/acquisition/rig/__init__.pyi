@@ -1,6 +1,7 @@
 from ._configuration import (
     HIGH_Z as HIGH_Z,
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
+    RESPONSE_ROLES as RESPONSE_ROLES,
     TOKEN_KEY as TOKEN_KEY,
     TOKEN_VARIABLE as TOKEN_VARIABLE,
     USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
@@ -14,7 +15,9 @@ from ._configuration import (
     OutputUse as OutputUse,
     Rig as Rig,
     Role as Role,
+    SensorConfig as SensorConfig,
     StatedUncertainty as StatedUncertainty,
+    TransducerConfig as TransducerConfig,
     VibrometerConfig as VibrometerConfig,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
@@ -27,7 +30,6 @@ from ._knobs import (
     Channel as Channel,
     Confirm as Confirm,
     KnobSheet as KnobSheet,
-    accelerometer as accelerometer,
     calibrations as calibrations,
     channels_of as channels_of,
     check_calibrations as check_calibrations,
@@ -36,7 +38,7 @@ from ._knobs import (
     confirm_simulated as confirm_simulated,
     save_knob_sheet as save_knob_sheet,
     sensor_name as sensor_name,
-    vibrometer as vibrometer,
+    transducer as transducer,
     wire as wire,
 )
 from ._load_rig import (

@@ -346,64 +346,138 @@ def _velocity_range(given: object) -> object:
     return 1e3 / volts_per_unit(given, "m s-1") if isinstance(given, str) else given
 
 
-class VibrometerConfig(FrozenModel):
-    """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
+class SensorConfig(FrozenModel):
+    """A sensor, as its data sheet and certificate describe it."""
 
     model: str
     serial: str = ""
+    full_scale_v: PositiveFloat
+    """Largest output, peak [V]."""
+    bandwidth_hz: PositiveFloat | None = None
+    """Upper -3 dB frequency, first order [Hz]; absent: far above what is measured."""
+    resonance_hz: PositiveFloat | None = None
+    """Mounted resonance [Hz]; absent likewise."""
+    delay_s: NonNegativeFloat = 0.0
+    """Signal delay of its electronics, bandwidth included [s]; the analysis takes it out of the phase."""
+    iepe: Literal["yes", "no"] = "no"
+    """Whether the input feeds it a current."""
+    calibrated: date
+    uncertainty: StatedUncertainty | None = None
+    """Uncertainty of the calibration; absent: not stated, and every result says so."""
+    alignment_deg: Sourced | None = None
+    """Largest angle between sensitive axis, or beam, and motion [degree]."""
+    noise_per_rthz: Sourced | None = None
+    """Density of its noise [SI unit per root hertz]; absent: not stated."""
+
+    @property
+    def name(self) -> str:
+        """Name in results."""
+        return self.model
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return SI units of the motion per volt; ``unit`` is that of the channel."""
+        raise NotImplementedError(unit)
+
+
+class TransducerConfig(SensorConfig):
+    """Any sensor of a channel: a table ``[sensors.m0_acceleration]``."""
+
+    sensitivity: str
+    """With the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return SI units per volt; raises ValueError when the sensitivity is not one for this unit."""
+        return 1 / volts_per_unit(self.sensitivity, unit)
+
+
+class VibrometerConfig(SensorConfig):
+    """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
+
     decoder: str
     range_mm_per_s_per_v: Annotated[
         PositiveFloat, BeforeValidator(_velocity_range, json_schema_input_type=PositiveFloat | str)
     ]
     """Decoder range [mm/s per volt], or text with another unit: ``"4 V/(m/s)"``."""
-    full_scale_v: PositiveFloat
-    """Largest output, peak [V]."""
     bandwidth_hz: PositiveFloat
     tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
     delay_s: NonNegativeFloat
     """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
-    calibrated: date
-    uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the calibration; absent: not stated, and every result says so."""
-    alignment_deg: Sourced | None = None
-    """Largest angle between beam and motion [degree]."""
-    noise_per_rthz: Sourced | None = None
-    """Density of its noise [m/s per root hertz]; absent: not stated."""
 
     @property
-    def full_scale_m_per_s(self) -> float:
-        """Largest velocity that the range can show [m/s]."""
-        return self.full_scale_v * self.range_mm_per_s_per_v * 1e-3
+    def name(self) -> str:
+        """Name in results, with that of the decoder."""
+        return f"{self.model} {self.decoder}"
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return the range [m/s per volt]."""
+        del unit
+        return self.range_mm_per_s_per_v * 1e-3
 
 
-class AccelerometerConfig(FrozenModel):
+class AccelerometerConfig(SensorConfig):
     """The accelerometer on the base."""
 
-    model: str
-    serial: str = ""
     sensitivity_v_per_m_per_s2: Annotated[
         PositiveFloat, BeforeValidator(_acceleration_sensitivity, json_schema_input_type=PositiveFloat | str)
     ]
     """Sensitivity [V per m/s2], or text with the unit of the data sheet: ``"100 mV/g"``."""
-    full_scale_v: PositiveFloat
     resonance_hz: PositiveFloat
     iepe: Literal["yes", "no"]
-    calibrated: date
-    uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the sensitivity; absent: not stated."""
-    alignment_deg: Sourced | None = None
-    """Largest angle between the sensitive axis and the motion [degree]."""
-    noise_per_rthz: Sourced | None = None
-    """Density of its noise [m/s2 per root hertz]; absent: not stated."""
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return the inverse of the sensitivity [m/s2 per volt]."""
+        del unit
+        return 1 / self.sensitivity_v_per_m_per_s2
 
 
 class Role(StrEnum):
-    """What a channel records; the name of its dataset."""
+    """What a channel records; the name of its dataset: a place on the rig, and a quantity.
+
+    ``base_force`` is the force by which the shaker's table moves what stands on it.
+    """
 
     DRIVE_VOLTAGE = "drive_voltage"
     AMPLIFIER_VOLTAGE = "amplifier_voltage"
+    BASE_FORCE = "base_force"
     BASE_ACCELERATION = "base_acceleration"
+    BASE_VELOCITY = "base_velocity"
+    BASE_DISPLACEMENT = "base_displacement"
+    M0_ACCELERATION = "m0_acceleration"
     M0_VELOCITY = "m0_velocity"
+    M0_DISPLACEMENT = "m0_displacement"
+    M1_ACCELERATION = "m1_acceleration"
+    M1_VELOCITY = "m1_velocity"
+    M1_DISPLACEMENT = "m1_displacement"
+    M2_ACCELERATION = "m2_acceleration"
+    M2_VELOCITY = "m2_velocity"
+    M2_DISPLACEMENT = "m2_displacement"
+
+    @property
+    def place(self) -> str:
+        """``"base"``, ``"m0"``."""
+        return self.value.partition("_")[0]
+
+    @property
+    def quantity(self) -> str:
+        """``"voltage"``, ``"acceleration"``."""
+        return self.value.partition("_")[2]
+
+    @property
+    def unit(self) -> str:
+        """UDUNITS text: ``"m s-2"``."""
+        return UNIT_OF_QUANTITY[self.quantity]
+
+
+UNIT_OF_QUANTITY = {
+    "voltage": "V",
+    "force": "N",
+    "acceleration": "m s-2",
+    "velocity": "m s-1",
+    "displacement": "m",
+}
+"""UDUNITS text, by the quantity of a channel."""
+RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
+"""Channels that show the motion of m0; the first that is there is used."""
 
 
 class ChannelConfig(FrozenModel):
@@ -523,8 +597,12 @@ class Rig(FrozenModel):
     generator: GeneratorConfig
     amplifier: AmplifierConfig
     shaker: ShakerConfig
-    vibrometer: VibrometerConfig
+    vibrometer: VibrometerConfig | None = None
+    """Sensor of the channel ``m0_velocity``; absent where another sensor shows m0."""
     accelerometer: AccelerometerConfig
+    """Sensor of the channel ``base_acceleration``."""
+    sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
+    """Sensors of all other channels, by role."""
     daq: DaqConfig
     specimen: SpecimenConfig
     controller: ControllerConfig | None = None
@@ -534,6 +612,41 @@ class Rig(FrozenModel):
     """How long a bench check that passed allows to arm [h]."""
     virtual: VirtualConfig | None = None
     """Present when every instrument is simulated."""
+
+    @model_validator(mode="after")
+    def _has_sensors(self) -> Self:
+        for role, sensor in self.sensors.items():
+            if role.quantity == "voltage":
+                raise ValueError(f"sensors.{role}: a voltage comes by wire; leave the table out")
+            if role in (Role.BASE_ACCELERATION, Role.M0_VELOCITY):
+                table = "accelerometer" if role is Role.BASE_ACCELERATION else "vibrometer"
+                raise ValueError(f"sensors.{role}: describe it in the table [{table}]")
+            try:
+                sensor.units_per_volt(role.unit)
+            except ValueError as error:
+                raise ValueError(f"sensors.{role}.sensitivity: {error}") from error
+        for channel in self.daq.channels:
+            role = channel.role
+            is_described = role.quantity == "voltage" or self.sensor(role) is not None
+            if not is_described and (channel.sensor is None or self.virtual is not None):
+                table = "vibrometer" if role is Role.M0_VELOCITY else f"sensors.{role}"
+                raise ValueError(
+                    f"the channel {role} has no sensor; add the table [{table}] (docs/configuration.md)"
+                )
+        if self.controller is not None and self.vibrometer is None:
+            raise ValueError("a controller samples the velocity of m0; add the table [vibrometer]")
+        return self
+
+    def sensor(self, role: Role) -> SensorConfig | None:
+        """Return the sensor of a channel; None for a voltage, and where none is described."""
+        described = {Role.BASE_ACCELERATION: self.accelerometer, Role.M0_VELOCITY: self.vibrometer}
+        return described.get(role, self.sensors.get(role))
+
+    @property
+    def response(self) -> Role | None:
+        """Channel that shows the motion of m0, the first of RESPONSE_ROLES; None without one."""
+        roles = {channel.role for channel in self.daq.channels}
+        return next((role for role in RESPONSE_ROLES if role in roles), None)
 
     @model_validator(mode="after")
     def _grid_carries_the_sample_rate(self) -> Self:
@@ -569,13 +682,18 @@ class Rig(FrozenModel):
     def knobs(self) -> tuple[Knob, ...]:
         """Everything that is set by hand."""
         amplifier, vibrometer = self.amplifier, self.vibrometer
-        return (
+        knobs = (
             Knob(instrument=amplifier.model, setting="gain", value=f"{amplifier.gain_db:g} dB"),
             Knob(
                 instrument=amplifier.model,
                 setting="current limit",
                 value=f"{amplifier.current_limit_a.value:g} A rms",
             ),
+        )
+        if vibrometer is None:
+            return knobs
+        return (
+            *knobs,
             Knob(
                 instrument=vibrometer.model,
                 setting="velocity range",

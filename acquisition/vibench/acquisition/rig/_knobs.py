@@ -27,26 +27,14 @@ class Sensor(Protocol):
 
 
 _USUAL: Mapping[Role, str] = MappingProxyType(
-    {
-        Role.DRIVE_VOLTAGE: "wire",
-        Role.AMPLIFIER_VOLTAGE: "wire",
-        Role.BASE_ACCELERATION: "accelerometer",
-        Role.M0_VELOCITY: "vibrometer",
-    }
-)
-_RECORDED: Mapping[Role, tuple[str, str]] = MappingProxyType(
-    {
-        Role.DRIVE_VOLTAGE: ("voltage", "V"),
-        Role.AMPLIFIER_VOLTAGE: ("voltage", "V"),
-        Role.BASE_ACCELERATION: ("acceleration", "m s-2"),
-        Role.M0_VELOCITY: ("velocity", "m s-1"),
-    }
+    {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
 )
 
 
 def sensor_name(config: ChannelConfig) -> str:
     """Name the sensor in front of an input: the one that is given, or the usual one of its role."""
-    return config.sensor or _USUAL[config.role]
+    usual = "wire" if config.role.quantity == "voltage" else "transducer"
+    return config.sensor or _USUAL.get(config.role, usual)
 
 
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
@@ -57,8 +45,8 @@ def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """
     name = sensor_name(config)
     facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
-    if (facts.quantity, facts.unit) != _RECORDED[config.role]:
-        quantity, unit = _RECORDED[config.role]
+    quantity, unit = config.role.quantity, config.role.unit
+    if (facts.quantity, facts.unit) != (quantity, unit):
         raise ConfigurationError(
             f"the sensor {name!r} of {config.physical} tells of {facts.quantity} in {facts.unit!r}, and "
             f"{config.role.value} records {quantity} in {unit!r}; give the channel another role or sensor"
@@ -75,22 +63,26 @@ def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
     return SensorFacts("voltage", "V", 1.0, float("inf"), "the amplifier's input, by wire")
 
 
-def accelerometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the accelerometer of the hardware configuration."""
-    del config
-    a = rig.accelerometer
-    per_volt = 1 / a.sensitivity_v_per_m_per_s2
+def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
+    """Return the sensor that the hardware configuration describes for a channel.
+
+    Raises ConfigurationError when it describes none.
+    """
+    role, sensor = config.role, rig.sensor(config.role)
+    if sensor is None:
+        raise ConfigurationError(
+            f"the channel {role.value} has no sensor; add the table [sensors.{role.value}]"
+        )
     return SensorFacts(
-        "acceleration", "m s-2", per_volt, a.full_scale_v, a.model, a.serial, calibrated=a.calibrated
+        role.quantity,
+        role.unit,
+        sensor.units_per_volt(role.unit),
+        sensor.full_scale_v,
+        sensor.name,
+        sensor.serial,
+        sensor.delay_s,
+        sensor.calibrated,
     )
-
-
-def vibrometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the vibrometer of the hardware configuration."""
-    del config
-    v = rig.vibrometer
-    per_volt, name = v.range_mm_per_s_per_v * 1e-3, f"{v.model} {v.decoder}"
-    return SensorFacts("velocity", "m s-1", per_volt, v.full_scale_v, name, v.serial, v.delay_s, v.calibrated)
 
 
 @dataclass(frozen=True)
@@ -101,7 +93,7 @@ class Channel:
     physical: str
     """Full name at the converter: ``"cDAQ1Mod1/ai2"``."""
     quantity: str
-    """``"voltage"``, ``"acceleration"`` or ``"velocity"``."""
+    """``"voltage"``, ``"acceleration"``, ``"force"``."""
     unit: str
     """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: float
@@ -329,13 +321,14 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
         Their ages are counted to it.
     """
     channels = channels_of(rig)
-    sensors = {channel.sensor: channel.sensor_calibrated for channel in channels if channel.sensor_calibrated}
-    inputs = {
-        f"{channel.physical} of {rig.daq.product}": channel.converter_calibrated for channel in channels
-    }
+    sensors = dict.fromkeys(
+        (each.sensor, each.serial, each.sensor_calibrated) for each in channels if each.sensor_calibrated
+    )
+    dates = [(sensor, calibrated) for sensor, _, calibrated in sensors]
+    dates += [(f"{each.physical} of {rig.daq.product}", each.converter_calibrated) for each in channels]
     return tuple(
         Calibration(what, calibrated, (today - calibrated).days, rig.calibration_valid_days)
-        for what, calibrated in (*sensors.items(), *inputs.items())
+        for what, calibrated in dates
     )
 
 

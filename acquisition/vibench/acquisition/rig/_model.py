@@ -37,10 +37,29 @@ class BaseQuantity(StrEnum):
     """Acceleration of the table [m/s2]."""
     AMPLITUDE = "amplitude"
     """Amplitude of the specimen: displacement of m0 against the table [m]."""
+    M0_DISPLACEMENT = "m0_displacement"
+    """Motion of m0, absolute [m]."""
     M0_VELOCITY = "m0_velocity"
-    """Velocity of m0, absolute, as a vibrometer sees it [m/s]."""
+    """[m/s]"""
+    M0_ACCELERATION = "m0_acceleration"
+    """[m/s2]"""
     P = "p"
     """Of m1 against m2 [m]."""
+
+
+_COLUMNS = {
+    BaseQuantity.AMPLIFIER_VOLTAGE: (_VOLTAGE, 0),
+    BaseQuantity.CURRENT: (_CURRENT, 0),
+    BaseQuantity.FORCE: (_CURRENT, 0),
+    BaseQuantity.STROKE: (_BASE, 0),
+    BaseQuantity.VELOCITY: (_BASE, 1),
+    BaseQuantity.ACCELERATION: (_BASE, 2),
+    BaseQuantity.M0_DISPLACEMENT: (_M0, 0),
+    BaseQuantity.M0_VELOCITY: (_M0, 1),
+    BaseQuantity.M0_ACCELERATION: (_M0, 2),
+    BaseQuantity.P: (_P, 0),
+}
+"""Column of the motion, and the power of i w that it is multiplied by."""
 
 
 class OnTable(StrEnum):
@@ -107,25 +126,13 @@ class RigModel:
     def _of(self, quantity: BaseQuantity, frequency_hz: ArrayLike, moved: ComplexArray) -> ComplexArray:
         hz = np.asarray(frequency_hz, dtype=np.float64)
         s = 2j * np.pi * hz.ravel()
-        match quantity:
-            case BaseQuantity.AMPLIFIER_VOLTAGE:
-                result = moved[:, _VOLTAGE]
-            case BaseQuantity.CURRENT:
-                result = moved[:, _CURRENT]
-            case BaseQuantity.FORCE:
-                result = self.rig.shaker.force_constant_n_per_a * moved[:, _CURRENT]
-            case BaseQuantity.STROKE:
-                result = moved[:, _BASE]
-            case BaseQuantity.VELOCITY:
-                result = s * moved[:, _BASE]
-            case BaseQuantity.ACCELERATION:
-                result = s**2 * moved[:, _BASE]
-            case BaseQuantity.AMPLITUDE:
-                result = moved[:, _M0] - moved[:, _BASE]
-            case BaseQuantity.M0_VELOCITY:
-                result = s * moved[:, _M0]
-            case BaseQuantity.P:
-                result = moved[:, _P]
+        if quantity is BaseQuantity.AMPLITUDE:
+            result = moved[:, _M0] - moved[:, _BASE]
+        else:
+            column, order = _COLUMNS[quantity]
+            result = s**order * moved[:, column]
+        if quantity is BaseQuantity.FORCE:
+            result *= self.rig.shaker.force_constant_n_per_a
         return np.asarray(result.reshape(hz.shape), dtype=np.complex128)
 
 

@@ -68,21 +68,24 @@ class BaseTracker:
 class SpecimenTracker:
     """Follows the main mass against the base: what its springs are stretched by.
 
-    The vibrometer's velocity passes the same high pass as the base's, so that both have the same
-    phase and their difference is right at low frequencies too.
+    Each integral that the sensor of m0 does not need is a high pass instead, so that both motions have the
+    same phase and their difference is right at low frequencies too.
     """
 
-    def __init__(self, sample_rate_hz: float) -> None:
-        self._high_pass = _high_pass(sample_rate_hz)
-        self._to_displacement = _integrator(sample_rate_hz)
+    def __init__(self, sample_rate_hz: float, role: Role = Role.M0_VELOCITY) -> None:
+        self._role = role
+        self._to_velocity = (_integrator if role is Role.M0_ACCELERATION else _high_pass)(sample_rate_hz)
+        self._to_displacement = (_high_pass if role is Role.M0_DISPLACEMENT else _integrator)(sample_rate_hz)
 
-    def follow(self, mass_velocity: Samples, base_velocity: Samples, is_blind: NDArray[np.bool_]) -> Samples:
-        """Return the displacement of the mass relative to the base [m] for the next velocities [m/s].
+    def follow(self, mass: Samples, base: BaseMotion, is_blind: NDArray[np.bool_]) -> Samples:
+        """Return the displacement of the mass relative to the base [m] for the next samples of its sensor.
 
-        Where the vibrometer is past its range (``is_blind``) it shows no motion, and none is assumed.
+        Where the sensor is past its range (``is_blind``) it shows no motion, and none is assumed.
         """
-        relative = self._high_pass.run(np.where(is_blind, 0.0, mass_velocity)) - base_velocity
-        return self._to_displacement.run(np.where(is_blind, 0.0, relative))
+        moved = self._to_velocity.run(np.where(is_blind, 0.0, mass))
+        if self._role is Role.M0_DISPLACEMENT:
+            return np.where(is_blind, 0.0, self._to_displacement.run(moved) - base.displacement)
+        return self._to_displacement.run(np.where(is_blind, 0.0, moved - base.velocity))
 
 
 RMS_S = 1.0
@@ -126,6 +129,7 @@ class LimitMonitor:
         self._rate_hz = sample_rate_hz
         self._next_sample = 0
         self._change: LimitExceeded | None = None
+        self._response = rig.response or Role.M0_VELOCITY
         self._begin(0)
 
     def require_safe(self, block: Block) -> None:
@@ -146,7 +150,7 @@ class LimitMonitor:
         """Take a change of the specimen, seen at a sample; the next block raises it if the plan says so."""
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
             trip = LimitTrip(
-                channel=Role.M0_VELOCITY.value,
+                channel=self._response.value,
                 quantity="change of the specimen",
                 value=1.0,
                 limit=0.0,
@@ -164,7 +168,7 @@ class LimitMonitor:
     def _begin(self, first_sample: int) -> None:
         self._settled_sample = first_sample + round(SETTLING_S * self._rate_hz)
         self._base = BaseTracker(self._rate_hz)
-        self._specimen = SpecimenTracker(self._rate_hz)
+        self._specimen = SpecimenTracker(self._rate_hz, self._response)
         self._mean_square_a2 = 0.0
 
     def _monitored_quantities(self, block: Block) -> Iterator[_MonitoredQuantity]:
@@ -184,8 +188,8 @@ class LimitMonitor:
         integrated = (
             [] if acceleration is None else [*self._at_the_base(base), self._table(acceleration, base)]
         )
-        if Role.M0_VELOCITY in rows:
-            integrated.append(self._in_the_specimen(rows[Role.M0_VELOCITY], base, block))
+        if self._response in rows:
+            integrated.append(self._in_the_specimen(rows[self._response], base, block))
         if is_settled:
             yield from integrated
 
@@ -255,12 +259,12 @@ class LimitMonitor:
         self._mean_square_a2 += share * (float(np.mean(current**2)) - self._mean_square_a2)
         return sqrt(self._mean_square_a2)
 
-    def _in_the_specimen(self, velocity: Samples, base: BaseMotion, block: Block) -> _MonitoredQuantity:
+    def _in_the_specimen(self, moved: Samples, base: BaseMotion, block: Block) -> _MonitoredQuantity:
         limit = self._rig.specimen.amplitude_limit_m
-        stretched = self._specimen.follow(velocity, base.velocity, _blind(block))
+        stretched = self._specimen.follow(moved, base, _blind(block, self._response))
         allowed = limit.value * self._limits.specimen_amplitude
         return _MonitoredQuantity(
-            Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source
+            self._response, "the specimen's amplitude", stretched, allowed, "m", limit.source
         )
 
     def _require(self, monitored: _MonitoredQuantity, first_sample: int) -> None:
@@ -307,11 +311,11 @@ class LimitMonitor:
         )
 
 
-def _blind(block: Block) -> NDArray[np.bool_]:
-    """Mark the samples of a block in which the vibrometer is past its range."""
+def _blind(block: Block, role: Role) -> NDArray[np.bool_]:
+    """Mark the samples of a block in which a sensor is past its range."""
     is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
     for overload in block.overloads:
-        if overload.channel == Role.M0_VELOCITY.value:
+        if overload.channel == role.value:
             first = max(overload.first_sample - block.first_sample, 0)
             is_blind[first : max(overload.last_sample - block.first_sample + 1, 0)] = True
     return is_blind

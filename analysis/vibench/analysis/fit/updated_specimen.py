@@ -306,14 +306,14 @@ def _linear(
     if not results.noise:
         not_told.append("Damping and frequencies stay as the bench says: no noise was recorded.")
         return None
-    weakest = results.noise[0].analysis.response
+    facts, weakest = results.noise[0].analysis.facts, results.noise[0].analysis.response
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
         return fit_specimen(
             weakest.frequency_response,
             nominal,
             free,
-            scale_sd=stated_uncertainties(results.noise[0].analysis.facts.bench).scale_sd,
+            scale_sd=stated_uncertainties(facts.bench, facts.response).scale_sd,
             is_nonlinear=is_nonlinear,
         )
     except NotEnoughData as error:

@@ -1,14 +1,15 @@
 """What sensors do to the two channels, undone by short symmetric filters."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from vibench.acquisition.recording import coupling_cut_hz
 
+from ..recordings.channels import SensedChannel, sensor_gain
 from ..signals.arrays import Complexes, Reals
 
 HALF_LENGTH = 16
@@ -18,20 +19,6 @@ _EXACT_BAND = 0.42
 _FIT_POINTS = 400
 _REST_WEIGHT = 1e-3
 """Above the band the filter is only kept from growing."""
-_ASSUMED_DAMPING_RATIO = 0.02
-"""Of an accelerometer's mounted resonance; a certificate rarely says it, and far below it does not matter."""
-
-
-class Sensed(Protocol):
-    """A channel, of a recording or of a bench, as far as its sensor is undone."""
-
-    @property
-    def delay_s(self) -> float:
-        """Lag of the sensor [s]."""
-
-    @property
-    def coupling(self) -> str:
-        """AC or DC."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +40,17 @@ class SensorCorrection:
 
 
 def sensor_correction(
-    bench: Mapping[str, Any], base: Sensed, response: Sensed, sample_rate_hz: float
+    bench: Mapping[str, Any], base: SensedChannel, response: SensedChannel, sample_rate_hz: float
 ) -> SensorCorrection:
     """Design the filters from what a recording says of its sensors; what it leaves out is ideal."""
-    resonance_hz = float(bench.get("accelerometer", {}).get("resonance_hz") or math.inf)
-    bandwidth_hz = float(bench.get("vibrometer", {}).get("bandwidth_hz") or math.inf)
-    rest_s = response.delay_s - (1.0 / (2.0 * np.pi * bandwidth_hz))
 
-    def accelerometer(frequency_hz: Reals) -> Complexes:
-        ratio = frequency_hz / resonance_hz
-        seen = 1.0 / (1.0 - ratio**2 + 2j * _ASSUMED_DAMPING_RATIO * ratio)
+    def base_gain(frequency_hz: Reals) -> Complexes:
         interpolation = np.sinc(frequency_hz / sample_rate_hz) ** 2
-        return np.asarray(np.exp(-2j * np.pi * frequency_hz * base.delay_s) * seen * interpolation)
-
-    def vibrometer(frequency_hz: Reals) -> Complexes:
-        return np.asarray(
-            np.exp(-2j * np.pi * frequency_hz * rest_s) / (1.0 + 1j * frequency_hz / bandwidth_hz)
-        )
+        return np.asarray(sensor_gain(bench, base, frequency_hz) * interpolation)
 
     return SensorCorrection(
-        acceleration=_inverse(accelerometer, sample_rate_hz),
-        velocity=_inverse(vibrometer, sample_rate_hz),
+        acceleration=_inverse(base_gain, sample_rate_hz),
+        velocity=_inverse(partial(sensor_gain, bench, response), sample_rate_hz),
         coupling_rad_per_s=2.0 * np.pi * coupling_cut_hz(base.coupling),
     )
 

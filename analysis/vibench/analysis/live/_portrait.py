@@ -6,9 +6,10 @@ import numpy as np
 from scipy import fft
 
 from ..signals.arrays import Reals
+from ..signals.quantity import Quantity
 from ..tables import Labelled
 from ._ring import RingWindow
-from ._sine_response import displacement_of, drive_tone, drive_turns, look_samples
+from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25
@@ -35,7 +36,13 @@ class Portrait(Labelled):
 
 
 def portrait(
-    window: RingWindow, drive_row: int, response_row: int, sample_rate_hz: float, *, delay_s: float = 0.0
+    window: RingWindow,
+    drive_row: int,
+    response_row: int,
+    sample_rate_hz: float,
+    quantity: Quantity = Quantity.VELOCITY,
+    *,
+    delay_s: float = 0.0,
 ) -> Portrait | None:
     """Draw the newest periods; None when no sine is playing, or too few samples are there.
 
@@ -45,6 +52,8 @@ def portrait(
         Samples in physical units, about `portrait_samples` of them.
     delay_s
         By how much the response channel lags the drive channel.
+    quantity
+        Quantity of the response's channel.
     """
     look = look_samples(sample_rate_hz)
     drive = np.asarray(window.values[drive_row], dtype=np.float64)
@@ -54,20 +63,19 @@ def portrait(
     count = portrait_samples(tone.frequency_hz, sample_rate_hz)
     if drive.size < count:
         return None
-    velocity = np.asarray(window.values[response_row, -count:], dtype=np.float64)
-    displacement = displacement_of(velocity, sample_rate_hz, tone.frequency_hz)
+    response = np.asarray(window.values[response_row, -count:], dtype=np.float64)
+    displacement, velocity = motion_of(response, sample_rate_hz, tone.frequency_hz, quantity)
     edge = (count - displacement.size) // 2
     turns = drive_turns(drive[-count:], sample_rate_hz, tone.frequency_hz) + delay_s * sample_rate_hz
     turns = turns[(turns >= edge) & (turns <= edge + displacement.size - 1)]
     stride = max(1, int(sample_rate_hz / tone.frequency_hz / POINTS_A_PERIOD))
     place = np.arange(displacement.size)
-    settled = velocity[edge : edge + displacement.size]
     return Portrait(
         drive_hz=tone.frequency_hz,
         orbit_displacement_m=displacement[::stride],
-        orbit_velocity_m_per_s=settled[::stride],
+        orbit_velocity_m_per_s=velocity[::stride],
         strobe_displacement_m=np.interp(turns - edge, place, displacement),
-        strobe_velocity_m_per_s=np.interp(turns - edge, place, settled),
+        strobe_velocity_m_per_s=np.interp(turns - edge, place, velocity),
         strobe_sample=turns + (window.stop_sample - count),
     )
 

@@ -1,7 +1,7 @@
 """Responses I and II of the newest stretch of a sine or a slow sweep, point by point as it goes."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy import fft
@@ -131,7 +131,12 @@ def look_samples(sample_rate_hz: float) -> int:
     return fft.next_fast_len(round(_LOOK_S * sample_rate_hz), real=True)
 
 
-def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: float) -> SinePoint | None:
+def sine_point(
+    window: RingWindow,
+    rows: tuple[int, int, int],
+    sample_rate_hz: float,
+    quantity: Quantity = Quantity.VELOCITY,
+) -> SinePoint | None:
     """Make a point of the newest samples.
 
     None when they hold no sine, are too few, some were lost, or the drive is ramped down: m0 then rings
@@ -142,7 +147,9 @@ def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: f
     window
         Samples in physical units; more than are needed do no harm.
     rows
-        Which channels are drive, base acceleration and response velocity.
+        Which channels are drive, base acceleration and response.
+    quantity
+        Quantity of the response's channel.
     """
     look = look_samples(sample_rate_hz)
     newest = np.asarray(window.values[list(rows), -look:], dtype=np.float64)
@@ -158,7 +165,7 @@ def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: f
     if _is_ramped_down(stretch[0], sample_rate_hz):
         return None
     middle_s = (window.stop_sample - 0.5 * count) / sample_rate_hz
-    point = _point(stretch, sample_rate_hz, tone.frequency_hz)
+    point = _point(stretch, sample_rate_hz, tone.frequency_hz, quantity)
     return None if point is None else replace(point, time_s=middle_s)
 
 
@@ -172,7 +179,7 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
     return last.amplitude < _LEAST_KEPT * swept * first.amplitude
 
 
-def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint | None:
+def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity) -> SinePoint | None:
     """Take frequency, amplitudes and extremes from the same stretch: in a sweep they move together."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
@@ -182,9 +189,7 @@ def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint |
     turns = np.exp(-2j * np.pi * frequency_hz / sample_rate_hz * np.arange(stretch.shape[-1]))
     found: Complexes = np.asarray(stretch @ (values * turns), dtype=np.complex128)
     _, base, response = found * (2 / float(np.sum(values)))
-    displacement = displacement_of(stretch[2], sample_rate_hz, frequency_hz)
-    edge = (stretch.shape[1] - displacement.size) // 2
-    velocity = stretch[2, edge : edge + displacement.size]
+    displacement, velocity = motion_of(stretch[2], sample_rate_hz, frequency_hz, quantity)
     amplitude_m = float(abs(base)) / omega**2
     if displacement.size == 0 or amplitude_m == 0.0:
         return None
@@ -195,17 +200,24 @@ def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint |
         lower=float(velocity.min()),
         upper=float(velocity.max()),
         response_i=float(np.max(np.abs(displacement))) / amplitude_m,
-        response_ii=float(abs(response)) / omega / amplitude_m,
+        response_ii=float(abs(response)) * omega**-quantity.derivatives / amplitude_m,
     )
 
 
-def displacement_of(velocity: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
-    """Integrate a velocity around a drive frequency; both ends, which that disturbs, are left out."""
-    return converted_signal(
-        velocity,
+def motion_of(
+    response: Reals, sample_rate_hz: float, frequency_hz: float, quantity: Quantity
+) -> tuple[Reals, Reals]:
+    """Return displacement and velocity around a drive frequency, without the ends that are disturbed."""
+    converted = partial(
+        converted_signal,
+        response,
         sample_rate_hz,
-        given=Quantity.VELOCITY,
-        wanted=Quantity.DISPLACEMENT,
+        given=quantity,
         low_hz=_BAND_BELOW * frequency_hz,
         high_hz=min(_BAND_ABOVE_HZ, 0.5 * sample_rate_hz),
-    ).settled
+    )
+    displacement = converted(wanted=Quantity.DISPLACEMENT).settled
+    if quantity is not Quantity.VELOCITY:
+        return displacement, converted(wanted=Quantity.VELOCITY).settled
+    edge = (response.size - displacement.size) // 2
+    return displacement, response[edge : edge + displacement.size]

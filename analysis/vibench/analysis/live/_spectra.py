@@ -131,6 +131,7 @@ class LiveSpectra:
     def frequency_response(
         self,
         rows: Sequence[int],
+        quantity: Quantity = Quantity.VELOCITY,
         *,
         low_hz: float,
         high_hz: float,
@@ -142,8 +143,10 @@ class LiveSpectra:
         Parameters
         ----------
         rows
-            Which channels are the base acceleration, the response velocity and, for an estimate
-            that noise on both does not bias, the drive voltage.
+            Which channels are the base acceleration, the response and, for an estimate that noise on both
+            does not bias, the drive voltage.
+        quantity
+            Quantity of the response's channel.
         low_hz, high_hz
             The band that is looked at.
         delay_s
@@ -166,7 +169,7 @@ class LiveSpectra:
         return converted_frequency_response(
             found.without_delay(delay_s),
             drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
-            response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
+            response=(quantity, Quantity.DISPLACEMENT),
         )
 
     def _averages(self, used: Flags, rows: Sequence[int], lines: int) -> SpectralAverages:

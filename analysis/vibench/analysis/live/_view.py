@@ -5,13 +5,16 @@ The history of a sine or a sweep so far: responses and extremes against the freq
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..frequency_response.results import FrequencyResponse
 from ..recordings.channels import BASE, DRIVE, RESPONSE
+from ..recordings.response import RESPONSE_ROLES
 from ..signals.arrays import Reals
+from ..signals.quantity import Quantity
 from ._levels import Level, LevelMeters
 from ._outline import Samples, column_starts, outline
 from ._portrait import PoincareSection, Portrait, portrait, portrait_samples
@@ -19,7 +22,7 @@ from ._ring import Ring, Values
 from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
 from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSettings
 
-# Impacts as the vibrometer sees them: kinks in the motion of m0, counted as they come.
+# Impacts as the sensor of m0 shows them: kinks in its motion, counted as they come.
 #
 # m1 and m2 strike each other; their jump in velocity reaches m0 through springs and dampers: within one
 # contact its acceleration steps, and changes its slope. The shape of that kink is the same for every
@@ -57,13 +60,13 @@ _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
 
 
 class ImpactCounter:
-    """Counts kinks in a velocity that comes block by block."""
+    """Counts kinks in a motion that comes block by block."""
 
-    def __init__(self, sample_rate_hz: float) -> None:
+    def __init__(self, sample_rate_hz: float, quantity: Quantity = Quantity.VELOCITY) -> None:
         span = max(1, round(_SPAN_S * sample_rate_hz))
         self._difference = np.zeros(6 * span + 1)
         self._difference[::span] = _SIXTH_DIFFERENCE
-        kink = _kink(self._difference, sample_rate_hz)
+        kink = _kink(self._difference, sample_rate_hz, 3 - quantity.derivatives)
         power = float(kink @ kink)
         # What a difference of the samples is correlated with, all in one: samples in, strength of a kink out.
         self._finder = np.convolve(self._difference, kink[::-1]) / power
@@ -77,13 +80,13 @@ class ImpactCounter:
         self.count = 0
         """Impacts so far."""
 
-    def add(self, velocity: Values | Reals) -> int:
+    def add(self, motion: Values | Reals) -> int:
         """Take the next samples, shape (samples,), lost ones NaN; gives how many impacts were found."""
-        starts = range(0, max(1, len(velocity)), self._most)
-        return sum(self._add_piece(velocity[first : first + self._most]) for first in starts)
+        starts = range(0, max(1, len(motion)), self._most)
+        return sum(self._add_piece(motion[first : first + self._most]) for first in starts)
 
-    def _add_piece(self, velocity: Values | Reals) -> int:
-        data = np.concatenate((self._carry, np.asarray(velocity, dtype=np.float64)))
+    def _add_piece(self, motion: Values | Reals) -> int:
+        data = np.concatenate((self._carry, np.asarray(motion, dtype=np.float64)))
         # A kink is separated from what its neighbours leave, so its surroundings must be there.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
         if fresh < self._least_fresh:
@@ -138,13 +141,14 @@ def _noise(data: Reals) -> float:
     return max(quiet, float(np.finfo(np.float32).eps * np.max(np.abs(known))))
 
 
-def _kink(difference: Reals, sample_rate_hz: float) -> Reals:
-    """Return what the difference makes of the velocity after one impact of unit change of slope."""
+def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
+    """Return what the difference makes of the motion after one impact, which grows as t^power / power!."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)
-    velocity = np.mean(0.5 * since**2 + _DAMPING_TIME_S * since, axis=1)
-    shape = np.convolve(velocity, difference, mode="valid")
+    step = (since > 0) * since ** (power - 1) / factorial(power - 1)
+    motion = np.mean(since * step / power + _DAMPING_TIME_S * step, axis=1)
+    shape = np.convolve(motion, difference, mode="valid")
     seen = np.flatnonzero(np.abs(shape) > 1e-3 * np.abs(shape).max())
     return np.asarray(shape[seen[0] : seen[-1] + 1])
 
@@ -198,7 +202,6 @@ HELD_S = 10.0
 _POINT_EVERY_S = 0.1
 """Points of a sweep's course, and portraits, change this often; the other pictures with every frame."""
 _LOWEST_DRIVE_HZ = 10.0
-_FREQUENCY_RESPONSE_ROLES = (BASE, RESPONSE, DRIVE)
 
 
 @dataclass(frozen=True)
@@ -257,7 +260,9 @@ class LiveView:
         self._rows = {each.role: row for row, each in enumerate(channels)}
         self._ring = Ring(len(channels), round(HELD_S * sample_rate_hz))
         self._spectra = LiveSpectra(len(channels), sample_rate_hz, settings)
-        self._impacts = ImpactCounter(sample_rate_hz)
+        self._response = next((role for role in RESPONSE_ROLES if role in self._rows), RESPONSE)
+        self._quantity = Quantity(self._response.partition("_")[2])
+        self._impacts = ImpactCounter(sample_rate_hz, self._quantity)
         self._meters = LevelMeters(np.array([each.full_scale_v for each in channels]), sample_rate_hz)
         self.levels: tuple[Level, ...] = ()
         """Meters, in the order of the channels; empty before the first sample."""
@@ -283,9 +288,9 @@ class LiveView:
             return
         self._spectra.add(fresh)
         self.levels = self._meters.add(fresh / self._units_per_volt)
-        if RESPONSE in self._rows:
-            self._impacts.add(fresh[self._rows[RESPONSE]])
-        if self._has(DRIVE, BASE, RESPONSE) and self._is_point_due():
+        if self._response in self._rows:
+            self._impacts.add(fresh[self._rows[self._response]])
+        if self._has(DRIVE, BASE, self._response) and self._is_point_due():
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
@@ -303,13 +308,14 @@ class LiveView:
 
     def frequency_response(self) -> FrequencyResponse | None:
         """Return |x / U| of the newest segments, with coherence and bounds; None before two of them."""
-        if not self._has(BASE, RESPONSE):
+        if not self._has(BASE, self._response):
             return None
         if self._frequency_response[0] != self._spectra.segments:
-            rows = [self._rows[role] for role in _FREQUENCY_RESPONSE_ROLES if role in self._rows]
+            wanted = (BASE, self._response, DRIVE)
+            rows = [self._rows[role] for role in wanted if role in self._rows]
             low_hz, high_hz = self._band_hz
             found = self._spectra.frequency_response(
-                rows, low_hz=low_hz, high_hz=high_hz, delay_s=self._delay_s
+                rows, self._quantity, low_hz=low_hz, high_hz=high_hz, delay_s=self._delay_s
             )
             self._frequency_response = (self._spectra.segments, found)
         return self._frequency_response[1]
@@ -321,7 +327,7 @@ class LiveView:
 
     def portrait(self) -> Portrait | None:
         """Return the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
-        if not self._has(DRIVE, RESPONSE):
+        if not self._has(DRIVE, self._response):
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
             return self._portrait[1]
@@ -330,8 +336,9 @@ class LiveView:
         found = portrait(
             self._ring.newest(wanted),
             self._rows[DRIVE],
-            self._rows[RESPONSE],
+            self._rows[self._response],
             self._rate_hz,
+            self._quantity,
             delay_s=self._delay_s,
         )
         if found is not None and np.all(found.strobe_sample >= self._lead_in):
@@ -362,8 +369,8 @@ class LiveView:
         self._pointed = self._ring.next_sample
         lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * self._band_hz[0])
         wanted = max(stretch_samples(lowest_hz, self._rate_hz), look_samples(self._rate_hz))
-        rows = (self._rows[DRIVE], self._rows[BASE], self._rows[RESPONSE])
+        rows = (self._rows[DRIVE], self._rows[BASE], self._rows[self._response])
         newest = self._ring.newest(min(wanted, self._settled()))
-        point = sine_point(newest, rows, self._rate_hz)
+        point = sine_point(newest, rows, self._rate_hz, self._quantity)
         if point is not None:
             self._trace.add(point)

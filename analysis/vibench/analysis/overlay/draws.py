@@ -17,7 +17,8 @@ from vibench.sim.shaker.loaded_shaker import MotionFailed
 from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, DRIVE, RESPONSE, RecordedChannels
+from ..recordings.channels import BASE, DRIVE, RecordedChannels
+from ..recordings.response import VELOCITY, velocity_noise
 from ..signals.arrays import Reals, Samples
 from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
@@ -56,7 +57,10 @@ class PlayedVoltage:
         self._frames = 1 - (-volts.size // self._hop)
         """They overlap by half; the first begins and the last ends half a frame outside."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
-        self._likely, self._roots = (volts, []) if converter_rms_v == 0.0 else self._parts(volts)
+        self._likely: Samples = volts
+        self._roots: list[Samples] = []
+        if converter_rms_v > 0.0:
+            self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
         """Give the likely voltage, and roots of the recorded shares, by line in batches of frames."""
@@ -398,12 +402,11 @@ def _moved(
         )
     except MotionFailed as error:
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
-    for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity)):
-        for first in range(0, seen.size, _BLOCK):
-            block = seen[first : first + _BLOCK]
-            drawn = rng.standard_normal(block.size, np.float32)
-            drawn *= np.float32(noise.rms[role])
-            block += drawn
+    for role, seen in ((BASE, motion.base_acceleration), (rig.response, motion.m0_velocity)):
+        rate_hz, first = recording.sample_rate_hz, 0
+        for block in velocity_noise(role, rate_hz, seen.size, _BLOCK, rng):
+            seen[first : first + block.size] += np.float32(noise.rms[role]) * block
+            first += block.size
     return motion
 
 
@@ -430,13 +433,13 @@ class StretchDraws:
     def measured(self) -> Reals:
         """Base acceleration and m0's velocity of the recording, over the same samples as a draw's."""
         start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
-        velocity = BridgedChannel(self.recording, RESPONSE).read(start, stop)
+        velocity = BridgedChannel(self.recording, VELOCITY).read(start, stop)
         return np.stack([self.recording.read(BASE, start, stop), velocity])
 
     @property
     def noise_rms(self) -> Reals:
         """White noise of base acceleration [m/s2] and m0's velocity [m/s], per sample."""
-        return np.array([self.noise.rms[role] for role in (BASE, RESPONSE)])
+        return np.array([self.noise.rms[role] for role in (BASE, VELOCITY)])
 
     def draw(self, specimen: Specimen, rng: np.random.Generator) -> Reals:
         """Give base acceleration [m/s2] and m0's velocity [m/s] of a run, noise included; shape (2, samples).
@@ -460,8 +463,14 @@ def stretch_draws(
 
     Where the recording ends there, the stretch ends a little earlier.
 
-    Raises UnusableData when samples were lost there, or nothing is known of the shaker.
+    Raises UnusableData when samples were lost there, nothing is known of the shaker, or m0 is not shown by a
+    velocity: an integrated channel has no white noise.
     """
+    if VELOCITY not in recording.roles:
+        raise UnusableData(
+            f"statistics of irregular motion need the white noise of the channel {VELOCITY}, and the "
+            f"recording has {', '.join(recording.roles)}; measure with a vibrometer"
+        )
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     rate = recording.sample_rate_hz
     first, last = max(0, start - round(_LEAD_S * rate)), min(recording.samples, stop + round(_TAIL_S * rate))
@@ -470,7 +479,7 @@ def stretch_draws(
     for end, fade_s in ((volts, _FADE_S), (volts[::-1], _TAIL_S)):
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
-    noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
+    noise = channel_noise(recording, (rig.role, BASE, VELOCITY))
     # Noise of this channel would shake the simulated table: only lines far above it are played.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0

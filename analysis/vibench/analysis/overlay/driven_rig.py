@@ -14,7 +14,8 @@ from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, DRIVE, RESPONSE, sensor_gain
+from ..recordings.channels import BASE, DRIVE, sensor_gain
+from ..recordings.response import ResponseChannel
 from ..signals.arrays import Reals
 
 AMPLIFIER = "amplifier_voltage"
@@ -42,12 +43,14 @@ class DrivenRig:
     driven: Driven
     role: str
     """Role of the channel that holds the voltage."""
+    response: str
+    """Role of the channel that shows m0."""
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
     """Return what the recorded voltage was played into.
 
-    Raises UnusableData when the recording does not name its shaker or amplifier, or has no velocity of m0.
+    Raises UnusableData when the recording does not name its shaker or amplifier, or does not show m0.
 
     Parameters
     ----------
@@ -58,11 +61,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
     shaker
         Its numbers, as fitted; by default those of the bench configuration.
     """
-    if RESPONSE not in recording.roles:
-        raise UnusableData(
-            f"simulated draws add the noise of a velocity, and the recording has no channel {RESPONSE}; its "
-            "other results need none"
-        )
+    response = ResponseChannel(recording).role
     rig = _configured(recording)
     if AMPLIFIER in recording.roles:
         amplifier, driven, role = Amplifier(), Driven.AMPLIFIER, AMPLIFIER
@@ -76,7 +75,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
                 "noise of the same rig, to which a shaker can be fitted"
             )
         shaker = shaker_of(rig)
-    base, m0 = (recording.channel(each) for each in (BASE, RESPONSE))
+    base, m0 = (recording.channel(each) for each in (BASE, response))
     table = DrivenTable(
         amplifier,
         shaker,
@@ -85,7 +84,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         partial(sensor_gain, recording.bench, m0),
         coupling_cut_hz(base.coupling),
     )
-    return DrivenRig(table, driven, role)
+    return DrivenRig(table, driven, role, response)
 
 
 def says_shaker(recording: Recording) -> bool:

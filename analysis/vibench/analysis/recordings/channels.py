@@ -8,7 +8,6 @@ import numpy as np
 
 from vibench.acquisition.recording import (
     REJECTED,
-    ChannelHeader,
     Recording,
     SegmentLabel,
     coupling_cut_hz,
@@ -18,41 +17,57 @@ from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Reals
 from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
 
-ACCELEROMETER_DAMPING_RATIO = 0.02
-"""Damping ratio of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
+SENSOR_DAMPING_RATIO = 0.02
+"""Damping ratio of a piezoelectric sensor's mounted resonance; usual for the kind."""
 
 
-def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
+class SensedChannel(Protocol):
+    """A channel, of a recording or of a bench, as far as its sensor is known."""
+
+    @property
+    def role(self) -> str:
+        """``"m0_velocity"``."""
+
+    @property
+    def delay_s(self) -> float:
+        """Lag of the sensor [s]."""
+
+    @property
+    def coupling(self) -> str:
+        """AC or DC."""
+
+
+def sensor_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
     """Complex gain of a channel over the motion that it shows, shape (lines,); 1 at low frequency.
 
-    The channel's delay as its header says it; of the base's accelerometer the mounted resonance, of the
-    vibrometer the bandwidth, whose own delay is part of the header's. A converter's coupling is left out.
+    The channel's delay as its header says it, the sensor's mounted resonance, and its bandwidth, whose own
+    delay is part of the header's. A converter's coupling is left out.
     """
-    s = 2j * np.pi * frequency_hz
-    delay_s = channel.delay_s
-    gain: Complexes = np.ones(frequency_hz.size, dtype=np.complex128)
-    match channel.quantity:
-        case "acceleration" if (
-            channel.role == BASE
-            and (resonance_hz := _number(bench, "accelerometer", "resonance_hz")) is not None
-        ):
-            part = frequency_hz / resonance_hz
-            gain = np.asarray(1 / (1 - part**2 + 2j * ACCELEROMETER_DAMPING_RATIO * part))
-        case "velocity" if (bandwidth_hz := _number(bench, "vibrometer", "bandwidth_hz")) is not None:
-            gain = np.asarray(1 / (1 + 1j * frequency_hz / bandwidth_hz))
-            delay_s -= 1 / (2 * np.pi * bandwidth_hz)
-    return np.asarray(gain * np.exp(-s * delay_s))
+    sensor = described_sensor(bench, channel.role)
+    part = frequency_hz / _number(sensor, "resonance_hz")
+    bandwidth_hz = _number(sensor, "bandwidth_hz")
+    delay_s = channel.delay_s - 1 / (2 * np.pi * bandwidth_hz)
+    gain = 1 / (1 - part**2 + 2j * SENSOR_DAMPING_RATIO * part) / (1 + 1j * frequency_hz / bandwidth_hz)
+    return np.asarray(gain * np.exp(-2j * np.pi * frequency_hz * delay_s))
 
 
-def coupled_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
+def coupled_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
     """Return the same with the channel's coupling, above 0 Hz."""
     coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel.coupling))
     return np.asarray(sensor_gain(bench, channel, frequency_hz) * coupling)
 
 
-def _number(bench: Mapping[str, Any], section: str, key: str) -> float | None:
-    said = (bench.get(section) or {}).get(key)
-    return float(said) if isinstance(said, int | float) and said > 0 else None
+def described_sensor(bench: Mapping[str, Any], role: str) -> Mapping[str, Any]:
+    """Return what a bench configuration says of the sensor of a channel; empty where it says nothing."""
+    table = {BASE: "accelerometer", VELOCITY: "vibrometer"}.get(role)
+    found = bench.get(table) if table else (bench.get("sensors") or {}).get(role)
+    return found or {}
+
+
+def _number(sensor: Mapping[str, Any], key: str) -> float:
+    """Return a frequency that a sensor states [Hz]; infinite where it states none."""
+    said = sensor.get(key)
+    return float(said) if isinstance(said, int | float) and said > 0 else np.inf
 
 
 OnRead = Callable[[int, int], None]

@@ -24,7 +24,7 @@ from vibench.sim import Specimen, SpecimenTable, fault_in_words
 from ..errors import UnusableData
 from .channel_levels import ChannelLevel, channel_levels
 from .channels import RESPONSE, OnRead, ignore_reading
-from .response import ACCELERATION, LOWEST_INTEGRATED_HZ, ResponseChannel, response_role
+from .response import ACCELERATION, LOWEST_INTEGRATED_HZ, VELOCITY, ResponseChannel, response_role
 
 MOST_BYTES = 1e9
 """Most bytes of memory, for what need not be checked against the file's size."""
@@ -96,6 +96,8 @@ class RecordingFacts(RecordingDescription):
     check: str
     """What the check of the bench found before the run; empty when it was left out."""
     seal: SealCheck
+    response: str = VELOCITY
+    """Channel whose motion is analysed."""
     feedback: tuple[FeedbackNote, ...] = ()
     """What a measurement with feedback found while it ran; empty for any other."""
     feedback_s: tuple[float, ...] = ()
@@ -160,6 +162,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         late=tuple(each.text for each in recording.events if each.kind == EventKind.LATE),
         check=recording.check_text,
         seal=seal,
+        response=response_role(recording) or VELOCITY,
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
     )
@@ -251,6 +254,7 @@ class _Bench(BaseModel):
     shaker: dict[str, JsonValue] | None = None
     vibrometer: dict[str, JsonValue] | None = None
     accelerometer: dict[str, JsonValue] | None = None
+    sensors: dict[str, dict[str, JsonValue]] | None = None
 
 
 class _Provenance(BaseModel):

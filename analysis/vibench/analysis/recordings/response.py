@@ -1,6 +1,6 @@
 """The velocity of m0, whichever sensor shows its motion: vibrometer, accelerometer or displacement probe."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
@@ -10,11 +10,12 @@ from scipy.fft import next_fast_len
 from scipy.special import sici
 
 from vibench.acquisition.recording import BridgedChannel, Dropout, Recording
+from vibench.acquisition.rig import RESPONSE_ROLES as ROLES
 
 from ..errors import UnusableData
-from ..signals.arrays import Reals
+from ..signals.arrays import Reals, Samples
 
-VELOCITY, ACCELERATION, DISPLACEMENT = RESPONSE_ROLES = ("m0_velocity", "m0_acceleration", "m0_displacement")
+VELOCITY, ACCELERATION, DISPLACEMENT = RESPONSE_ROLES = tuple(role.value for role in ROLES)
 """Channels that show the motion of m0, the one that is used first."""
 LOWEST_INTEGRATED_HZ = 5.0
 """An acceleration is integrated exactly above it; below it, the velocity fades to nothing."""
@@ -149,12 +150,24 @@ class ResponseChannel:
         return self._block[1]
 
 
+def velocity_noise(
+    role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
+) -> Iterator[Samples]:
+    """Yield white noise of unit variance at a sensor as `ResponseChannel` reads it, block by block."""
+    kernel = _CONVERSIONS[role][0](rate_hz) if role in _CONVERSIONS else np.ones(1)
+    before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
+    for first in range(0, count, block):
+        white = np.concatenate((before, rng.standard_normal(min(block, count - first), np.float32)))
+        yield white if kernel.size == 1 else _convolved(white, kernel)
+        before = white[white.size - kernel.size + 1 :]
+
+
 def _mirrored(samples: Reals, count: int, about: float) -> Reals:
     """Return ``count`` samples before the first one, the nearest first."""
     return np.asarray(about * samples[:1] - samples[1 : count + 1])
 
 
-def _convolved(samples: Reals, kernel: Reals) -> Reals:
+def _convolved(samples: Samples, kernel: Reals) -> Reals:
     """Return the part of a convolution that needs no sample beyond the ends."""
     # By numpy: the window would load scipy.signal when it starts.
     size = next_fast_len(samples.size + kernel.size - 1, real=True)

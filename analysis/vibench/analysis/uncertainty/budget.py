@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..recordings.channels import BASE, described_sensor
 from ..tables import Labelled, plus_minus
 
 COVERAGE = 2.0
@@ -33,6 +34,8 @@ class Cause(StrEnum):
 
     VIBROMETER = "vibrometer calibration"
     ACCELEROMETER = "accelerometer calibration"
+    DISPLACEMENT_PROBE = "displacement probe calibration"
+    FORCE_CELL = "force cell calibration"
     CONVERTER = "converter"
     ALIGNMENT = "alignment"
     CLOCK = "clock"
@@ -148,8 +151,12 @@ class Budget(Labelled):
         ]
 
 
-_SENSORS = {"vibrometer": Cause.VIBROMETER, "accelerometer": Cause.ACCELEROMETER}
-_ROLES = {"vibrometer": "m0_velocity", "accelerometer": "base_acceleration"}
+_SENSORS = {
+    "velocity": Cause.VIBROMETER,
+    "acceleration": Cause.ACCELEROMETER,
+    "displacement": Cause.DISPLACEMENT_PROBE,
+    "force": Cause.FORCE_CELL,
+}
 
 
 @dataclass(frozen=True)
@@ -157,9 +164,9 @@ class Stated:
     """Relative standard uncertainties of what the channels show, by what a bench configuration says."""
 
     response: tuple[Contribution, ...]
-    """Of the vibrometer's channel."""
+    """Of the channel that shows m0."""
     base: tuple[Contribution, ...]
-    """Of the accelerometer's channel."""
+    """Of the channel of the base."""
     clock: Contribution
     """Of every frequency."""
 
@@ -175,24 +182,23 @@ class Stated:
         return (Contribution(Cause.CLOCK, relative, self.clock.source),)
 
 
-def stated_uncertainties(bench: Mapping[str, Any]) -> Stated:
-    """Read what the bench configuration in a recording states.
+def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
+    """Read what the bench configuration in a recording states; ``response`` is the channel of m0.
 
     A calibration is normal with its coverage factor. An alignment within an angle scales by its cosine: the
     root of the uncorrected mean square is taken (JCGM 100:2008, F.2.4.5), the angle being uniform. A clock
     within bounds is uniform.
     """
-    return Stated(
-        tuple(_channel(bench, "vibrometer")), tuple(_channel(bench, "accelerometer")), _clock(bench)
-    )
+    inputs = {each.get("role"): each for each in (bench.get("daq") or {}).get("channels") or ()}
+    of_response, of_base = (tuple(_channel(bench, role, inputs.get(role, {}))) for role in (response, BASE))
+    return Stated(of_response, of_base, _clock(bench))
 
 
-def _channel(bench: Mapping[str, Any], sensor: str) -> Iterator[Contribution]:
-    said = bench.get(sensor) or {}
-    yield _calibration(_SENSORS[sensor], said, sensor)
-    inputs = (bench.get("daq") or {}).get("channels") or ()
-    mine: Mapping[str, Any] = next((each for each in inputs if each.get("role") == _ROLES[sensor]), {})
-    yield _calibration(Cause.CONVERTER, mine, f"input of {_ROLES[sensor]}")
+def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> Iterator[Contribution]:
+    said, cause = described_sensor(bench, role), _SENSORS[role.partition("_")[2]]
+    sensor = cause.value.removesuffix(" calibration")
+    yield _calibration(cause, said, sensor)
+    yield _calibration(Cause.CONVERTER, mine, f"input of {role}")
     angle = said.get("alignment_deg")
     if angle is None:
         yield Contribution(Cause.ALIGNMENT, None, f"{sensor}: alignment_deg is not stated")

@@ -25,7 +25,7 @@ from vibench.acquisition.plan import (
     preview_measurement,
 )
 from vibench.acquisition.recording import UntilNote
-from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, amplifier_of, shaker_of, specimen_of
+from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, Role, amplifier_of, shaker_of, specimen_of
 from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
@@ -36,6 +36,7 @@ from ..overlay.overlay import RESPONSE_I, RESPONSE_II
 from ..recordings.checks import Check, Verdict
 from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals
+from ..signals.quantity import Quantity
 from ..signals.window import Window
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Labelled
@@ -211,7 +212,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     rig
         What it is played on: its specimen, and what it states of sensors and noise.
     """
-    stated = stated_uncertainties(rig.model_dump(mode="json"))
+    stated = stated_uncertainties(rig.model_dump(mode="json"), rig.response or Role.M0_VELOCITY)
     match measurement.excitation:
         case Dwell(frequency_hz=at_hz) | HeldDwell(frequency_hz=at_hz):
             return tuple(_of_sine(measurement, rig, stated, at_hz))
@@ -329,16 +330,29 @@ def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
     return tuple(dict.fromkeys(each.cause for part in parts for each in part if each.relative is None))
 
 
-def _densities(rig: Rig) -> tuple[float, float] | None:
-    """White noise of velocity [(m/s)^2/Hz] and acceleration [(m/s2)^2/Hz], one-sided; None if not stated."""
-    virtual = rig.virtual
-    velocity, acceleration = rig.vibrometer.noise_per_rthz, rig.accelerometer.noise_per_rthz
-    if velocity is not None and acceleration is not None:
-        return velocity.value**2, acceleration.value**2
+def _densities(rig: Rig, frequency_hz: Reals) -> tuple[Reals, float] | None:
+    """Noise of m0's velocity [(m/s)^2/Hz] and of the base's acceleration [(m/s2)^2/Hz], one-sided.
+
+    None if not stated. An integrated acceleration has the noise of its sensor over the frequency.
+    """
+    response = rig.response or Role.M0_VELOCITY
+    of_m0, of_base = _density(rig, response), _density(rig, Role.BASE_ACCELERATION)
+    if of_m0 is None or of_base is None:
+        return None
+    return of_m0 * (2 * np.pi * frequency_hz) ** (2 - 2 * Quantity(response.quantity).derivatives), of_base
+
+
+def _density(rig: Rig, role: Role) -> float | None:
+    sensor, virtual = rig.sensor(role), rig.virtual
+    if sensor is not None and sensor.noise_per_rthz is not None:
+        return sensor.noise_per_rthz.value**2
     if virtual is None:
         return None
-    white = virtual.accelerometer_noise_m_per_s2**2 / _HALF_BAND_HZ
-    return virtual.vibrometer_noise_m_per_s_per_rthz**2, white
+    simulated = {
+        Role.M0_VELOCITY: virtual.vibrometer_noise_m_per_s_per_rthz**2,
+        Role.BASE_ACCELERATION: virtual.accelerometer_noise_m_per_s2**2 / _HALF_BAND_HZ,
+    }
+    return simulated.get(role, 0.0)
 
 
 def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
@@ -353,8 +367,8 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
     modes: list[tuple[float, tuple[float | None, ...]]] = [
         (hz, (None, None, None)) for hz in specimen.natural_frequencies_hz if low_hz <= hz <= high_hz
     ]
-    if (noise := _densities(rig)) is not None:
-        lines = _expected_lines(excitation, rig, rms_v**2 / (high_hz - low_hz), noise, time_s)
+    lines = _expected_lines(excitation, rig, rms_v**2 / (high_hz - low_hz), time_s)
+    if lines is not None:
         try:
             found = resonances(lines, low_hz=low_hz, high_hz=high_hz)
         except InvalidRequest:  # the band has too few lines for a fit
@@ -383,16 +397,12 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
 
 
 def _expected_lines(
-    excitation: Excitation, rig: Rig, density_v: float, noise: tuple[float, float], time_s: float
-) -> FrequencyResponse:
+    excitation: Excitation, rig: Rig, density_v: float, time_s: float
+) -> FrequencyResponse | None:
     """Return the linear transmission at the lines of a noise, each with its scatter after a recorded time.
 
-    Parameters
-    ----------
-    density_v
-        Of the voltage at the terminal, one-sided [V^2/Hz].
-    noise
-        One-sided densities of the response's velocity [(m/s)^2/Hz] and the base's acceleration [(m/s2)^2/Hz].
+    ``density_v`` is that of the voltage at the terminal, one-sided [V^2/Hz]. None if no noise of sensors is
+    stated.
     """
     if isinstance(excitation, WhiteNoise | OddMultisine):
         lines_hz = np.asarray(excitation.lines, dtype=np.float64) * excitation.repetition_hz
@@ -400,6 +410,9 @@ def _expected_lines(
     else:
         apart_hz = _GRID_HZ
         lines_hz = np.arange(*excitation.band_hz, apart_hz, dtype=np.float64)
+    noise = _densities(rig, lines_hz)
+    if noise is None:
+        return None
     value = base_transmissibility(specimen_of(rig), lines_hz)[:, 0]
     base = density_v * np.abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, lines_hz)) ** 2
     response = base * np.abs(value / (2 * np.pi * lines_hz)) ** 2
@@ -443,12 +456,12 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
     chance = simulated_dwell(measurement, rig, at_hz, window_s)
     if chance is None:
         return
-    noise = _densities(rig)
+    noise = _densities(rig, np.array([at_hz]))
     omega = 2 * np.pi * at_hz
     size_m = float(abs(base_transmissibility(specimen, [at_hz])[0, 0])) * amplitude_m
     by_noise = None
     if noise is not None:
-        shares = noise[0] / (omega * size_m) ** 2 + noise[1] / (omega**2 * amplitude_m) ** 2
+        shares = noise[0][0] / (omega * size_m) ** 2 + noise[1] / (omega**2 * amplitude_m) ** 2
         by_noise = float(np.sqrt(shares / window_s))
     lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
     missing = _missing(stated.response, stated.base, stated.timed(1))

@@ -36,7 +36,7 @@ _FEWEST_PERIODS = 20.0
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
     """Return frequency, damping ratio and transmissibility of every resonance."""
-    stated = stated_uncertainties(analysis.facts.bench)
+    stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     found = analysis.response
     chance = _chance_share(found)
     return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance))
@@ -89,7 +89,8 @@ def _chance_share(found: NoiseResponse) -> float:
 
 def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
     """Return base amplitude and both responses of a dwell."""
-    stated, found = stated_uncertainties(analysis.facts.bench), analysis.response
+    found = analysis.response
+    stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
@@ -194,7 +195,7 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
     top = found.largest(found.response_ii)
     # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
-    stated = stated_uncertainties(analysis.facts.bench)
+    stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
     scatter = _UNTOLD if collides[top] else from_scatter(Cause.NOISE, sd_m, value_m, "parts of the window")
     amplitude = _amplitude(value_m, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
@@ -216,7 +217,7 @@ def _largest(
     collides: Flags,
     laid: AbstractOverlay[Any] | None,
 ) -> Iterator[Budget]:
-    stated = stated_uncertainties(facts.bench)
+    stated = stated_uncertainties(facts.bench, facts.response)
     rate = f", swept at {abs(found.sweep_rate_hz_per_s):.3g} Hz/s" if isinstance(found, SweepResponse) else ""
     error, sd = found.noise_error_i, found.sd_response_ii
     for name, values, scatter, source in (

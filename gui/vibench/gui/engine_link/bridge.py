@@ -52,7 +52,8 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
     channels = [
         LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
     ]
-    delay_s = 0.0 if rig is None else rig.vibrometer.delay_s
+    sensor = None if rig is None or rig.response is None else rig.sensor(rig.response)
+    delay_s = 0.0 if sensor is None else sensor.delay_s
     begins_s = 0.0 if measurement is None else lead_in_s(measurement)
     return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s, lead_in_s=begins_s)
 

@@ -188,7 +188,8 @@ class LoadedShaker:
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
         """Structure that the engine moves."""
-        self._step_s = step_s
+        self.step_s = step_s
+        """Length of a step [s]."""
         self._place(specimen, start)
         x, _, _, vx, _, _ = self.structure["specimen"]["motion"]
         self.structure["reactions_before"] = specimen.stiffnesses[0] * x + specimen.dampings[0] * vx
@@ -235,7 +236,7 @@ class LoadedShaker:
 
     def _place(self, specimen: Specimen, motion: ArrayLike) -> None:
         engine = native_engine()
-        tables, state = cubic_tables(engine, specimen, self._step_s), engine.new("State")
+        tables, state = cubic_tables(engine, specimen, self.step_s), engine.new("State")
         start_on_cubics(engine, tables, specimen, state, motion, _CONTACT_TOLERANCE)
         engine.fill(self.structure, tables=tables, specimen=state)
 

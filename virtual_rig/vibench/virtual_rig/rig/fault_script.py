@@ -97,12 +97,12 @@ class RigFaults:
         self._world.widen_gaps(by_m)
 
     def drop_laser(self, duration_s: float) -> None:
-        """Block the vibrometer's laser for a while; it gives no signal."""
-        self._world.disturb_vibrometer(duration_s, DROPOUT_LEVEL)
+        """Let the sensor of m0 show nothing for a while, like a vibrometer without light."""
+        self._world.disturb_response(duration_s, DROPOUT_LEVEL)
 
     def over_range(self, duration_s: float) -> None:
-        """Hold the vibrometer at full scale for a while."""
-        self._world.disturb_vibrometer(duration_s, OVER_RANGE_LEVEL)
+        """Hold the sensor of m0 at full scale for a while."""
+        self._world.disturb_response(duration_s, OVER_RANGE_LEVEL)
 
     def disconnect(self, physical_channel: str) -> None:
         """Disconnect an input of the converter, such as ``"cDAQ1Mod1/ai2"``."""
@@ -236,7 +236,7 @@ class JumpClock(ScriptedFault):
 
 
 class DropLaser(ScriptedFault):
-    """The vibrometer's laser is blocked, and it gives no signal."""
+    """The sensor of m0 shows nothing, like a vibrometer without light."""
 
     fault: Literal["drop_laser"]
     for_s: PositiveFloat
@@ -248,7 +248,7 @@ class DropLaser(ScriptedFault):
 
 
 class OverRange(ScriptedFault):
-    """The vibrometer stays at full scale."""
+    """The sensor of m0 stays at full scale."""
 
     fault: Literal["over_range"]
     for_s: PositiveFloat

@@ -1,7 +1,6 @@
-"""Sensors: the laser vibrometer at m0, and the accelerometer on the base."""
+"""Sensors that show the motion of the rig: bandwidth, resonance, noise, drop-outs, full scale."""
 
 from dataclasses import dataclass
-from typing import Protocol
 from zlib import crc32
 
 import numpy as np
@@ -9,7 +8,7 @@ from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
+from vibench.acquisition.rig import Role, SensorConfig
 from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
@@ -142,6 +141,16 @@ def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
     return LowPass((pole, pole.conjugate()))
 
 
+def low_pass_of(sensor: SensorConfig) -> LowPass:
+    """Build the response of a sensor: its bandwidth and its mounted resonance, as far as stated."""
+    poles: tuple[complex, ...] = ()
+    if sensor.bandwidth_hz is not None:
+        poles += first_order(sensor.bandwidth_hz).poles
+    if sensor.resonance_hz is not None:
+        poles += resonant(sensor.resonance_hz, SENSOR_DAMPING_RATIO).poles
+    return LowPass(poles)
+
+
 def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
     """Return a low-pass filter for a grid of ``step_s``, initially at rest.
 
@@ -170,8 +179,8 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     return np.concatenate([[total - weights.sum()], weights])
 
 
-ACCELEROMETER_DAMPING_RATIO = 0.02
-"""Damping ratio of a piezoelectric accelerometer's mounted resonance; assumed typical value."""
+SENSOR_DAMPING_RATIO = 0.02
+"""Damping ratio of a piezoelectric sensor's mounted resonance; assumed typical value."""
 IEPE_BIAS_V = 10.0
 """Constant voltage of a powered IEPE sensor; 8 to 12 V is usual."""
 LONGEST_DELAY_S = 5e-3
@@ -205,92 +214,60 @@ class SensorParts:
         )
 
 
-class Sensor(Protocol):
-    """Converts a motion to volts."""
+class MotionSensor:
+    """A sensor in front of an input: vibrometer, accelerometer, displacement probe or force cell.
 
-    def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return the conversion data for the next steps."""
-
-
-def sensor_volts(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
-    """Return output volts for the means of a motion over the next steps, shape (steps,)."""
-    volts = np.empty(len(values))
-    parts = sensor.parts(first_step, len(values))
-    native_engine().call("show", parts.showing(values, volts))
-    return volts
-
-
-class Vibrometer:
-    """A laser vibrometer with velocity decoder.
-
-    Order: velocity, bandwidth of the decoder (first order), white noise, drop-outs, volts, clipping at full
-    scale. The remainder of the decoder's delay beyond that of its bandwidth is a plain delay
-    (``delay_steps``), which the converter's filter applies exactly.
+    Order: motion, bandwidth or resonance, white noise, drop-outs, volts, clipping at full scale. Delay beyond
+    that of the bandwidth is a plain delay (``delay_steps``), which the converter's filter applies exactly.
     """
 
     def __init__(
         self,
-        config: VibrometerConfig,
-        noise_density: float,
-        dropouts: RandomDropouts,
+        config: SensorConfig,
+        role: Role,
+        noise_rms: float,
         noise: NoiseStream,
         grid: TimeGrid = USUAL_GRID,
+        dropouts: RandomDropouts | None = None,
     ) -> None:
-        """``noise_density`` in (m/s)/sqrt(Hz)."""
+        """``noise_rms``: of the mean over a step, in the SI unit of the channel."""
         if config.delay_s > LONGEST_DELAY_S:
             raise ConfigurationError(
-                f"vibrometer.delay_s = {config.delay_s} s: the virtual rig can delay by at most "
-                f"{LONGEST_DELAY_S} s; give a smaller delay"
+                f"delay_s = {config.delay_s} s of the {config.model} ({role.value}): the virtual rig can "
+                f"delay by at most {LONGEST_DELAY_S} s; give a smaller delay"
             )
-        bandwidth = first_order(config.bandwidth_hz)
-        self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
-        self._filter = running_filter(bandwidth, grid.step_s)
-        self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
-        self._full_scale_m_per_s = config.full_scale_m_per_s
+        low_pass = low_pass_of(config)
+        bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz) if config.bandwidth_hz else 0.0
+        self.delay_steps = (config.delay_s - bandwidth_s) * grid.rate_hz
+        self._filter = running_filter(low_pass, grid.step_s)
+        self._noise_rms = noise_rms
+        self._full_scale = config.full_scale_v * config.units_per_volt(role.unit)
         self._full_scale_v = config.full_scale_v
         self._noise = noise
         self._dropouts = dropouts
         self._demanded: list[Disturbance] = []
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """Replace the velocity by a level for some steps: a drop-out or an over-range on demand."""
+        """Show a level instead of the motion for some steps: a drop-out or an over-range on demand."""
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return the conversion data of the velocity [m/s] for the next steps."""
+        """Return the conversion data of the motion for the next steps, without bias."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
-        disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
+        dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
+        disturbed = dropouts + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
         # Insert the disturbances into ``values``, which start at ``first_step``, in place.
         for disturbance in disturbed:
             begin = max(disturbance.first_step - first_step, 0)
             stop = max(disturbance.stop_step - first_step, 0)
-            instead[begin:stop] = disturbance.level * self._full_scale_m_per_s
+            instead[begin:stop] = disturbance.level * self._full_scale
         noise = self._noise_rms * self._noise.draw(first_step, count)
-        scale = self._full_scale_m_per_s, self._full_scale_v
-        return SensorParts(self._filter, noise, instead, *scale)
+        return SensorParts(self._filter, noise, instead, self._full_scale, self._full_scale_v)
 
-
-class Accelerometer:
-    """A piezoelectric accelerometer: its resonance, noise, sensitivity, and clipping at full scale."""
-
-    def __init__(
-        self,
-        config: AccelerometerConfig,
-        noise_m_per_s2: float,
-        noise: NoiseStream,
-        grid: TimeGrid = USUAL_GRID,
-    ) -> None:
-        """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
-        mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
-        self._filter = running_filter(mounted, grid.step_s)
-        self._noise_rms = grid.rms_per_step(noise_m_per_s2)
-        self._sensitivity = config.sensitivity_v_per_m_per_s2
-        self._full_scale_v = config.full_scale_v
-        self._noise = noise
-
-    def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return the conversion data of the acceleration [m/s2] for the next steps, without bias."""
-        noise = self._noise_rms * self._noise.draw(first_step, count)
-        scale = self._full_scale_v / self._sensitivity, self._full_scale_v
-        return SensorParts(self._filter, noise, np.empty(0), *scale)
+    def volts(self, values: FloatArray, first_step: int) -> FloatArray:
+        """Output volts for the means of a motion over the next steps, shape (steps,)."""
+        volts = np.empty(len(values))
+        parts = self.parts(first_step, len(values))
+        native_engine().call("show", parts.showing(np.ascontiguousarray(values), volts))
+        return volts

@@ -1,5 +1,6 @@
 """Connections of the converter's inputs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -11,7 +12,7 @@ _USUAL_OUTPUT = f"{SECOND_DEVICE}/ao0"
 
 
 class Signal(IntEnum):
-    """Row of the world's signals."""
+    """Row of the world's signals; rows of other sensors follow, in the order of the configuration."""
 
     DRIVE = 0
     AMPLIFIER = 1
@@ -32,7 +33,7 @@ class Cable:
     """Connection of one input of the converter."""
 
     behind: Behind
-    signal: Signal = Signal.DRIVE
+    signal: int = Signal.DRIVE
     attenuation: float = 1.0
     """Volts at the source per volt at the input."""
     delay_steps: float = 0.0
@@ -40,12 +41,11 @@ class Cable:
 
 OPEN_INPUT = Cable(Behind.NOTHING)
 
-_SIGNAL_OF_ROLE = {
-    Role.DRIVE_VOLTAGE: Signal.DRIVE,
-    Role.AMPLIFIER_VOLTAGE: Signal.AMPLIFIER,
-    Role.BASE_ACCELERATION: Signal.BASE_ACCELERATION,
-    Role.M0_VELOCITY: Signal.M0_VELOCITY,
-}
+
+def signal_rows(rig: Rig) -> dict[Role, int]:
+    """Row of the world's signals by role, of every sensor and wire that a rig has."""
+    fixed = (Role.DRIVE_VOLTAGE, Role.AMPLIFIER_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
+    return {role: row for row, role in enumerate((*fixed, *rig.sensors))}
 
 
 def amplifier_input(rig: Rig) -> str:
@@ -53,21 +53,21 @@ def amplifier_input(rig: Rig) -> str:
     return rig.daq.output_channel or _USUAL_OUTPUT
 
 
-def cables_of(rig: Rig, vibrometer_delay_steps: float) -> dict[str, Cable]:
-    """Return every connected input by its physical name, ``"cDAQ1Mod1/ai0"``."""
-    delays = {Role.M0_VELOCITY: vibrometer_delay_steps}
-    sensors = {Role.BASE_ACCELERATION: _accelerometer(rig)}
+def cables_of(rig: Rig, delay_steps: Mapping[Role, float]) -> dict[str, Cable]:
+    """Every connected input by its physical name, ``"cDAQ1Mod1/ai0"``; delays of the sensors by role."""
+    rows = signal_rows(rig)
     return {
         f"{device}/{channel.physical}": Cable(
-            behind=sensors.get(channel.role, Behind.VOLTAGE_SOURCE),
-            signal=_SIGNAL_OF_ROLE[channel.role],
+            behind=_source(rig, channel.role),
+            signal=rows[channel.role],
             attenuation=channel.attenuation,
-            delay_steps=delays.get(channel.role, 0.0),
+            delay_steps=delay_steps.get(channel.role, 0.0),
         )
         for device in (rig.daq.device, SECOND_DEVICE)
         for channel in rig.daq.channels
     }
 
 
-def _accelerometer(rig: Rig) -> Behind:
-    return Behind.IEPE_SENSOR if rig.accelerometer.iepe == "yes" else Behind.VOLTAGE_SOURCE
+def _source(rig: Rig, role: Role) -> Behind:
+    sensor = rig.sensor(role)
+    return Behind.IEPE_SENSOR if sensor is not None and sensor.iepe == "yes" else Behind.VOLTAGE_SOURCE

@@ -2,7 +2,7 @@
 
 import heapq
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -12,7 +12,9 @@ import numpy as np
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import (
+    RESPONSE_ROLES,
     Rig,
+    Role,
     VirtualConfig,
     amplifier_of,
     fastest_sample_rate_hz,
@@ -26,16 +28,14 @@ from ..analogue import Input
 from .conversion import Conversion, InputStage, converter_input, history_steps
 from .sensors import (
     LONGEST_DELAY_S,
-    Accelerometer,
     Disturbance,
+    MotionSensor,
     NoiseStream,
     RandomDropouts,
     SensorParts,
-    Vibrometer,
-    sensor_volts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
+from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of, signal_rows
 
 
 class AnalogueOutput:
@@ -178,35 +178,29 @@ class World:
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
-        self.vibrometer = Vibrometer(
-            rig.vibrometer,
-            virtual.vibrometer_noise_m_per_s_per_rthz,
-            RandomDropouts(virtual.vibrometer_dropouts_per_s, noise("laser dropouts"), grid),
-            noise("vibrometer"),
-            grid,
-        )
+        self._sensors = dict(_sensors_of(rig, virtual, grid))
+        self._rows = signal_rows(rig)
+        self._fixture_mass_kg = rig.shaker.fixture_mass_kg
         step_s = grid.physical_step_s(virtual.converter_clock_ppm)
         self._specimen = specimen or specimen_of(rig)
         self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), self._specimen, step_s)
-        self._accelerometer = Accelerometer(
-            rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
-        )
         self._terminal = terminal
         self._gain_db = rig.amplifier.gain_db
         self._amplifier_noise = noise("amplifier")
         self._amplifier_noise_v = grid.rms_per_step(virtual.amplifier_noise_v)
         self._noise = noise
         self._converter_noise_v = virtual.converter_noise_v
-        self._plan = cables_of(rig, self.vibrometer.delay_steps)
+        self._plan = cables_of(rig, {role: each.delay_steps for role, each in self._sensors.items()})
         self._cables = dict(self._plan)
         self._amplifier_input = amplifier_input(rig)
         self._outputs: dict[str, AnalogueOutput] = {}
         self._loop = loop
         self._conversions: list[Conversion] = []
-        self._history = np.zeros((len(Signal), _history_steps(grid)))
+        self._history = np.zeros((len(self._rows), _history_steps(grid)))
         self._schedule = EventSchedule(grid)
         self._step = 0
         self._unspent_steps = 0.0
+        self._last_end = np.zeros((1, len(MOTION_COLUMNS)))
         self._truth: list[FloatArray] | None = None
         self._turn = threading.RLock()
 
@@ -294,12 +288,13 @@ class World:
         with self._turn:
             self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
-    def disturb_vibrometer(self, duration_s: float, level: float) -> None:
-        """Make the vibrometer output ``level`` (share of full scale) for a while."""
+    def disturb_response(self, duration_s: float, level: float) -> None:
+        """Make the sensor of m0 output ``level`` (share of full scale) for a while."""
         with self._turn:
-            self.vibrometer.disturb(
-                Disturbance(self._step, self._step + self._grid.step_at(duration_s), level)
-            )
+            stop = self._step + self._grid.step_at(duration_s)
+            for role in RESPONSE_ROLES:
+                if role in self._sensors:
+                    self._sensors[role].disturb(Disturbance(self._step, stop, level))
 
     def connect(self, physical_channel: str) -> None:
         """Connect an input as described by the rig."""
@@ -358,7 +353,7 @@ class World:
             played = output.render(first, steps)
             if channel == self._amplifier_input:
                 drive += played
-        signals = np.empty((len(Signal), steps))
+        signals = np.zeros((len(self._rows), steps))
         signals[Signal.DRIVE] = drive
         self._move(first, signals)
         self._step = first + steps
@@ -370,23 +365,50 @@ class World:
         """Compute the rows of amplifier and sensors from the drive in ``signals``, in place."""
         steps = signals.shape[1]
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
-        motion = ShakenMotion.of(steps, steps if self._truth is not None else 0)
+        others = [role for role in self._sensors if role not in _LOOP_ROLES]
+        motion = ShakenMotion.of(steps, steps if others or self._truth is not None else 0)
         try:
             if self._loop is not None and self._loop.is_on:
-                sensors = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
-                good = self._loop.move(first, self._grid.step_s, self.plant, noise, sensors, motion, signals)
+                base, m0 = (self._sensors[role].parts(first, steps) for role in _LOOP_ROLES)
+                good = self._loop.move(
+                    first, self._grid.step_s, self.plant, noise, (base, m0), motion, signals
+                )
                 self.plant.account(good, steps)
             else:
                 self.plant.move_into(motion, signals[Signal.DRIVE], noise)
                 signals[Signal.AMPLIFIER] = motion.amplifier_voltage
-                signals[Signal.BASE_ACCELERATION] = sensor_volts(
-                    self._accelerometer, motion.base_acceleration, first
-                )
-                signals[Signal.M0_VELOCITY] = sensor_volts(self.vibrometer, motion.m0_velocity, first)
+                for role, means in zip(
+                    _LOOP_ROLES, (motion.base_acceleration, motion.m0_velocity), strict=True
+                ):
+                    if role in self._sensors:
+                        signals[self._rows[role]] = self._sensors[role].volts(means, first)
         except MotionFailed as error:
             raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
+        if others:
+            ends = np.concatenate([self._last_end, motion.ends])
+            self._last_end = ends[-1:]
+            for role in others:
+                signals[self._rows[role]] = self._sensors[role].volts(self._means(role, ends), first)
         if self._truth is not None:
             self._truth.append(motion.ends)
+
+    def _means(self, role: Role, ends: FloatArray) -> FloatArray:
+        """Means over steps of what a sensor measures, from the states at their ends, shape (steps,)."""
+        h, column = self.plant.step_s, dict(zip(MOTION_COLUMNS, ends.T, strict=True))
+        place, velocity = (column[name] for name in _STATES[role.place])
+        match role.quantity:
+            case "acceleration":
+                means = np.diff(velocity) / h
+            case "velocity":
+                means = np.diff(place) / h
+            case "displacement":
+                # The mean of a cubic through both ends (Hermite).
+                means = 0.5 * (place[:-1] + place[1:]) - h / 12 * np.diff(velocity)
+            case _:
+                pull = self._specimen.stiffnesses[0] * (column["x"] - place)
+                pull += self._specimen.dampings[0] * (column["vx"] - velocity)
+                means = self._fixture_mass_kg * np.diff(velocity) / h - 0.5 * (pull[:-1] + pull[1:])
+        return np.asarray(means)
 
     def _remember(self, signals: FloatArray) -> None:
         steps, kept = signals.shape[1], self._history.shape[1]
@@ -395,6 +417,33 @@ class World:
         else:
             self._history[:, :-steps] = self._history[:, steps:]
             self._history[:, -steps:] = signals
+
+
+_LOOP_ROLES = (Role.BASE_ACCELERATION, Role.M0_VELOCITY)
+"""Channels whose means the engine computes itself, which a controller can sample."""
+_STATES = {
+    "base": ("base_displacement", "base_velocity"),
+    "m0": ("x", "vx"),
+    "m1": ("y", "vy"),
+    "m2": ("z", "vz"),
+}
+"""Columns of displacement and velocity, by the place of a channel."""
+
+
+def _sensors_of(rig: Rig, virtual: VirtualConfig, grid: TimeGrid) -> Iterator[tuple[Role, MotionSensor]]:
+    """Simulate every sensor that a rig describes; those of ``sensors`` have the noise that they state."""
+    noise = partial(NoiseStream, virtual.seed)
+    per_rthz = np.sqrt(grid.rate_hz / 2)
+    rms = grid.rms_per_step(virtual.accelerometer_noise_m_per_s2)
+    role = Role.BASE_ACCELERATION
+    yield role, MotionSensor(rig.accelerometer, role, rms, noise("accelerometer"), grid)
+    if rig.vibrometer is not None:
+        dropouts = RandomDropouts(virtual.vibrometer_dropouts_per_s, noise("laser dropouts"), grid)
+        rms, role = virtual.vibrometer_noise_m_per_s_per_rthz * per_rthz, Role.M0_VELOCITY
+        yield role, MotionSensor(rig.vibrometer, role, rms, noise("vibrometer"), grid, dropouts)
+    for role, sensor in rig.sensors.items():
+        density = 0.0 if sensor.noise_per_rthz is None else sensor.noise_per_rthz.value
+        yield role, MotionSensor(sensor, role, density * per_rthz, noise(role.value), grid)
 
 
 def _history_steps(grid: TimeGrid) -> int:

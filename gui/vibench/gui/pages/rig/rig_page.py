@@ -349,7 +349,9 @@ class RigPage(Page):
         if rig is None:
             self.about.setText(f"✖ {self.choice.complaint}. Choose another configuration.")
         else:
-            chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
+            sensor = None if rig.response is None else rig.sensor(rig.response)
+            shown = "no sensor on m0" if sensor is None else sensor.model
+            chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, shown)
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
             warning = f"\n⚠ {self.choice.warning}" if self.choice.warning else ""
             self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}{warning}")

@@ -11,6 +11,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineStatus, TwinStatus
+from vibench.acquisition.rig import RESPONSE_ROLES
 from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView, Portrait, zigzag
 
@@ -101,7 +102,7 @@ _WORDS = {
     "drive_voltage": "drive",
     "amplifier_voltage": "amplifier",
     "base_acceleration": "base",
-    "m0_velocity": "m0",
+    **{role.value: "m0" for role in RESPONSE_ROLES},
 }
 _SHORT = {"amplifier_voltage": "amp."}
 

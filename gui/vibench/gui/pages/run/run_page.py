@@ -142,7 +142,7 @@ class WatchCard(QGroupBox):
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
-        self.impacts.setToolTip("Jumps in the acceleration of m0, derived from the vibrometer signal")
+        self.impacts.setToolTip("Jumps in the acceleration of m0, derived from its sensor")
         self.meters = LevelMeters(theme)
         self.span = Choice()
         for span_s in SPANS_S:

@@ -1,0 +1,199 @@
+"""Rigs with an accelerometer or a displacement probe on m0, sensors on other masses, and a force cell."""
+
+import re
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from vibench.acquisition import open_bench, open_recording, run_campaign
+from vibench.acquisition.bench.instrument_list import InstrumentList
+from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.check.bench_report import bench_report
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.first_day.configured import configure, questions_for
+from vibench.acquisition.host.shipped import shipped
+from vibench.acquisition.plan import Campaign, Measurement
+from vibench.acquisition.plan._limits import limit_checks
+from vibench.acquisition.rig import Rig, load_rig, specimen_of
+from vibench.analysis import Simulation, analyse_files, budget_sentences
+from vibench.analysis.recordings.response import derivative_kernel
+from vibench.sim import base_transmissibility
+
+BASE, WITHOUT = load_rig("virtual_rig"), load_rig("virtual_rig_accelerometers")
+SHEETS = {
+    "acceleration": {"sensitivity": "10 mV/g", "resonance_hz": 50e3},
+    "velocity": {"sensitivity": "250 mm/s/V"},
+    "displacement": {"sensitivity": "20 mV/um", "bandwidth_hz": 50e3, "delay_s": 5e-6},
+    "force": {"sensitivity": "22 mV/N"},
+}
+NOISE = {"acceleration": 3e-5, "displacement": 1e-12, "force": 2e-6}
+DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 1.5}
+
+
+def sheet(role, **more):
+    quantity = role.partition("_")[2]
+    noise = {"value": NOISE.get(quantity, 1e-9), "source": "test"}
+    usual = {"model": role, "full_scale_v": 5.0, "calibrated": "2026-02-10", "noise_per_rthz": noise}
+    return {**usual, **SHEETS[quantity], **more}
+
+
+def rig_with(*roles, without=("amplifier_voltage",), **more):
+    """The virtual rig with further sensors at the inputs of channels that are left out."""
+    said = BASE.model_dump(mode="json")
+    kept = [each for each in said["daq"]["channels"] if each["role"] not in without]
+    free = sorted({f"ai{number}" for number in range(4)} - {each["physical"] for each in kept})
+    usual = {"range_v": 5.0, "coupling": "DC", "calibrated": "2026-02-10"}
+    kept += [{"role": role, "physical": at, **usual} for role, at in zip(roles, free, strict=False)]
+    said["daq"]["channels"] = kept
+    said["sensors"] = {role: sheet(role, **more) for role in roles}
+    if "m0_velocity" in without:
+        said["vibrometer"] = None
+    return Rig.model_validate(said)
+
+
+ON_M0 = pytest.mark.parametrize("role", ["m0_acceleration", "m0_displacement"])
+
+
+def measured(rig, folder, **excitation):
+    plan = {
+        "name": "s",
+        "defaults": {"ramp_s": 0.2},
+        "measurements": [{"name": "s", "excitation": excitation}],
+    }
+    with open_bench(rig) as bench:
+        (result,) = run_campaign(bench, Campaign.model_validate(plan), folder)
+    return result.path
+
+
+def amplitude(samples, rate_hz, frequency_hz):
+    turns = np.exp(-2j * np.pi * frequency_hz / rate_hz * np.arange(samples.size))
+    taper = np.hanning(samples.size)
+    return 2 * np.sum(samples * taper * turns) / taper.sum()
+
+
+@pytest.mark.parametrize("role", ["m0_displacement", "m0_acceleration"])
+def test_a_probe_and_an_accelerometer_show_the_motion_that_the_vibrometer_shows(tmp_path, role):
+    path = measured(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
+    with open_recording(path) as recording:
+        rate = recording.sample_rate_hz
+        chosen = slice(round(0.5 * rate), None)
+        velocity, other = (recording.read(each)[chosen] for each in ("m0_velocity", role))
+        header = recording.channel(role)
+    assert header.quantity == role.partition("_")[2]
+    lower = "m0_displacement" in role
+    given, wanted = (other, velocity) if lower else (velocity, other)
+    found = np.convolve(given, derivative_kernel(rate), "valid")
+    wanted = wanted[64:-64]
+    at = amplitude(found, rate, 250.0) / amplitude(wanted, rate, 250.0)
+    assert abs(at) == pytest.approx(1.0, rel=3e-4)
+
+
+def test_a_force_cell_shows_what_moves_fixture_and_specimen(tmp_path):
+    path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
+    with open_recording(path) as recording:
+        rate, stop = recording.sample_rate_hz, recording.samples - round(0.4 * recording.sample_rate_hz)
+        force, base = (
+            amplitude(recording.read(each, stop - round(rate), stop), rate, 80.0)
+            for each in ("base_force", "base_acceleration")
+        )
+    specimen, s = specimen_of(BASE), 2j * np.pi * 80.0
+    pull = specimen.stiffnesses[0] + s * specimen.dampings[0]
+    moved = base_transmissibility(specimen, [80.0])[0, 0] - 1
+    assert abs(force / base) == pytest.approx(
+        abs(BASE.shaker.fixture_mass_kg - pull * moved / s**2), rel=5e-3
+    )
+
+
+@ON_M0
+def test_the_bench_check_hears_a_sensor_on_m0_with_the_right_sign(tmp_path, role):
+    with open_bench(rig_with(role, without=("m0_velocity",))) as bench:
+        report = bench_report(bench, tmp_path)
+    found = {each.name: each.verdict for each in report.findings}
+    assert found[f"{role} hears the sine"] is Verdict.OK
+    assert found[f"sign of {role}"] is Verdict.OK
+    assert report.verdict is not Verdict.FAIL
+
+
+@ON_M0
+def test_a_plan_beyond_the_range_of_a_sensor_on_m0_is_refused(role):
+    plan = {
+        "name": "s",
+        "excitation": {"kind": "dwell", **DWELL, "amplitude_vpp": 1.0, "frequency_hz": 260.0},
+    }
+    rig = rig_with(role, without=("m0_velocity",), full_scale_v=1e-3)
+    (check,) = (
+        each
+        for each in limit_checks(Measurement.model_validate(plan), rig)
+        if each.what.startswith(f"the {role.partition('_')[2]} of m0")
+    )
+    assert not check.is_kept
+
+
+def test_a_dwell_by_accelerometers_has_the_responses_and_causes_of_its_sensors(tmp_path):
+    results = [
+        analyse_files(
+            [measured(rig, tmp_path / str(number), amplitude_vpp=1.5, frequency_hz=260.0, **DWELL)],
+            "s",
+            Simulation.LEFT_OUT,
+        )
+        for number, rig in enumerate((BASE, WITHOUT))
+    ]
+    by_laser, by_accelerometer = (each.results[0].analysis for each in results)
+    assert by_accelerometer.facts.response == "m0_acceleration"
+    assert by_accelerometer.motion.verdict.kind is by_laser.motion.verdict.kind
+    assert by_accelerometer.response.response_i == pytest.approx(by_laser.response.response_i, rel=5e-3)
+    assert by_accelerometer.response.response_ii == pytest.approx(by_laser.response.response_ii, rel=1e-3)
+    said = " ".join(budget_sentences(results[1]))
+    assert "accelerometer calibration" in said
+    assert "vibrometer" not in said
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"vibrometer": None}, "the channel m0_velocity has no sensor; add the table [vibrometer]"),
+        ({"sensors": {"m2_velocity": sheet("m0_acceleration")}}, "is not a sensitivity for 'm s-1'"),
+        ({"sensors": {"drive_voltage": sheet("m0_force")}}, "a voltage comes by wire"),
+        (
+            {"sensors": {"m0_velocity": sheet("m0_velocity")}},
+            "describe it in the table [vibrometer]",
+        ),
+        ({"sensors": {"m9_velocity": sheet("m0_velocity")}}, "m9_velocity"),
+    ],
+)
+def test_a_sensor_that_does_not_fit_is_refused(change, words):
+    with pytest.raises(ValidationError, match=re.escape(words)):
+        Rig.model_validate({**BASE.model_dump(mode="json"), **change})
+
+
+def test_a_channel_without_a_sensor_names_the_table_to_add():
+    said = WITHOUT.model_dump(mode="json") | {"sensors": {}}
+    with pytest.raises(ValidationError, match=re.escape("add the table [sensors.m0_acceleration]")):
+        Rig.model_validate(said)
+
+
+def test_a_first_day_asks_for_the_sensors_that_the_template_has(tmp_path):
+    template = shipped("hardware_configs/virtual_rig_accelerometers.toml")
+    keys = {each.key for each in questions_for(template.read_text())}
+    assert "vibrometer.serial" not in keys
+    assert {"sensors.m0_acceleration.sensitivity", "daq.channels.base_force.physical"} <= keys
+    given = {"sensors.m0_acceleration.sensitivity": "9.8 mV/g", "sensors.base_force.serial": "4711"}
+    rig = configure(
+        template,
+        tmp_path / "own.toml",
+        InstrumentList((), (), ()),
+        lambda question, *_: given.get(question.key, ""),
+        "note",
+    )
+    assert rig.sensors["m0_acceleration"].sensitivity == "9.8 mV/g"
+    assert rig.sensors["base_force"].serial == "4711"
+
+
+def test_feedback_without_a_velocity_of_m0_is_refused_before_anything_plays(tmp_path):
+    level = {"displacement_m": 1e-6}
+    with pytest.raises(ConfigurationError, match=r"feedback listens to m0_velocity.*Nothing was played"):
+        measured(
+            WITHOUT, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
+            base_level=level, duration_s=1.0,
+        )  # fmt: skip
