@@ -13,8 +13,8 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_461,
-    "analysis": 32_270,
-    "cli": 5_193,
+    "analysis": 32_351,
+    "cli": 5_217,
     "extensions": 2_732,
     "gui": 12_493,
     "native": 6_625,

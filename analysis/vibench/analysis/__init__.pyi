@@ -55,6 +55,7 @@ from .results.campaign_results import (
     budgets_of as budgets_of,
     campaign_summary as campaign_summary,
     merged_results as merged_results,
+    other_responses as other_responses,
     recordings_in as recordings_in,
     result_summary as result_summary,
 )

@@ -1,6 +1,6 @@
 """`vibench analyse`: analyse one recording or a folder, and write figures, tables and a report."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -26,6 +26,8 @@ from vibench.analysis import (
     analyse_files,
     budget_sentences,
     campaign_summary,
+    merged_results,
+    other_responses,
     quantities_named,
     recordings_in,
     update_model,
@@ -197,6 +199,12 @@ def _analyse(
         overlay = overlay if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, overlay, draws)
         motions = list(hidden_motions(results, overlay, observer, hidden))
+        others = {
+            role: analyse_files(
+                having, f"{name}, {role}", Simulation.LEFT_OUT, request, observer, response=role
+            )
+            for role, having in other_responses(paths).items()
+        }
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     from vibench.analysis.report import check_warnings, findings, write_report
@@ -208,7 +216,8 @@ def _analyse(
             if hidden is not _Hidden.OMITTED
             else {}
         )
-        print_json({**campaign_summary(results), **fitted, **told})
+        further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
+        print_json({**campaign_summary(results), **fitted, **told, **(further if others else {})})
     for sentence in (
         ()
         if as_json
@@ -217,6 +226,7 @@ def _analyse(
             *(f"warning: {each}" for each in check_warnings(results)),
             *(s for each in motions for s in each.sentences),
             *budget_sentences(results),
+            *(f"{role}: {said}" for role, each in others.items() for said in budget_sentences(each)),
         )
     ):
         console.print(sentence)
@@ -231,7 +241,21 @@ def _analyse(
             save_toml(updated.description, specimen_file)
             if not as_json:
                 console.print("The specimen:", bold(specimen_file.resolve()))
-    complain_about(results)
+    if has_report:
+        _write_reports(others, folder, as_json=as_json)
+    complain_about(merged_results(name, (results, *others.values())))
+
+
+def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
+    """Write a report for each further channel that shows a motion."""
+    from vibench.analysis.report import write_report
+
+    for role, results in others.items():
+        if results.results:
+            place = free_path(folder / f"report_{role}.html")
+            report = write_report(results, place, folder / f"figures_{role}")
+            if not as_json:
+                console.print(f"The report of {role}:", bold(report.resolve()))
 
 
 def hidden_motions(

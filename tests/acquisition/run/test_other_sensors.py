@@ -1,6 +1,9 @@
 """Rigs with an accelerometer or a displacement probe on m0, sensors on other masses, and a force cell."""
 
+import json
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -16,7 +19,14 @@ from vibench.acquisition.host.shipped import shipped
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import Rig, load_rig, specimen_of
-from vibench.analysis import Simulation, analyse_files, budget_sentences
+from vibench.analysis import (
+    Simulation,
+    analyse,
+    analyse_files,
+    budget_sentences,
+    other_responses,
+)
+from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.response import derivative_kernel
 from vibench.sim import base_transmissibility
 
@@ -197,3 +207,36 @@ def test_feedback_without_a_velocity_of_m0_is_refused_before_anything_plays(tmp_
             WITHOUT, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
             base_level=level, duration_s=1.0,
         )  # fmt: skip
+
+
+def test_a_sensor_on_m2_is_analysed_by_the_same_path_and_gets_a_report(tmp_path):
+    noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
+    path = measured(
+        rig_with("m2_acceleration"), tmp_path, kind="white_noise", amplitude_vpp=0.05, settle_s=2.0, **noise
+    )
+    assert other_responses([path]) == {"m2_acceleration": (path,)}
+    of_m2, of_m0 = (analyse(path, response=role) for role in ("m2_acceleration", None))
+    assert (of_m2.facts.mass, of_m0.facts.mass) == ("m2", "m0")
+    for found, column in ((of_m2, 2), (of_m0, 0)):
+        response = found.response.frequency_response
+        model = base_transmissibility(specimen_of(BASE), response.frequency_hz)[:, column]
+        at = [int(np.argmin(np.abs(response.frequency_hz - hz))) for hz in (94.5, 266.0, 500.0)]
+        np.testing.assert_allclose(np.abs(response.value)[at], np.abs(model)[at], rtol=0.03)
+    command = [sys.executable, "-m", "vibench.cli", "analyse", path, "--no-simulate", "--json"]
+    ended = subprocess.run(
+        [*command, "--out", tmp_path / "out"], capture_output=True, text=True, check=True, timeout=110
+    )
+    said = json.loads(ended.stdout)
+    assert said["responses"]["m2_acceleration"]["results"][0]["recording"]["name"] == "s"
+    report = (tmp_path / "out" / "report_m2_acceleration.html").read_text(encoding="utf-8")
+    assert list((tmp_path / "out" / "figures_m2_acceleration").glob("transmission_s.*"))
+    shown = re.sub(r"<(script|style).*?</\1>|data:[^\"]+", "", report, flags=re.DOTALL)
+    # The channel of m0 stands among the levels of all channels, and nothing else speaks of m0.
+    assert re.findall(r".{30}\bm0\b(?! velocity).{20}", shown) == []
+
+
+def test_a_channel_that_shows_no_mass_is_no_response(tmp_path):
+    path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
+    assert other_responses([path]) == {}
+    with pytest.raises(UnusableData, match="base_force is no channel that shows the motion of a mass"):
+        analyse(path, response="base_force")

@@ -108,7 +108,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         label="what does not repeat there",
     )
     magnitude_axis(axes)
-    axes.set_ylabel("m0 velocity [m/s]")
+    axes.set_ylabel("velocity of the mass [m/s]")
 
 
 def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, str, str]) -> None:
@@ -152,5 +152,5 @@ def _quiet_text(found: Distortion) -> str:
     return (
         f" Lines that were not driven hold {' and '.join(shown)} (rms, what does not repeat, "
         f"{1e6 * found.detection_noise_m_per_s:.2g} µm/s taken off): even and odd distortion of all from "
-        "the drive voltage to m0."
+        "the drive voltage to the mass."
     )

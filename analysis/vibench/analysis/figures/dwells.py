@@ -77,7 +77,7 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
     axes.axvspan(stop_s - response.window_s, stop_s, color=COLLIDING, zorder=0, label="window analysed")
     axes.fill_between(found.time_s, factor * found.lower, factor * found.upper, color=MEASURED, linewidth=0)
     axes.set_xlim(0, motion.samples.size / motion.sample_rate_hz)
-    axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of m0 [{unit}]")
+    axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of {analysis.facts.mass} [{unit}]")
 
 
 def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
@@ -138,8 +138,8 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
         said.append(f"{text} Measured bands: {bands} re the drive's line." if bands else text)
     window_s = rising[0][0].response.window_s
     text = (
-        f"Displacement of m0 and its spectrum over the last {window_s:.3g} s (largest line in each "
-        f"{COLUMN_HZ:g} Hz). {' '.join(said)}"
+        f"Displacement of {rising[0][0].facts.mass} and its spectrum over the last {window_s:.3g} s "
+        f"(largest line in each {COLUMN_HZ:g} Hz). {' '.join(said)}"
     )
     if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
         return text

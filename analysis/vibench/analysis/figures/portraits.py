@@ -75,8 +75,8 @@ def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
         markersize=2.5,
         label="once a drive period",
     )
-    axes.set_xlabel(f"x of m0 [{unit}]")
-    axes.set_ylabel(f"velocity of m0 [{speed_unit}]")
+    axes.set_xlabel(f"x of {analysis.facts.mass} [{unit}]")
+    axes.set_ylabel(f"velocity of {analysis.facts.mass} [{speed_unit}]")
     axes.set_title(f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}")
 
 
@@ -89,6 +89,6 @@ def _caption(rising: Sequence[DwellAnalysis]) -> str:
             text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
         said.append(text)
     return (
-        "Velocity over displacement of m0 (grey) and one point at the same phase of every recorded drive "
-        f"period (colour). {'. '.join(said)}."
+        f"Velocity over displacement of {rising[0].facts.mass} (grey) and one point at the same "
+        f"phase of every recorded drive period (colour). {'. '.join(said)}."
     )

@@ -66,14 +66,14 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
         color=MEASURED,
         alpha=0.85,
         linewidth=0,
-        label="measured m0 velocity",
+        label=f"measured {analysis.facts.mass} velocity",
     )
     if laid is not None:
         for number, outline in enumerate((laid.response.upper, laid.response.lower)):
             label = simulated_label(laid.run) if number == 0 else None
             axes.plot(laid.response.time_s, factor * outline, color=SIMULATED, linewidth=0.7, label=label)
     axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
-    axes.set_ylabel(f"m0 velocity\n[{unit}]")
+    axes.set_ylabel(f"{analysis.facts.mass} velocity\n[{unit}]")
     axes.set_xlabel("time of the sweep [s]")
     _frequency_on_top(axes, found)
 

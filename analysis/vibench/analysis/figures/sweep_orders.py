@@ -54,7 +54,7 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
     factor, unit = prefixed(top, "m/s")
     figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
     axes.set_xlabel("time of the sweep [s]")
-    axes.set_ylabel("frequency in the\nvelocity of m0 [Hz]")
+    axes.set_ylabel(f"frequency in the\nvelocity of {analysis.facts.mass} [Hz]")
     axes.grid(visible=False)
 
 
@@ -77,7 +77,7 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
     axes.set_xlim(*ends)
     magnitude_axis(axes)
     axes.set_xlabel("drive frequency [Hz]")
-    axes.set_ylabel(f"displacement of m0 [{unit}]")
+    axes.set_ylabel(f"displacement of {analysis.facts.mass} [{unit}]")
 
 
 def _caption(analysis: SweepAnalysis) -> str:
@@ -91,9 +91,9 @@ def _caption(analysis: SweepAnalysis) -> str:
     )
     return (
         f"Above: amplitude in the recorded velocity, {found.resolution_hz:.2g} Hz wide at half power. Below: "
-        "displacement of m0 at orders of the recorded drive, grey where the masses collide; with collisions "
-        f"each holds what chaos puts near it. Strongest beside order 1 is {loudest[1]}, "
-        f"{20 * np.log10(loudest[0]):.0f} dB below it (median)."
+        f"displacement of {analysis.facts.mass} at orders of the recorded drive, grey where the "
+        f"masses collide; with collisions each holds what chaos puts near it. Strongest beside order 1 is "
+        f"{loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB below it (median)."
     )
 
 

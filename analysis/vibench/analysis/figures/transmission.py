@@ -139,7 +139,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     seen = size[np.isfinite(size) & (size > 0)]
     if seen.size:
         axes.set_ylim(bottom=float(view.drawn(np.array([_BELOW * np.min(seen)]))[0]))
-    axes.set_ylabel(view.label)
+    axes.set_ylabel(view.label(analysis.facts.mass))
 
 
 def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:

@@ -43,7 +43,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
             )
         if view.scale is MagnitudeScale.LOG:
             magnitude_axis(axes)
-        axes.set_ylabel(view.label)
+        axes.set_ylabel(view.label(rising[0].facts.mass))
         axes.set_xlabel("frequency [Hz]")
         lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
         highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
@@ -71,7 +71,7 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
         where = f"resonances at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
         said.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
     return (
-        f"Measured transmission from base to m0 at {len(rising)} noise levels. {'; '.join(said)}. "
-        "Dashed: resonances of the model without contact; dotted: with m1 stuck to m2, where strong "
-        "collisions move the motion to."
+        f"Measured transmission from base to {rising[0].facts.mass} at {len(rising)} noise levels. "
+        f"{'; '.join(said)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
+        "m2, where strong collisions move the motion to."
     )

@@ -60,13 +60,12 @@ class FrequencyResponseView:
         """``"|x / U|"``, for captions and axes."""
         return f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
 
-    @property
-    def label(self) -> str:
+    def label(self, mass: str = "m0") -> str:
         """Text of the magnitude axis."""
         unit = self.unit
         match self.scale:
             case MagnitudeScale.LOG:
-                return f"{self.symbol}{f' [{unit}]' if unit else ''}  (m0 over base)"
+                return f"{self.symbol}{f' [{unit}]' if unit else ''}  ({mass} over base)"
             case MagnitudeScale.DECIBEL:
                 return f"{self.symbol} [dB re 1{f' {unit}' if unit else ''}]"
 

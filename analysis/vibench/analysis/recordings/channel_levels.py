@@ -15,7 +15,6 @@ from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Integers, Reals
 from ..signals.envelope import DEFAULT_BINS, Envelope
 from .channels import BASE, DRIVE, OnRead, ignore_reading
-from .response import RESPONSE_ROLES
 
 _BLOCK_S = 2.0
 _AT_FULL_SCALE = 0.999
@@ -163,15 +162,15 @@ _CLIPPED_SHARE = 0.2
 """A sine that just fills its range spends 3 % of its time within a thousandth of it; this is no sine."""
 
 
-def require_moving_channels(levels: Sequence[ChannelLevel]) -> None:
-    """Refuse channels that hold nothing to analyse.
+def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
+    """Refuse channels that hold nothing to analyse; ``response`` is that whose motion is analysed.
 
     Raises
     ------
     UnusableData
         One sentence that names every such channel and what to look at.
     """
-    used = (DRIVE, BASE, *RESPONSE_ROLES)
+    used = (DRIVE, BASE, response)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]
     if faults:
         raise UnusableData("; ".join(faults))

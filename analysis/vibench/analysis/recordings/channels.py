@@ -135,6 +135,8 @@ class RecordedChannels:
 
     recording: Recording
     on_read: OnRead = ignore_reading
+    response: str | None = None
+    """Channel whose motion is analysed; None for that of m0."""
     _response: ResponseChannel = field(init=False)
 
     def __post_init__(self) -> None:
@@ -145,7 +147,7 @@ class RecordedChannels:
                 f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and one of "
                 f"{', '.join(RESPONSE_ROLES)}"
             )
-        object.__setattr__(self, "_response", ResponseChannel(self.recording))
+        object.__setattr__(self, "_response", ResponseChannel(self.recording, self.response))
 
     @property
     def sample_rate_hz(self) -> float:

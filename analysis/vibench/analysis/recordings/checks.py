@@ -14,7 +14,7 @@ from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig
 
 from ..tables import Labelled
-from .channels import DRIVE, RESPONSE
+from .channels import DRIVE
 from .facts import RecordingFacts
 
 
@@ -114,7 +114,7 @@ def _overloads(facts: RecordingFacts) -> Check:
     flat = [
         f"{each.header.role} at {' and '.join(f'{value:.4g}' for value in each.flat_tops)} {each.header.unit}"
         for each in facts.channels
-        if each.flat_tops and not (facts.dropouts and each.header.role == RESPONSE)
+        if each.flat_tops and not (facts.dropouts and each.header.role == facts.response)
     ]
     if flat:
         text = f"flat tops: {', '.join(flat)}; peaks are cut, so Responses I and II are wrong; measure again"
@@ -130,7 +130,7 @@ def _overloads(facts: RecordingFacts) -> Check:
         return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
     what = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
-    if facts.dropouts and RESPONSE in facts.overload_s:
+    if facts.dropouts and facts.response in facts.overload_s:
         what = (
             "the vibrometer lost its light for longer than is bridged, or peaks were cut: look at the "
             "velocity there, and do not trust Response I"
@@ -142,7 +142,7 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
     if facts.dropouts:
         times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
         text = (
-            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; m0's motion was "
+            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; the motion was "
             "bridged there from both sides, which misses what impacts did there. Refocus the laser, or stick "
             "on reflective tape"
         )

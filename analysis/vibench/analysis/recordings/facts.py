@@ -23,8 +23,15 @@ from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
 from ..errors import UnusableData
 from .channel_levels import ChannelLevel, channel_levels
-from .channels import RESPONSE, OnRead, ignore_reading
-from .response import ACCELERATION, LOWEST_INTEGRATED_HZ, VELOCITY, ResponseChannel, response_role
+from .channels import OnRead, ignore_reading
+from .response import (
+    ACCELERATION,
+    LOWEST_INTEGRATED_HZ,
+    VELOCITY,
+    ResponseChannel,
+    response_role,
+    response_roles,
+)
 
 MOST_BYTES = 1e9
 """Most bytes of memory, for what need not be checked against the file's size."""
@@ -104,6 +111,11 @@ class RecordingFacts(RecordingDescription):
     """When each of it was noted, from the beginning of the recording [s]."""
 
     @property
+    def mass(self) -> str:
+        """Mass whose motion is analysed: ``"m0"``."""
+        return self.response.partition("_")[0]
+
+    @property
     def feedback_noted(self) -> list[dict[str, Any]]:
         """Kind, time and numbers of each note."""
         return [
@@ -121,8 +133,12 @@ class RecordingFacts(RecordingDescription):
         return next(each for each in self.channels if each.header.role == role)
 
 
-def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
+def recording_facts(
+    recording: Recording, on_read: OnRead = ignore_reading, response: str | None = None
+) -> RecordingFacts:
     """Collect what a recording says about itself; ``on_read`` receives the part of its samples read so far.
+
+    ``response`` is the channel whose motion is analysed; None for that of m0.
 
     Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
     know, and NotEnoughData when it holds no samples.
@@ -130,13 +146,14 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     require_measured_size(recording)
     seal = require_intact(recording)
     measurement = plan_of(recording)
-    _require_band(recording, measurement)
+    response = response or response_role(recording) or VELOCITY
+    _require_band(recording, measurement, response)
     _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
-    dropouts = _dropouts(recording)
+    dropouts = _dropouts(recording, response)
     for each in recording.overloads:
-        if each.channel == RESPONSE and any(
+        if each.channel == response and any(
             one.first <= each.first_sample and each.last_sample < one.stop for one in dropouts
         ):
             continue
@@ -162,25 +179,25 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         late=tuple(each.text for each in recording.events if each.kind == EventKind.LATE),
         check=recording.check_text,
         seal=seal,
-        response=response_role(recording) or VELOCITY,
+        response=response,
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
     )
 
 
-def _require_band(recording: Recording, measurement: Measurement) -> None:
+def _require_band(recording: Recording, measurement: Measurement, response: str) -> None:
     low_hz = measurement.excitation.band_hz[0]
-    if response_role(recording) == ACCELERATION and low_hz < LOWEST_INTEGRATED_HZ:
+    if response.endswith(ACCELERATION) and low_hz < LOWEST_INTEGRATED_HZ:
         raise UnusableData(
-            f"{recording.path.name}: the plan reaches down to {low_hz:g} Hz, and the acceleration of m0 is "
-            f"integrated from {LOWEST_INTEGRATED_HZ:g} Hz on; measure the velocity or displacement of m0"
+            f"{recording.path.name}: the plan reaches down to {low_hz:g} Hz, and {response} is integrated "
+            f"from {LOWEST_INTEGRATED_HZ:g} Hz on; measure a velocity or displacement"
         )
 
 
-def _dropouts(recording: Recording) -> tuple[Dropout, ...]:
-    if response_role(recording) is None:
+def _dropouts(recording: Recording, response: str) -> tuple[Dropout, ...]:
+    if response not in response_roles(recording):
         return ()
-    return ResponseChannel(recording).dropouts(0, recording.samples)
+    return ResponseChannel(recording, response).dropouts(0, recording.samples)
 
 
 def plan_of(recording: Recording) -> Measurement:

@@ -15,8 +15,11 @@ from vibench.acquisition.rig import RESPONSE_ROLES as ROLES
 from ..errors import UnusableData
 from ..signals.arrays import Reals, Samples
 
-VELOCITY, ACCELERATION, DISPLACEMENT = RESPONSE_ROLES = tuple(role.value for role in ROLES)
+VELOCITY = ROLES[0].value
+RESPONSE_ROLES = tuple(role.value for role in ROLES)
 """Channels that show the motion of m0, the one that is used first."""
+ACCELERATION, DISPLACEMENT = "acceleration", "displacement"
+_MOTIONS = ("velocity", ACCELERATION, DISPLACEMENT)
 LOWEST_INTEGRATED_HZ = 5.0
 """An acceleration is integrated exactly above it; below it, the velocity fades to nothing."""
 _HELD_S, _REACH_S = 0.2, 1.0
@@ -77,7 +80,7 @@ _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = Ma
 
 @dataclass(eq=False)
 class ResponseChannel:
-    """Velocity of m0 from the first of `RESPONSE_ROLES` that a recording has.
+    """Velocity of a mass; by default that of m0 from the first of `RESPONSE_ROLES` that a recording has.
 
     An acceleration is integrated, which makes its noise grow towards low frequencies; a displacement is
     differentiated, which makes it grow towards high ones. Both happen with zero phase.
@@ -86,24 +89,32 @@ class ResponseChannel:
     """
 
     recording: Recording
+    response: str | None = None
+    """Channel that shows the motion, one of `response_roles`."""
     role: str = field(init=False)
+    quantity: str = field(init=False)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
     """Number and velocities of the block that was made last: estimators read one after the other."""
 
     def __post_init__(self) -> None:
-        found = response_role(self.recording)
+        found = self.response or response_role(self.recording)
+        if self.response is not None and self.response not in response_roles(self.recording):
+            raise UnusableData(
+                f"{self.response} is no channel that shows the motion of a mass; the recording has "
+                f"{', '.join(response_roles(self.recording)) or 'none'}"
+            )
         if found is None:
             raise UnusableData(
                 f"no channel shows the motion of m0: the recording has {', '.join(self.recording.roles)}; "
                 f"an analysis needs one of {', '.join(RESPONSE_ROLES)}"
             )
-        self.role = found
-        if found in _CONVERSIONS:
-            self._kernel = _CONVERSIONS[found][0](self.recording.sample_rate_hz)
-        if found in _CONVERSIONS and self.recording.samples <= self.reach:
+        self.role, self.quantity = found, _quantity(found)
+        if self.quantity in _CONVERSIONS:
+            self._kernel = _CONVERSIONS[self.quantity][0](self.recording.sample_rate_hz)
+        if self.quantity in _CONVERSIONS and self.recording.samples <= self.reach:
             raise UnusableData(
-                f"{self.recording.duration_s:.3g} s of {found} are too short for the velocity of m0; record "
+                f"{self.recording.duration_s:.3g} s of {found} are too short for a velocity; record "
                 f"more than {self.reach / self.recording.sample_rate_hz:.3g} s"
             )
 
@@ -114,7 +125,7 @@ class ResponseChannel:
 
     def read(self, start: int, stop: int) -> Reals:
         """Give velocities [m/s], shape (samples,); lost samples are NaN, a vibrometer's drop-outs bridged."""
-        if self.role not in _CONVERSIONS:
+        if self.quantity not in _CONVERSIONS:
             return BridgedChannel(self.recording, self.role).read(start, stop)
         size = max(_BLOCK_REACHES * self._kernel.size, _LEAST_BLOCK)
         parts = [np.empty(0)]
@@ -126,7 +137,7 @@ class ResponseChannel:
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
         """Give the drop-outs that reach into these samples; only light drops out."""
-        if self.role in _CONVERSIONS:
+        if self.quantity in _CONVERSIONS:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
 
@@ -139,7 +150,7 @@ class ResponseChannel:
             lost = np.isnan(given)
             given = np.where(lost, 0.0, given - (0.0 if lost.all() else np.nanmean(given)))
             before, behind = first - (start - reach), (stop + reach) - last
-            about = _CONVERSIONS[self.role][1]
+            about = _CONVERSIONS[self.quantity][1]
             ends = _mirrored(given, before, about)[::-1], _mirrored(given[::-1], behind, about)
             given = np.concatenate((ends[0], given, ends[1]))
             found = _convolved(given, self._kernel)
@@ -154,7 +165,8 @@ def velocity_noise(
     role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
 ) -> Iterator[Samples]:
     """Yield white noise of unit variance at a sensor as `ResponseChannel` reads it, block by block."""
-    kernel = _CONVERSIONS[role][0](rate_hz) if role in _CONVERSIONS else np.ones(1)
+    quantity = _quantity(role)
+    kernel = _CONVERSIONS[quantity][0](rate_hz) if quantity in _CONVERSIONS else np.ones(1)
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
     for first in range(0, count, block):
         white = np.concatenate((before, rng.standard_normal(min(block, count - first), np.float32)))
@@ -173,6 +185,24 @@ def _convolved(samples: Samples, kernel: Reals) -> Reals:
     size = next_fast_len(samples.size + kernel.size - 1, real=True)
     whole = np.fft.irfft(np.fft.rfft(samples, size) * np.fft.rfft(kernel, size), size)
     return whole[kernel.size - 1 : samples.size]
+
+
+def _quantity(role: str) -> str:
+    return role.rpartition("_")[2]
+
+
+def response_roles(recording: Recording) -> tuple[str, ...]:
+    """Name every channel ``<mass>_<quantity>`` that shows the motion of a mass, that of m0 first."""
+    first = response_role(recording)
+    others = (
+        role
+        for role in recording.roles
+        if role != first
+        and role.partition("_")[0] != "base"
+        and _quantity(role) in _MOTIONS
+        and recording.channel(role).quantity == _quantity(role)
+    )
+    return (*(() if first is None else (first,)), *others)
 
 
 def response_role(recording: Recording) -> str | None:

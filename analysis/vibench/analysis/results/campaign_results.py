@@ -1,6 +1,7 @@
 """All recordings of a campaign, analysed; one that cannot be analysed says why and stops no other."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,6 +25,7 @@ from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
+from ..recordings.response import response_role, response_roles
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import plain
@@ -174,6 +176,7 @@ def analyse_files(
     observer: Observer = ignore_progress,
     specimen: Specimen | None = None,
     draws: int = DRAWS,
+    response: str | None = None,
 ) -> CampaignResults:
     """Analyse recordings one after the other, each with the model overlaid on it, as `analyse` does.
 
@@ -196,6 +199,8 @@ def analyse_files(
         In place of the described one.
     draws
         Simulated runs of each test.
+    response
+        Channel whose motion is analysed; by default that of m0, which alone is simulated.
 
     Raises
     ------
@@ -211,7 +216,14 @@ def analyse_files(
         try:
             with open_recording(path) as recording:
                 result, failed = result_of(
-                    recording, simulation, request, observer, specimen, shaker=shaker, draws=draws
+                    recording,
+                    simulation,
+                    request,
+                    observer,
+                    specimen,
+                    shaker=shaker,
+                    draws=draws,
+                    response=response,
                 )
         except (AnalysisError, RecordingError) as error:
             failures.append(AnalysisFailure(path.name, FailedStep.ANALYSIS, str(error)))
@@ -219,6 +231,21 @@ def analyse_files(
         results.append(result)
         failures.extend(failed)
     return CampaignResults(name, tuple(results), tuple(failures))
+
+
+def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
+    """Return the channels of other motions than that of m0, with the recordings that have each.
+
+    Recordings that cannot be read are left out: their own analysis says what is wrong with them.
+    """
+    found: dict[str, tuple[Path, ...]] = {}
+    for path in paths:
+        with suppress(RecordingError), open_recording(path) as recording:
+            first = response_role(recording)
+            for role in response_roles(recording):
+                if role != first:
+                    found[role] = (*found.get(role, ()), path)
+    return found
 
 
 def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
@@ -272,14 +299,15 @@ def result_of(
     *,
     shaker: FittedShaker | None = None,
     draws: int = DRAWS,
+    response: str | None = None,
 ) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
     Raises AnalysisError when nothing in the recording is usable.
     """
     name = recording.path.name
-    analysis = analyse(recording, request, observer)
-    if simulation is Simulation.LEFT_OUT:
+    analysis = analyse(recording, request, observer, response)
+    if simulation is Simulation.LEFT_OUT or response is not None:
         return Result(analysis, None), ()
     try:
         laid = overlay(

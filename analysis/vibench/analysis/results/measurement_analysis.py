@@ -25,6 +25,7 @@ def analyse(
     recording: Recording | Path | str,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: Observer = ignore_progress,
+    response: str | None = None,
 ) -> AbstractAnalysis[Any, Any]:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
@@ -37,6 +38,8 @@ def analyse(
         How the transmission of noise is estimated; other excitations take no notice.
     observer
         Told how far it is.
+    response
+        Channel whose motion is analysed, such as ``"m2_velocity"``; by default that of m0.
 
     Raises
     ------
@@ -45,12 +48,12 @@ def analyse(
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:
-            return analyse(opened, request, observer)
+            return analyse(opened, request, observer, response)
     name = recording.path.name
-    facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"))
+    facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"), response)
     try:
-        channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"))
-        require_moving_channels(facts.channels)
+        channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"), response)
+        require_moving_channels(facts.channels, facts.response)
         plan = facts.measurement.excitation
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
         found = replace(found, checks=(*found.checks, *until_checks(facts)))
