@@ -153,10 +153,10 @@ def test_a_forgotten_start_is_answered_with_motions_and_shares(vibench_here, tmp
     assert len(motions) > 1
     assert sum(each["starts"] for each in motions) == point["ensemble"]["starts"] >= 8
     assert all(each["share"]["low"] <= each["share"]["share"] <= each["share"]["high"] for each in motions)
-    assert "At 1 of 1 points the start was forgotten" in ran.stderr
+    assert "At 1 of 1 points the motion depends sensitively on the start" in ran.stderr
     assert "starts are followed, and chaos is followed on, for 0.2 s" in ran.stderr
     told = vibench_here(*asked, cwd=tmp_path)
-    assert "Where the start is forgotten" in told.stdout
+    assert "Motions with sensitive dependence on the start" in told.stdout
     assert "%)" in told.stdout
 
 

@@ -89,7 +89,7 @@ def test_one_that_hangs_is_named_and_keeps_no_stop_from_the_others(vibench_here,
             assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
             assert told.returncode == 1
             assert f"south, process {south.pid}: has taken the stop (abort)" in told.stdout
-            assert f"hangs, process {hangs.pid} lives and does not answer" in told.stderr
+            assert f"hangs, process {hangs.pid} runs but does not answer" in told.stderr
         assert hangs.communicate(timeout=20)[0] == "abort vibench stop\n"
 
 

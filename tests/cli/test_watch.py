@@ -80,7 +80,7 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
     assert seen[0]["status"]["run"]["name"] == "dwell"
     assert "vibench release" in vibench_here("stop", "--level", "hold", cwd=tmp_path).stdout
     wait(running, EngineState.HELD)
-    assert "told to go on" in vibench_here("release", cwd=tmp_path).stdout
+    assert "has received the release" in vibench_here("release", cwd=tmp_path).stdout
     wait(running, EngineState.RUNNING)
     told = vibench("stop", "--level", "abort", "--reason", "smoke in the laboratory")
     assert told.returncode == 0, told.stderr
@@ -95,7 +95,7 @@ def test_a_stop_of_an_engine_that_stands_still_is_kept_and_said_so(running, tmp_
     with frozen(running.pid):
         told = vibench("stop", "--level", "abort", "--reason", "while it stood still")
         assert told.returncode == 1
-        assert "lives and does not answer" in told.stderr
+        assert "runs but does not answer" in told.stderr
         seen = json.loads(vibench("watch", "--json").stdout)["engines"]
         assert [each["pid"] for each in seen] == [running.pid]
         assert "does not answer within" in seen[0]["silence"]

@@ -57,10 +57,9 @@ def forgetting_text(points: Sequence[ScenePrediction]) -> str:
     ensembles = [point.ensemble for point in lost if point.ensemble is not None]
     starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
     return (
-        f"At {len(lost)} of {len(points)} points the start was forgotten: a small change had grown past "
-        f"telling before the motion settled, or it never did. There {starts} starts were followed for "
-        f"{followed_s:.0f} s in all; {sum(each.is_one_of_several for each in lost)} points have more than "
-        "one motion."
+        f"At {len(lost)} of {len(points)} points the motion depends sensitively on the start, or did not "
+        f"settle. There {starts} starts were simulated for {followed_s:.0f} s in all; "
+        f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )
 
 

@@ -103,7 +103,7 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
                 f"instrument hangs, or the computer does. {SWITCH_OFF}"
             )
         case StopDelivery.TOLD if level is StopLevel.HOLD:
-            return f"{name}: holds; 'vibench release' resumes it."
+            return f"{name}: has received the hold; 'vibench release' resumes it."
         case StopDelivery.TOLD | StopDelivery.TAKEN:
             return f"{name}: has taken the stop ({level.value}); its output is off."
 
@@ -114,7 +114,7 @@ def release(pid: Pid = None) -> None:
     with EngineClient.attach(engine.address) as client:
         # A hold may be requested before anything can be held, such as during a rest; release it as well.
         client.resume()
-    console.print(f"{engine.what}, process {engine.pid}: resumes.")
+    console.print(f"{engine.what}, process {engine.pid}: has received the release.")
 
 
 def _facts(engine: Announcement) -> dict[str, object]:
