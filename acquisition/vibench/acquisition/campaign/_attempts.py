@@ -193,7 +193,8 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig at free pace idles at once: its time counts, otherwise the clock's.
+                # A virtual rig at free pace needs no real time, so rig time counts there, otherwise real
+                # time.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

@@ -258,7 +258,7 @@ class Tracked:
     lock: LockResult
     tries: int
     periods: int
-    """Number of drive periods until then."""
+    """Number of drive periods up to this result."""
 
 
 def _flanks(

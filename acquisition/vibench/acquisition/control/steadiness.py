@@ -333,7 +333,7 @@ def _repeats(figures: Judgement, tolerance: float) -> bool:
 
 
 def _limit(figures: Judgement, tolerance: float) -> float:
-    """Return the largest scatter of a motion that repeats as far as can be seen."""
+    """Return the largest scatter of a motion that still counts as repeating."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 

@@ -65,7 +65,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
         pause = Event()
         while not handler.is_forgotten(after_s):
             pause.wait(after_s / 10)
-        handler.shutdown(Cause.PARENT_GONE, f"nobody has asked for {after_s:g} s, and nothing was to be done")
+        handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to carry out")
 
     Thread(target=look, name="engine forgotten", daemon=True).start()
 

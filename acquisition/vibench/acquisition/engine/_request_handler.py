@@ -207,8 +207,8 @@ class RequestHandler:
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
-        Checking the limits of a long campaign takes seconds, in which nothing is armed that a stop could
-        disarm: it would be armed afterwards, and started.
+        Checking the limits of a long campaign takes seconds. A stop in this time has nothing to disarm, so
+        it is checked again before arming.
         """
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)

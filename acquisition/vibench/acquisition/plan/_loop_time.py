@@ -15,7 +15,5 @@ def look_s(frequency_hz: float) -> float:
 
 
 def loop_time_s(rig: Rig, frequency_hz: float) -> float:
-    """Return the time from a motion to the drive computed from it: a look, and the generator's commands
-    [s].
-    """
+    """Return the delay from a motion to the resulting drive: a look, and the generator's commands [s]."""
     return look_s(frequency_hz) + _COMMANDS * rig.generator.settle_s
