@@ -17,7 +17,7 @@ from vibench.acquisition.engine import (
     RequestHandler,
     Supervision,
 )
-from vibench.acquisition.engine._server import answered
+from vibench.acquisition.engine._server import answer_to
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import Message
 
@@ -187,7 +187,7 @@ def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
     ],
 )
 def test_a_request_that_is_not_understood_does_nothing_and_says_where(handler, request_text, where):
-    answer = json.loads(answered(handler, Message(request_text.encode())).text)
+    answer = json.loads(answer_to(handler, Message(request_text.encode())).text)
     assert where in answer["refused"]
     assert "nothing was done" in answer["refused"]
 
@@ -202,6 +202,6 @@ def test_a_request_and_its_answer_are_what_they_were_on_the_wire(handler):
     assert VERBS["stop"].message(level="ramp").text == (
         b'{"ask":"stop","level":"ramp","reason":"stopped by the operator"}'
     )
-    assert answered(handler, VERBS["beat"].message()).text == b'{"ok": true}'
-    looked = answered(handler, VERBS["look"].message(most=3))
+    assert answer_to(handler, VERBS["beat"].message()).text == b'{"ok": true}'
+    looked = answer_to(handler, VERBS["look"].message(most=3))
     assert json.loads(looked.text).keys() == {"run_id", "first_sample", "sample_rate_hz", "shape"}
