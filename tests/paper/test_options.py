@@ -52,6 +52,7 @@ def test_a_fit_has_the_force_of_the_stops_at_its_indentation(model):
     assert case.fitted("hertz") == "hertz"
 
 
+@pytest.mark.thorough
 def test_models_are_compared_up_to_the_frequency_given():
     short = Case(accuracy=Accuracy.QUICK, duration_s=0.6, window_s=0.25, highest_hz=300.0)
     evidence = Evidence(lambda study: solve_study(study, workers=2))
