@@ -334,7 +334,7 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
         if before - error < _SETTLED:
             break
         turned = np.fft.irfft(wanted * np.exp(1j * np.angle(spectrum)), series.size)
-        shuffled = values[np.argsort(np.argsort(turned))]
+        shuffled[np.argsort(turned)] = values
     return shuffled, error
 
 

@@ -1,6 +1,6 @@
 """What a noise measurement shows: the transmission from base to m0, with bounds and resonances."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -27,6 +27,8 @@ from .results import Estimator, FrequencyResponse, converted_frequency_response
 from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
+Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
+"""The transmission, and what finds the rest in the same samples, resonances above all: that costs more."""
 _BLOCK = 1 << 19
 """Samples of a record that are looked at together."""
 _LEVEL_SEGMENT_S = 1.0
@@ -80,7 +82,7 @@ def repeated_response(
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     *,
     repetitions: Sequence[Repetition] = (),
-) -> NoiseResponse:
+) -> Estimated:
     """Estimate the transmission of noise that repeats from everything usable in it.
 
     Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
@@ -139,23 +141,28 @@ def repeated_response(
         ).without_gain(sensors)
 
     chosen = by(request.estimator)
-    found = _resonances(chosen)
-    if found and not repetitions and scatters_beyond_noise(periodic):
-        without = (_resonances(by(request.estimator, each)) for each in sums.without_each())
-        found = scattered_resonances(found, tuple(without))
-    return NoiseResponse(
-        frequency_response=chosen,
-        h1=by(Estimator.H1),
-        h2=by(Estimator.H2),
-        resonances=found,
-        base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
-        bias=_bias(chosen, by(Estimator.DRIVE), found),
-        periodic=periodic,
-        used_s=used / rate,
-        left_out=len(stretches) - taken,
-        lost_samples=bad.lost,
-        overloaded_samples=bad.overloaded,
-    )
+
+    def response() -> NoiseResponse:
+        found = _resonances(chosen)
+        if found and not repetitions and scatters_beyond_noise(periodic):
+            without = (_resonances(by(request.estimator, each)) for each in sums.without_each())
+            found = scattered_resonances(found, tuple(without))
+        band = {"low_hz": noise.band_start_hz, "high_hz": noise.band_stop_hz}
+        return NoiseResponse(
+            frequency_response=chosen,
+            h1=by(Estimator.H1),
+            h2=by(Estimator.H2),
+            resonances=found,
+            base_level=noise_drive_level(level.density(), **band),
+            bias=_bias(chosen, by(Estimator.DRIVE), found),
+            periodic=periodic,
+            used_s=used / rate,
+            left_out=len(stretches) - taken,
+            lost_samples=bad.lost,
+            overloaded_samples=bad.overloaded,
+        )
+
+    return chosen, response
 
 
 @dataclass

@@ -69,7 +69,7 @@ def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellRes
     found = measured_dwell(channels, analysis.excitation, towards_hz, analysis.response.window_s)
     endings = _endings(irregular_motion(channels, found))
     impacts = channels.played_impacts(SegmentLabel.DWELL)
-    return Draw(found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
+    return Draw(lambda: found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
 
 
 def _compared_quantities(analysis: DwellAnalysis) -> tuple[Quantity, ...]:

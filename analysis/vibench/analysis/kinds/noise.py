@@ -8,6 +8,7 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison.recording_curves import noise_traces
 from ..frequency_response.noise_response import (
+    Estimated,
     Noise,
     NoiseAnalysis,
     NoiseResponse,
@@ -25,7 +26,7 @@ from ..uncertainty.quantities import noise_budgets
 from .analysis_kind import AnalysisKind
 
 NOISE_FAMILY = "noise"
-Estimate = Callable[[Channels, Any, FrequencyResponseRequest], NoiseResponse]
+Estimate = Callable[[Channels, Any, FrequencyResponseRequest], Estimated]
 
 
 def _warnings(found: NoiseResponse) -> Iterator[Check]:
@@ -46,20 +47,21 @@ def _noise(
     def analyse(
         facts: RecordingFacts, channels: Channels, plan: Noise, request: FrequencyResponseRequest
     ) -> NoiseAnalysis:
-        response = estimate(channels, plan, request)
+        _, whole = estimate(channels, plan, request)
+        response = whole()
         checks = (*measurement_checks(facts), *_warnings(response))
         return NoiseAnalysis(facts, checks, plan, response, request)
 
     def draw(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Draw[NoiseResponse]:
-        response = again(analysis)(channels, analysis.excitation, analysis.request)
-        label = SegmentLabel.NOISE if response.periodic is None else SegmentLabel.REALISATION
-        return Draw(response, noise_quantities(response), (), *channels.played_impacts(label))
+        found, whole = again(analysis)(channels, analysis.excitation, analysis.request)
+        label = SegmentLabel.NOISE if analysis.response.periodic is None else SegmentLabel.REALISATION
+        return Draw(whole, noise_quantities(found), (), *channels.played_impacts(label))
 
     return AnalysisKind(
         family=NOISE_FAMILY,
         analyse=analyse,
         draws=lambda analysis: partial(draw, analysis),
-        compared=lambda analysis: noise_quantities(analysis.response),
+        compared=lambda analysis: noise_quantities(analysis.response.frequency_response),
         lay=noise_overlay,
         curves=noise_traces,
         budgets=noise_budgets,
@@ -75,5 +77,10 @@ def _estimate_for_draws(analysis: NoiseAnalysis) -> Estimate:
     return partial(repeated_response, repetitions=found.periodic.repetitions)
 
 
+def _streamed(channels: Channels, plan: Any, request: FrequencyResponseRequest) -> Estimated:
+    found = streamed_response(channels, plan, request)
+    return found.frequency_response, lambda: found
+
+
 REPEATED_NOISE = _noise(repeated_response, again=_estimate_for_draws)
-STREAMED_NOISE = _noise(streamed_response, again=lambda _: streamed_response)
+STREAMED_NOISE = _noise(_streamed, again=lambda _: _streamed)

@@ -56,7 +56,7 @@ def stepped_analysis(
 
     def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
         response = stepped_response(channels, analysis.excitation, label, setting_vpp)
-        return Draw(response, stepped_quantities(response), (), *channels.played_impacts(label))
+        return Draw(lambda: response, stepped_quantities(response), (), *channels.played_impacts(label))
 
     return AnalysisKind(
         family="stepped_sine",

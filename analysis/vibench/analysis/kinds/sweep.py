@@ -45,7 +45,7 @@ def _draws(analysis: SweepAnalysis) -> Callable[[SimulatedChannels], Draw[SweptM
         found = swept.motion(channels)
         colliding = collisions(found)
         impacts = channels.played_impacts(SegmentLabel.SWEEP)
-        return Draw(found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
+        return Draw(lambda: found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
 
     return draw
 

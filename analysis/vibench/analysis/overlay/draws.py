@@ -241,7 +241,8 @@ R = TypeVar("R")
 class Draw(Generic[R]):
     """One draw, through the estimator of the recording."""
 
-    response: R
+    response: Callable[[], R]
+    """Finish the estimate, of which a comparison needs the quantities alone."""
     quantities: tuple[Quantity, ...]
     endings: tuple[Ending, ...]
     impacts: float
@@ -332,8 +333,8 @@ def drawn(
     def estimated(number: int) -> Draw[None]:
         draw = estimate(source.channels(number))
         if number == 0:
-            responses.append(draw.response)
-        return Draw(None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
+            responses.append(draw.response())
+        return Draw(lambda: None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
 
     workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * source.samples))))
     with ThreadPoolExecutor(workers) as pool:

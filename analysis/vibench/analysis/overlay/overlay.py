@@ -10,6 +10,7 @@ import numpy as np
 from vibench.sim import Accuracy, Specimen
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
+from ..frequency_response.results import FrequencyResponse
 from ..signals.arrays import Reals
 from ..signals.envelope import Envelope
 from ..sine.collision_region import Collisions, collisions
@@ -150,9 +151,8 @@ def _difference(
     return logarithmic_difference(measured.frequency_hz, (measured.value, sd), simulated)
 
 
-def noise_quantities(response: NoiseResponse) -> tuple[Quantity, ...]:
+def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
     """Return what a draw of noise is compared by."""
-    found = response.frequency_response
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
 
@@ -163,7 +163,7 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> Noise
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
     specimen = drawn.run.specimen
-    compared = noise_quantities(analysis.response)
+    compared = noise_quantities(measured)
     return NoiseOverlay(
         run=drawn.run,
         response=drawn.response,

@@ -166,4 +166,4 @@ def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyRes
         case StreamedNoise() as plan:
             return streamed_response(channels, plan, analysis.request).frequency_response
         case plan:
-            return repeated_response(channels, plan, analysis.request).frequency_response
+            return repeated_response(channels, plan, analysis.request)[0]
