@@ -28,7 +28,6 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
-from vibench.analysis.overlay import draws as drawing
 from vibench.analysis.overlay.ensemble import EnsembleCurve, z_limit
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import Specimen, gong2025
@@ -36,7 +35,6 @@ from vibench.sim import Specimen, gong2025
 RIG = load_rig(Path(__file__).parents[1] / "hardware_configs" / "virtual_rig.toml")
 DRAWS = 19
 DRAWS_OF_SWEEPS = 24
-drawing.FIRST_DRAWS = DRAWS_OF_SWEEPS  # statistics of draws need all of them
 BINS = 5
 """Of the ranks: 20 seeds fill four to a bin."""
 

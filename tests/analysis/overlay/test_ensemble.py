@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
+from vibench.analysis.overlay.draws import Draw, DrawSource, drawn
+from vibench.analysis.overlay.driven_rig import Driven
 from vibench.analysis.overlay.ensemble import (
     Ending,
     EnsembleCurve,
@@ -13,6 +15,7 @@ from vibench.analysis.overlay.ensemble import (
     largest_of_chance,
     z_limit,
 )
+from vibench.sim import Accuracy, gong2025
 
 FREQUENCY_HZ = np.arange(40.0) + 100.0
 
@@ -160,3 +163,18 @@ def test_half_of_the_draws_give_the_verdict_of_all_where_they_agree_clearly(shif
         decided += half.agrees_clearly
         assert whole.agrees or not half.agrees_clearly
     assert decided > 100 if shift == 0.0 else decided < 20
+
+
+@pytest.mark.parametrize(
+    ("requested", "shift", "made"), [(16, 0.0, 8), (16, 2.0, 16), (24, 0.0, 24), (5, 0.0, 5)]
+)
+def test_draws_stop_at_clear_agreement_unless_more_than_usual_are_requested(requested, shift, made):
+    def estimate(number):
+        value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
+        return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value),), (), 100.0, 1.0)
+
+    source = DrawSource(
+        gong2025(), Driven.GENERATOR, Accuracy.STANDARD, None, requested, 1000, "", lambda number: number
+    )
+    found = drawn(source, estimate, [Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)))])
+    assert (found.run.draws, len(found.quantities), found.response) == (made, made, 0)

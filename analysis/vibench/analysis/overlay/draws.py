@@ -324,9 +324,9 @@ def drawn(
 ) -> Drawn[R]:
     """Estimate from every draw what was estimated from the recording.
 
-    Fewer are made where the first ones agree clearly. Where most of what was ``measured`` is of a kind of
-    motion that few draws come to, up to three times as many are made. Raises UnusableData when a simulation
-    did not reach its end.
+    Of `DRAWS` or less, fewer are made where the first ones agree clearly. Where most of what was ``measured``
+    is of a kind of motion that few draws come to, up to three times as many are made. Raises UnusableData
+    when a simulation did not reach its end.
     """
     responses: list[R] = []
 
@@ -364,7 +364,8 @@ def _are_enough(found: list[Draw[None]], usual: int, measured: Sequence[Quantity
     curves = ensemble_curves(measured, [each.quantities for each in found])
     if np.median(np.concatenate([each.count for each in curves])) < FEWEST_DRAWS:
         return False
-    return len(found) >= usual or all(each.agrees_clearly for each in curves)
+    # A user who requests more than the default wants narrower bands, not only a verdict.
+    return len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
 
 
 def _drawn_channels(
