@@ -16,7 +16,7 @@ from vibench.sim.background import Observer, stage
 
 from ..errors import AnalysisError
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
-from ..overlay.driven_rig import says_shaker
+from ..overlay.driven_rig import described_shaker
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..results.campaign_results import CampaignResults
 from ..sine.dwell_analysis import DwellAnalysis
@@ -171,7 +171,7 @@ def numbers_from_statistics(
 
 
 def _fit_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
-    if says_shaker(recording) or not results.noise:
+    if described_shaker(recording) is not None or not results.noise:
         return None
     weakest = results.noise[0].analysis
     with open_recording(weakest.facts.path) as noise:

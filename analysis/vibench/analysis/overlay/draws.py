@@ -341,7 +341,13 @@ def drawn(
         found = list(pool.map(estimated, range(min(FIRST_DRAWS, source.most))))
         usual = source.most if found[0].impacts else len(found)
         most = usual if source.most == 1 else _MORE * usual
-        while len(found) < most and not _are_enough(found, usual, measured):
+        while len(found) < most:
+            curves = ensemble_curves(measured, [each.quantities for each in found])
+            if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
+                # A user who requests more than the default wants narrower bands, not only a verdict.
+                len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
+            ):
+                break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
             found += pool.map(estimated, range(len(found), stop))
     run = SimulatedRun(
@@ -357,15 +363,6 @@ def drawn(
     return Drawn(
         run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
     )
-
-
-def _are_enough(found: list[Draw[None]], usual: int, measured: Sequence[Quantity]) -> bool:
-    """Return whether further draws would hardly change what is said of the measurement."""
-    curves = ensemble_curves(measured, [each.quantities for each in found])
-    if np.median(np.concatenate([each.count for each in curves])) < FEWEST_DRAWS:
-        return False
-    # A user who requests more than the default wants narrower bands, not only a verdict.
-    return len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
 
 
 def _drawn_channels(

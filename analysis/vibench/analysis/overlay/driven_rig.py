@@ -87,11 +87,6 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
     return DrivenRig(table, driven, role, response)
 
 
-def says_shaker(recording: Recording) -> bool:
-    """Whether the bench configuration in a recording describes a whole rig, shaker included."""
-    return described_shaker(recording) is not None
-
-
 def described_shaker(recording: Recording) -> Shaker | None:
     """Return the shaker that the bench configuration in a recording describes; None where it does not."""
     rig = _configured(recording)

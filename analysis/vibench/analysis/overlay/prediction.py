@@ -32,9 +32,6 @@ WINDOW_S = 5.0
 """The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that
 the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
 
-Progress = Callable[[int, int], None]
-"""Told (points done, points in all), in the calling thread."""
-
 
 @dataclass(frozen=True, eq=False)
 class ResponsePrediction(Labelled):
@@ -61,10 +58,6 @@ class ResponsePrediction(Labelled):
         return np.asarray(self.impacts > 0)
 
 
-def ignore_points(done: int, asked: int) -> None:
-    """Watch nothing."""
-
-
 def predict(
     specimen: Specimen,
     frequency_hz: Reals,
@@ -73,7 +66,6 @@ def predict(
     *,
     duration_s: float = PREDICTION_S,
     approach: Approach = Approach.REST,
-    progress: Progress = ignore_points,
 ) -> ResponsePrediction:
     """Simulate a sine at each frequency: from rest on all cores, or one after the other as a sweep comes by.
 
@@ -95,17 +87,14 @@ def predict(
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
         return steady_response(specimen, drive, accuracy, for_s, window_s, state)
 
-    points: list[Response] = []
     match approach:
         case Approach.REST:
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-                for found in pool.map(point, drives):
-                    points.append(found)
-                    progress(len(points), len(drives))
+                points = list(pool.map(point, drives))
         case Approach.UP:
-            points = list(_follow_points(point, drives, duration_s, progress))
+            points = list(_follow_points(point, drives, duration_s))
         case Approach.DOWN:
-            points = list(_follow_points(point, drives[::-1], duration_s, progress))[::-1]
+            points = list(_follow_points(point, drives[::-1], duration_s))[::-1]
     ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
     return ResponsePrediction(
         specimen=specimen,
@@ -113,7 +102,7 @@ def predict(
         amplitude_m=amplitudes.copy(),
         response_i=np.where(ended, [each.response_i for each in points], np.nan),
         response_ii=np.where(ended, [each.response_ii for each in points], np.nan),
-        linear=linear_transmissibility(specimen, frequency_hz),
+        linear=np.abs(base_transmissibility(specimen, frequency_hz)[:, 0]),
         impacts=np.array([each.impacts for each in points], dtype=np.int64),
         accuracy=accuracy,
         duration_s=duration_s,
@@ -125,25 +114,18 @@ def _follow_points(
     point: Callable[[Harmonic, Reals | None, float], Response],
     drives: Sequence[Harmonic],
     duration_s: float,
-    progress: Progress,
 ) -> Iterator[Response]:
     """Let each point begin in the state in which the last one ended, the drive's phase going on.
 
     The first begins at rest, and has the time that takes.
     """
     state, turns = None, 0.0
-    for number, drive in enumerate(drives, start=1):
+    for drive in drives:
         for_s = duration_s if state is not None else max(duration_s, PREDICTION_S)
         found = point(replace(drive, phase_rad=2 * np.pi * turns), state, for_s)
         yield found
         turns = (turns + drive.frequency_hz * for_s) % 1.0
         state = found.final_state if found.outcome is Outcome.REACHED_END else None
-        progress(number, len(drives))
-
-
-def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
-    """|x / U| of the specimen without contact, exact, shape of ``frequency_hz``."""
-    return np.abs(base_transmissibility(specimen, frequency_hz)[:, 0])
 
 
 def paper_amplitude_m(amplitude_vpp: float) -> float | None:

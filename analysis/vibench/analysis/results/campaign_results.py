@@ -20,7 +20,7 @@ from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
 from ..kinds.noise import NOISE_FAMILY
 from ..overlay.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
-from ..overlay.driven_rig import says_shaker
+from ..overlay.driven_rig import described_shaker
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
 from ..recordings.checks import AbstractAnalysis
@@ -97,9 +97,11 @@ def _source(
     measurement, why = analysis.facts.measurement, ""
     if simulation is Simulation.UNDER_VOLTAGE:
         try:
-            if shaker is None and isinstance(analysis, NoiseAnalysis) and not says_shaker(recording):
+            if described_shaker(recording) is not None:
+                shaker = None
+            elif shaker is None and isinstance(analysis, NoiseAnalysis):
                 shaker = fit_shaker(recording, analysis, model)
-            return voltage_source(recording, model, None if says_shaker(recording) else shaker, draws)
+            return voltage_source(recording, model, shaker, draws)
         except UnusableData as error:
             why = str(error)
     return base_source(recording, measurement, model, accuracy, why)
@@ -255,7 +257,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
     for path in paths:
         try:
             with open_recording(path) as recording:
-                if says_shaker(recording):
+                if described_shaker(recording) is not None:
                     continue
                 needed = True
                 plan = recording.plan.get("excitation") or {}
