@@ -33,6 +33,7 @@ TARGETS: dict[str, Attack] = {
     "flips": recordings_flips.attack,
     "kills": recordings_kills.attack,
     "calls": recordings_kills.attack_calls,
+    "dropouts": doubtful_recordings.attack_dropouts,
     "drifts": doubtful_recordings.attack_drifts,
     "steps": doubtful_recordings.attack_steps,
 }

@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import oaconvolve
 
-from vibench.acquisition.plan import OddMultisine, SteppedLevel, SteppedSine, WhiteNoise
-from vibench.analysis import Simulation, analyse_files
+from vibench.acquisition.plan import Dwell, OddMultisine, SineSweep, SteppedLevel, SteppedSine, WhiteNoise
+from vibench.analysis import Simulation, analyse_files, budgets_of
+from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.frequency_response.distortion import distortion
 from vibench.sim import Specimen, base_transmissibility, gong2025
 
@@ -295,3 +296,91 @@ def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
 
 
 attack_drifts = members("drifts", repeated_noise)
+
+
+LIGHT_RATE_HZ = 25_600.0
+"""Drop-outs are looked for above 20 kHz."""
+FULL_SCALE_M_PER_S = 1.0
+
+
+def darkened(rng: np.random.Generator, velocity: np.ndarray, first: int, stop: int) -> tuple[str, np.ndarray]:
+    """Draw drop-outs between two samples: how often, how long, in bursts or not, and what is shown."""
+    per_s = float(10 ** rng.uniform(-0.5, 2))
+    count = max(1, round(per_s * (stop - first) / LIGHT_RATE_HZ))
+    starts = rng.integers(first, stop - 200, count)
+    if rng.random() < 0.4:
+        centres = rng.integers(first, stop - 200, max(1, count // 6))
+        starts = np.clip(
+            rng.choice(centres, count) + rng.normal(0, 300, count).astype(int), first, stop - 200
+        )
+    kind = str(rng.choice(("level", "zero", "noise", "ramp")))
+    mean_s = float(rng.choice((1e-4, 3e-4, 1e-3)))
+    dark = velocity.copy()
+    for start in starts:
+        length = int(np.clip(rng.exponential(mean_s) * LIGHT_RATE_HZ, 1, 100))
+        level = rng.uniform(-1, 1) * FULL_SCALE_M_PER_S
+        shown = {
+            "level": np.full(length, level),
+            "zero": np.zeros(length),
+            "noise": rng.uniform(-1, 1, length) * FULL_SCALE_M_PER_S,
+            "ramp": np.linspace(level, -level, length),
+        }
+        dark[start : start + length] = shown[kind]
+    return f"{count} drop-outs, {kind}, {1e3 * mean_s:g} ms, {len(starts)}", dark
+
+
+def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
+    """A dwell or a sweep, with and without drop-outs."""
+    specimen = specimen_without_contact(rng)
+    hz, settle_s, length_s = near_a_mode(rng, specimen), 1.0, float(rng.uniform(3, 5))
+    usual, synthetic.RATE = synthetic.RATE, LIGHT_RATE_HZ
+    try:
+        hz = float(np.clip(hz, 60, 560))
+        if rng.random() < 0.7:
+            motion = synthetic.sine(settle_s + length_s, hz, 1e-6)
+            plan: Dwell | SineSweep = Dwell(
+                amplitude_vpp=0.02, frequency_hz=hz, settle_s=settle_s, duration_s=length_s
+            )
+            part = synthetic.Part("dwell", settle_s, settle_s + length_s, {"frequency_hz": hz})
+        else:
+            ends = {"start_hz": 0.9 * hz, "stop_hz": 1.1 * hz, "duration_s": length_s}
+            motion = synthetic.chirp(length_s, 0.9 * hz, 1.1 * hz, 1e-6)
+            settle_s = 0.0
+            plan = SineSweep(amplitude_vpp=0.02, settle_s=0.0, **ends)
+            part = synthetic.Part("sweep", 0.0, length_s, {"start_hz": 0.9 * hz})
+        acceleration, velocity = filtered(specimen, motion.displacement_m)
+        largest = max(np.max(np.abs(velocity)), 0.01 * np.max(np.abs(acceleration)))
+        within = float(10 ** rng.uniform(-2.5, 0)) * 0.5 / largest
+        base = synthetic.Motion(within * motion.displacement_m, within * acceleration)
+        noise_m_per_s = float(10 ** rng.uniform(-6, -4))
+        light = within * velocity + noise_m_per_s * rng.standard_normal(velocity.size)
+        about, dark = darkened(
+            rng, light, round(settle_s * LIGHT_RATE_HZ), light.size - round(0.5 * LIGHT_RATE_HZ)
+        )
+        about += f"; {plan!r}, {within * np.max(np.abs(velocity)):.2g} m/s, noise {noise_m_per_s:.2g}"
+        done = []
+        for name, shown in (("light", light), ("dark", dark)):
+            path = synthetic.write_recording(folder, plan, base, shown, [part], name=name)
+            done.append(analyse_files([path], name, Simulation.LEFT_OUT))
+    finally:
+        synthetic.RATE = usual
+    if not done[0].results:
+        return Said("refused with light", (), f"{about} {done[0].failures}")
+    if not done[1].results:
+        return Said("refused", (), about)
+    seen, found = (each.results[0] for each in done)
+    faults, is_told = [], True
+    for one, other in zip(budgets_of(seen), budgets_of(found), strict=True):
+        told = not {"noise", "chance"} & {each.value for each in other.not_stated}
+        is_told = is_told and told
+        off = abs(other.value - one.value)
+        if told and not off <= SURELY * other.expanded + STEADY * abs(one.value):
+            faults.append(f"{other.quantity} {other.text}, not {one.value:.5g}")
+    if isinstance(plan, Dwell):
+        kinds = [each.analysis.motion.verdict.kind for each in (seen, found)]
+        if kinds[1] not in {kinds[0], MotionKind.UNDECIDED}:
+            faults.append(f"{kinds[1]}, not {kinds[0]}")
+    return Said("told" if is_told else "withheld", tuple(faults), about)
+
+
+attack_dropouts = members("drop-outs", dark_recording)

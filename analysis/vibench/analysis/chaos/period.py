@@ -15,6 +15,8 @@ STEADY = 2e-3
 """A motion that repeats to this part of its size is steady: no drive is steadier."""
 _NOISE_MARGIN = 1.5
 """Measured scatter over the expected one, up to which noise explains it."""
+_REPEATED = 0.25
+"""Part of the points' variance that a period above one may leave: any period leaves less than all."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Standard errors of a slope that a settled record reaches once in 250 (four figures, eight free blocks)."""
@@ -57,9 +59,11 @@ def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None
     """Find the fewest drive periods after which all points repeat within noise; None if they do not.
 
     The points of each phase of the period are compared over the whole record: what changes slowly differs
-    little from one period to the next. A scatter of 0.2 % of the orbit is granted to the drive.
+    little from one period to the next. A scatter of 0.2 % of the orbit is granted to the drive, and to a
+    period above one no more than half of the points' own, beyond their noise.
     """
-    allowed = (_NOISE_MARGIN * points.noise) ** 2 + STEADY**2
+    by_noise = (_NOISE_MARGIN * points.noise) ** 2
+    allowed = by_noise + STEADY**2
     count = len(points.value)
     for period in range(1, min(longest, count // 4) + 1):
         whole = np.full((-(-count // period) * period, _TABLE), np.nan)
@@ -67,6 +71,7 @@ def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None
         scatter = np.nanvar(whole.reshape(-1, period, _TABLE), axis=0, ddof=1)
         if np.all(np.mean(scatter, axis=0) <= allowed):
             return period
+        allowed = np.minimum(allowed, by_noise + _REPEATED * np.var(points.value, axis=0))
     return None
 
 

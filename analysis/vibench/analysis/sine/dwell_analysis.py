@@ -36,7 +36,7 @@ BAND_ABOVE = 0.25
 _CLEAR_MOTION = 0.8
 """Part of a dwell that must lie clear of drop-outs where its motion does not repeat."""
 
-_BURST = 15.0
+BURST = 15.0
 """Median deviations by which the largest of many maxima of noise does not lie above their median."""
 _LEAST_RISE = 0.01
 """Part of its usual maximum by which |x| rises in a burst."""
@@ -169,7 +169,7 @@ def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> flo
     if not largest.size:
         return 0.0
     off = largest / np.median(largest) - 1
-    return float(np.max(off)) if np.max(off) > _BURST * np.median(np.abs(off)) else 0.0
+    return float(np.max(off)) if np.max(off) > BURST * np.median(np.abs(off)) else 0.0
 
 
 @dataclass(frozen=True)

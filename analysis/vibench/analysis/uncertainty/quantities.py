@@ -13,7 +13,7 @@ from ..overlay.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOve
 from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Flags, Reals
 from ..sine.dwell import DwellResponse
-from ..sine.dwell_analysis import DwellAnalysis
+from ..sine.dwell_analysis import BURST, DwellAnalysis
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
@@ -160,6 +160,9 @@ def of_one_draw(found: DwellResponse) -> Contribution:
     largest = largest[largest > 0.0]
     if largest.size < _FEWEST_BLOCKS:
         return Contribution(Cause.CHANCE, None, "drop-outs leave too little of the window to tell")
+    off = np.abs(largest / np.median(largest) - 1)
+    if np.max(off) > max(BURST * np.median(off), _ALIKE):
+        return Contribution(Cause.CHANCE, None, "a burst in the window makes the largest |x|; find its cause")
     source = f"largest |x| of {largest.size} parts of the window"
     return from_scatter(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
 
