@@ -305,7 +305,6 @@ def main() -> None:
         sys.exit(ExitCode.FAILED)
     except UnicodeEncodeError as error:  # raised for paths, because files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
-        name = shortened(name, NAME_SHOWN)
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
@@ -320,7 +319,8 @@ def main() -> None:
 def _disk_trouble(error: Exception) -> str:
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
-    return DISK_ERRORS[error.errno].format(name=shortened(str(error.filename or "a file"), NAME_SHOWN))
+    name = str(error.filename2 or error.filename or "a file")  # a copy names its source first
+    return DISK_ERRORS[error.errno].format(name=shortened(name, NAME_SHOWN))
 
 
 def _shortage(error: BaseException | None) -> str:

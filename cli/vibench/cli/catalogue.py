@@ -32,13 +32,10 @@ def show_catalogue(
         _show(entries)
     for each in entries:
         if each.is_bad:
-            errors.print(f"error: {_recording_name(each)}")
+            where = "" if each.path in each.reason else f"{each.path}: "
+            errors.print(f"error: {where}{each.reason}")
     if any(each.is_bad for each in entries):
         raise typer.Exit(ExitCode.FAILED)
-
-
-def _recording_name(entry: CatalogueEntry) -> str:
-    return entry.reason if entry.path in entry.reason else f"{entry.path}: {entry.reason}"
 
 
 def _show(entries: Sequence[CatalogueEntry]) -> None:

@@ -15,9 +15,6 @@ from .options import option
 from .output import console, errors, print_json
 from .paths import AllowExternal, AsJson, external_data
 
-MOST_NAMED = 10
-"""Most recordings named in the final sentence."""
-
 
 def verify(
     place: Annotated[
@@ -51,6 +48,6 @@ def verify(
         console.print(", ".join([*summary, "samples not checked"] if quick else summary))
     bad = [each for each in found if each.is_bad]
     if bad:
-        named = ", ".join(each.path for each in bad[:MOST_NAMED]) + (" and more" if bad[MOST_NAMED:] else "")
+        named = ", ".join(each.path for each in bad)
         errors.print(f"error: {len(bad)} of {len(found)} recordings cannot be trusted: {named}")
         raise typer.Exit(ExitCode.FAILED)

@@ -346,10 +346,8 @@ class ValidatedForm(QWidget, Generic[Model]):
         self.value: Model | None = None
         """The validated model; None while the content is not allowed."""
         self.form = ModelForm(model, hidden)
-        self._complaint = SentenceLabel(rank="complaint")
-        self._complaint.setAccessibleName(f"Complaint about the {name}")
-        self._warning = SentenceLabel()
-        self._warning.setAccessibleName(f"Warning about the {name}")
+        self._complaint = SentenceLabel(rank="complaint", name=f"Complaint about the {name}")
+        self._warning = SentenceLabel(name=f"Warning about the {name}")
         fill_box(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
         self.form.changed.connect(self._take)
         UNITS.on_change(self._validate)

@@ -112,9 +112,10 @@ class ScrollArea(QScrollArea):
         return QSize(least.width() + bar, least.height())
 
 
-def push_button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
+def push_button(text: str, tip: str, act: Callable[[], object], rank: str = "") -> QPushButton:
     """Return a button; ``act`` is called without Qt's arguments."""
     button = QPushButton(text)
+    button.setProperty("rank", rank)
     button.setToolTip(tip)
     button.setAccessibleName(text.replace("&", "").rstrip("…"))
     button.clicked.connect(lambda _checked=False: act())
@@ -159,8 +160,9 @@ class ElidedLabel(QLabel):
 
     LETTERS = 3
 
-    def __init__(self, text: str = "") -> None:
+    def __init__(self, text: str = "", rank: str = "") -> None:
         super().__init__()
+        self.setProperty("rank", rank)
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setText(text)
 

@@ -170,8 +170,9 @@ UNITS = DisplayUnits()
 class SentenceLabel(QLabel):
     """A wrapped text that shows its quantities in the chosen units."""
 
-    def __init__(self, text: str = "", rank: str = "") -> None:
+    def __init__(self, text: str = "", rank: str = "", name: str = "") -> None:
         super().__init__()
+        self.setAccessibleName(name)
         self.sentence, self._tip = "", ""
         self.setWordWrap(True)
         self.setTextFormat(Qt.TextFormat.PlainText)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QSplitter, QVBo
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.campaign import VerifiedRecording
 from vibench.acquisition.recording import Recording, name_now
-from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
+from vibench.analysis.live import RecordingOverview, has_overview, kept_levels
 from vibench.sim.background import Job
 
 from ...background.background import LatestRequest
@@ -132,26 +132,22 @@ class FilesPage(Page):
             self._open(path)
 
     def _listed(self, found: Listing) -> None:
-        entries = found.recordings
+        entries, shown = found.recordings, self.table.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
         # A late answer must not change a newer selection.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
-        self.table.recordings.show_entries(entries)
-        count = f"{len(entries)} recording{'s' if len(entries) != 1 else ''}"
-        self._count.setText(count)
-        missing = self.table.recordings.missing_pictures()
+        shown.show_entries(entries)
+        self._count.setText(f"{len(entries)} recording{'s' if len(entries) != 1 else ''}")
+        missing = shown.missing_pictures()
         if missing:
-            self.context.background.ask(thumbnails, self._pictured, self._failed, missing)
+            self.context.background.ask(thumbnails, shown.show_thumbnails, self._failed, missing)
         if chosen:
             # A recording that was still growing may have its final name now.
             self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
-
-    def _pictured(self, found: dict[Path, Thumbnail | None]) -> None:
-        self.table.recordings.show_thumbnails(found)
 
     def _failed(self, error: BaseException) -> None:
         self.context.say(notice_of(error))
@@ -252,14 +248,8 @@ class FilesPage(Page):
         if os.path.isdir(folder):  # noqa: PTH112
             self._go_to(folder)
         else:
-            self.context.say(
-                Notice(
-                    NoticeKind.WARNING,
-                    f"{folder} is no folder.",
-                    "The list is unchanged.",
-                    "Type or choose another folder.",
-                )
-            )
+            said = f"{folder} is no folder.", "The list is unchanged.", "Type or choose another folder."
+            self.context.say(Notice(NoticeKind.WARNING, *said))
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
@@ -318,10 +308,8 @@ class FilesPage(Page):
         search.setClearButtonEnabled(True)
         search.textChanged.connect(self.table.search)
         search_label.setBuddy(search)
-        self._goes_to = ElidedLabel()
-        self._goes_to.setProperty("rank", "second")
-        self._count = ElidedLabel()
-        self._count.setProperty("rank", "second")
+        self._goes_to = ElidedLabel(rank="second")
+        self._count = ElidedLabel(rank="second")
         self._compare = push_button(
             "Co&mpare", "Overlay the selected recordings on others", self._hand_to_compare
         )
@@ -346,8 +334,7 @@ class FilesPage(Page):
         return browser
 
     def _viewer(self) -> QWidget:
-        self._title = ElidedLabel("No recording is open")
-        self._title.setProperty("rank", "title")
+        self._title = ElidedLabel("No recording is open", rank="title")
         self._facts = SentenceLabel("Choose one in the list above.", rank="second")
         self._view = ElidedLabel()
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)

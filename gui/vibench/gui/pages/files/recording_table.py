@@ -41,7 +41,7 @@ from vibench.analysis.live import THUMBNAIL_COLUMNS, OverviewLevel, Thumbnail, o
 
 from ...forms.editor import Choice
 from ...widgets.boxes import paint_hint, plain_tip
-from ...widgets.notice import moment_text, outcome_text
+from ...widgets.notice import clock, moment_text, outcome_text
 from ...widgets.read_table import offer_copies
 from ...widgets.theme import Theme
 
@@ -194,12 +194,7 @@ def size_text(size: int) -> str:
 
 def duration_text(duration_s: float) -> str:
     """Return a duration: ``"4.25 s"``, ``"3:20"``, ``"1:02:03"``."""
-    minute = 60
-    if duration_s < minute:
-        return f"{duration_s:.3g} s"
-    whole = round(duration_s)
-    hours, minutes, seconds = whole // 3600, whole // minute % minute, whole % minute
-    return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+    return f"{duration_s:.3g} s" if duration_s < 60 else clock(duration_s)
 
 
 def role_text(role: str) -> str:
@@ -247,8 +242,7 @@ class CampaignChoice(Choice):
     """Files of the selected campaign as a set; None for all recordings."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName("Campaign")
+        super().__init__("Campaign")
         self.setToolTip("List the recordings of one campaign")
         self.setMinimumContentsLength(22)
         self._campaigns: tuple[ListedCampaign, ...] = ()

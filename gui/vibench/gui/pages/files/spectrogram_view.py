@@ -51,8 +51,7 @@ class HiddenMotionView(QWidget):
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.caption = SentenceLabel(rank="second")
-        self.specimen = Choice()
-        self.specimen.setAccessibleName("Specimen of the hidden motion")
+        self.specimen = Choice(name="Specimen of the hidden motion")
         self.specimen.setToolTip("Specimen whose springs, masses and stops are used for the estimate")
         self.specimen.addItem("as the recording describes it", "")
         for name in shipped_specimens():
@@ -63,7 +62,7 @@ class HiddenMotionView(QWidget):
         self.find_numbers.setToolTip(
             "Estimate gaps, m1, springs, dampers and contact law from the visible collisions"
         )
-        self.find_numbers.toggled.connect(self._ask_otherwise)
+        self.find_numbers.toggled.connect(lambda _is_on: self._ask())
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
         self._asked: HiddenViewRequest | None = None
@@ -116,9 +115,6 @@ class HiddenMotionView(QWidget):
         self._asked = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
         self.plot.setEnabled(self._of in (None, self._asked))
         self._latest_request.ask(self._asked)
-
-    def _ask_otherwise(self, _is_on: bool) -> None:  # noqa: FBT001 - a signal's
-        self._ask()
 
     def _choose_specimen(self, place: int) -> None:
         """Select another specimen; the last entry asks for a file and adds it."""
@@ -185,8 +181,7 @@ class SpectrogramView(QWidget):
         self.line_width = Choice()
         for width_hz in _WIDTHS_HZ:
             self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
-        self.caption = ElidedLabel()
-        self.caption.setProperty("rank", "second")
+        self.caption = ElidedLabel(rank="second")
         self._theme = theme
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None

@@ -376,8 +376,7 @@ class MapsPage(Page):
         self.quantity.addItems(list(COLOURINGS))
         self.quantity.setAccessibleName("Quantity shown by the colours of the map")
         self.quantity.currentIndexChanged.connect(self._recolour)
-        self._state = SentenceLabel("Nothing has been computed yet.")
-        self._state.setAccessibleName("Progress of the map")
+        self._state = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
         self._open = push_button(
             "&Open in Simulate",
             "Simulate a frequency range around this point, with errors",

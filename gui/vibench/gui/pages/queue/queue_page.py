@@ -158,8 +158,7 @@ class QueuePage(Page):
             "Each recording of the campaign is listed here, with its state.",
         )
         self.sweep = SweepForm()
-        self.summary = SentenceLabel()
-        self.summary.setAccessibleName("Summary of the campaign")
+        self.summary = SentenceLabel(name="Summary of the campaign")
         self.progress = ProgressBar()
         self.progress.setAccessibleName("Progress of the campaign")
         self.progress.setRange(0, 1000)

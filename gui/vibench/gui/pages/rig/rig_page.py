@@ -60,14 +60,12 @@ class RigChoice(QWidget):
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
         """Why the selected file cannot be used, or should be checked; empty without a reason."""
-        self._box = Choice()
-        self._box.setAccessibleName("Hardware configuration")
+        self._box = Choice(name="Hardware configuration")
         self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
         own = QPushButton("Own file…")
         own.setToolTip("Open a hardware configuration of your own")
         own.clicked.connect(self._ask)
-        self.pace = Choice()
-        self.pace.setAccessibleName("Pace of the simulated rig")
+        self.pace = Choice(name="Pace of the simulated rig")
         self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
         for words in PACES.values():
             self.pace.addItem(words)
@@ -231,9 +229,8 @@ class RigPage(Page):
         self.knobs = KnobSheetForm()
         self.about = SentenceLabel(rank="second")
         self.open_button = push_button(
-            "&Open bench", "Open every instrument; the generator stays silent", self.open_bench
+            "&Open bench", "Open every instrument; the generator stays silent", self.open_bench, "first"
         )
-        self.open_button.setProperty("rank", "first")
         self.close_button = push_button(
             "Close bench", "Silence everything and close the instruments", self._close
         )

@@ -379,8 +379,7 @@ class HiddenMotionPlot(QWidget):
             self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
         ]
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.caption = SentenceLabel(rank="second")
-        self.caption.setAccessibleName("Report of the live twin")
+        self.caption = SentenceLabel(rank="second", name="Report of the live twin")
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
         fill_box(QVBoxLayout(self), self.caption, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)

@@ -251,15 +251,12 @@ class ArmCard(QGroupBox):
 
     def __init__(self) -> None:
         super().__init__("What will happen")
-        self._words = SentenceLabel()
-        self._words.setAccessibleName("What will happen")
+        self._words = SentenceLabel(name="What will happen")
         self.arm_button = push_button(
-            "A&rm…  (Ctrl+Return)", "Describe in words what will happen", self.arm_wanted.emit
+            "A&rm…  (Ctrl+Return)", "Describe in words what will happen", self.arm_wanted.emit, "first"
         )
-        self.arm_button.setProperty("rank", "first")
         self.cancel_button = push_button("Cancel", "Disarm; nothing was played", self.cancel_wanted.emit)
-        self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit)
-        self.start_button.setProperty("rank", "first")
+        self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit, "first")
         self.hold_button = push_button("Hold", "Hold the run; the drive stays on", self.hold_wanted.emit)
         fill_box(QVBoxLayout(self), self._words)
         self.buttons = column(
@@ -349,8 +346,7 @@ class RunPage(Page):
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
         self.look_button = QPushButton("Look at the recording")
         self.look_button.setToolTip("Show the last recording on the Files page")
-        self.summary = SentenceLabel()
-        self.summary.setAccessibleName("How the last run ended")
+        self.summary = SentenceLabel(name="How the last run ended")
         self._lay_out()
         self._connect()
         self._show_channels()

@@ -188,8 +188,7 @@ class SimulatePage(Page):
 
     def _side(self) -> QWidget:
         scene = titled_box("Scene", self.form)
-        self._cost = SentenceLabel()
-        self._cost.setAccessibleName("Cost and error of this accuracy")
+        self._cost = SentenceLabel(name="Cost and error of this accuracy")
         cost = titled_box("Cost and error of this accuracy", self._cost)
         return column(scene, cost, 1)
 
