@@ -290,8 +290,6 @@ def _require_bench(recording: Recording) -> None:
         described_specimen(recording.bench)
     except ValidationError as error:
         first = error.errors()[0]
-        if first["loc"] == ("excitation",) and first["type"] == "value_error":  # its package is missing
-            raise UnusableData(f"{recording.path.name}: {fault_in_words(first)}") from error
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(
             f"what {recording.path.name} says of its bench cannot be read ({place}: {first['msg']}); "
