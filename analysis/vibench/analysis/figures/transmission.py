@@ -3,10 +3,11 @@
 import numpy as np
 from matplotlib.axes import Axes
 
+from vibench.sim import base_transmissibility
+
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.request import MagnitudeScale
 from ..overlay.overlay import TRANSMISSION, NoiseOverlay
-from ..overlay.prediction import linear_transmissibility
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, columns, plus_minus, table
@@ -94,7 +95,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     if laid is not None:
         simulated, sines = view.shown(laid.response.frequency_response), laid.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
-        linear = linear_transmissibility(laid.run.specimen, fine_hz)
+        linear = np.abs(base_transmissibility(laid.run.specimen, fine_hz)[:, 0])
         linear = view.drawn(linear * view.factor(fine_hz))
         axes.plot(fine_hz, linear, color=LINEAR, linestyle="--", label="without contact")
         micrometres = 1e6 * float(sines.amplitude_m[0])
