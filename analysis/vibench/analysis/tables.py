@@ -204,10 +204,7 @@ class Labelled:
         rows of several units have them beside their values (``values_value_units``). Texts and settings that
         are words are attributes.
 
-        Raises
-        ------
-        InvalidRequest
-            When xarray is not installed.
+        Raises InvalidRequest when xarray is not installed.
         """
         try:
             import xarray  # noqa: PLC0415 - optional, and slow to load

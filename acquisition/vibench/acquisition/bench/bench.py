@@ -71,10 +71,8 @@ class BenchLock:
     def of(cls, rig: Rig) -> "BenchLock":
         """Take the bench, or refuse with who has it.
 
-        Raises
-        ------
-        InstrumentBusy
-            When another process holds one of its instruments, or something else lies in a lock's place.
+        Raises InstrumentBusy when another process holds one of its instruments, or something else lies in a
+        lock's place.
         """
         lock = cls([])
         if rig.virtual is not None or rig.plays_back:

@@ -73,11 +73,8 @@ class AFG1022X(ScpiInstrument):
     def open(cls, config: GeneratorConfig) -> Self:
         """Find the generator, switch its output off, and bring it into a known state.
 
-        Raises
-        ------
-        InstrumentLost, InstrumentBusy, InstrumentError
-            When nothing, another program, or another instrument answers; the output is then off,
-            as far as the instrument could be reached.
+        Raises InstrumentLost or InstrumentBusy or InstrumentError when nothing, another program, or another
+        instrument answers; the output is then off, as far as the instrument could be reached.
         """
         generator = cls(config)
         leave = generator.disconnect  # another instrument gets no further commands

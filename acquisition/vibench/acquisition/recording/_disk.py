@@ -48,10 +48,7 @@ class PositionedFile(OpenFile):
 def sole_use(path: Path) -> Iterator[None]:
     """Hold a file that nobody records to; for the time of a recovery.
 
-    Raises
-    ------
-    RecordingError
-        When another process is recording to it.
+    Raises RecordingError when another process is recording to it.
     """
     with closing(OpenFile(path)) as file:
         if not file.is_locked_alone():

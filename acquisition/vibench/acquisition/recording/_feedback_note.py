@@ -391,10 +391,7 @@ _KINDS = frozenset((*_FOUND, *_FOLLOWED, "until"))
 def feedback_note(event: Event) -> FeedbackNote | None:
     """Read an event as a note; None when it is another event, or was cut short in the file.
 
-    Raises
-    ------
-    RecordingError
-        When it is a note of a version that this program does not know.
+    Raises RecordingError when it is a note of a version that this program does not know.
     """
     if event.kind not in _KINDS:
         return None

@@ -340,10 +340,7 @@ def recover(path: Path | str) -> Path:
     samples that were never compressed, a compressed copy that was never completed, or a complete
     one whose ``.part`` was not yet deleted.
 
-    Raises
-    ------
-    RecordingError
-        When there is nothing to recover, the file is still being recorded, or is not ours.
+    Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not ours.
     """
     path = Path(path)
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path

@@ -249,10 +249,7 @@ class Recording(RecordingDescription):
     def read(self, role: str, start: int = 0, stop: int | None = None) -> Samples:
         """Return samples ``start`` to ``stop`` (exclusive) in the channel's physical unit; lost ones are NaN.
 
-        Raises
-        ------
-        RecordingError
-            When there is no such channel or range, or the file is damaged there.
+        Raises RecordingError when there is no such channel or range, or the file is damaged there.
         """
         channel = self.channel(role)
         counts = self.read_counts(role, start, stop)
@@ -375,10 +372,7 @@ class Recording(RecordingDescription):
         swapped, so that a crash cannot harm the samples. ``roles`` are the channels that were used
         (all by default): their checksums are kept with the result.
 
-        Raises
-        ------
-        RecordingError
-            When the recording is not finished, an axis does not fit, or the disk refuses.
+        Raises RecordingError when the recording is not finished, an axis does not fit, or the disk refuses.
         """
         self._require_finished("added to")
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
@@ -424,10 +418,8 @@ def open_recording(path: Path | str) -> Recording:
 
     A ``NAME.h5.part`` that has been finished in the meantime is opened as ``NAME.h5``.
 
-    Raises
-    ------
-    RecordingError
-        When the file is missing, empty, cut short, damaged, no recording, or from a newer version.
+    Raises RecordingError when the file is missing, empty, cut short, damaged, no recording, or from a newer
+    version.
     """
     handle = OpenRecording(Path(path))
     try:

@@ -107,10 +107,7 @@ class SealKey:
 def seal_key(path: Path | None = None) -> SealKey | None:
     """Read the key from a file, by default the one that VIBENCH_SEAL_KEY names; None where none is given.
 
-    Raises
-    ------
-    RecordingError
-        When the file cannot be read, or is too short to be a secret.
+    Raises RecordingError when the file cannot be read, or is too short to be a secret.
     """
     named = os.environ.get(KEY_VARIABLE, "") if path is None else str(path)
     if not named:

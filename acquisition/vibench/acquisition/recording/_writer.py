@@ -112,11 +112,8 @@ ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILE
 def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWriter":
     """Begin a recording: ``NAME.h5.part`` stands on the disk, with all that is known, before this returns.
 
-    Raises
-    ------
-    RecordingError
-        When the name is not ``NAME.h5``, a file of that name exists in any of its three forms, or
-        the disk has no room for the planned samples.
+    Raises RecordingError when the name is not ``NAME.h5``, a file of that name exists in any of its three
+    forms, or the disk has no room for the planned samples.
     """
     path = Path(path)
     if path.suffix != layout.SUFFIX:
@@ -181,11 +178,8 @@ class RecordingWriter:
 
         Samples missing between this block and the last are marked as a gap and read as NaN.
 
-        Raises
-        ------
-        RecordingError
-            When the block does not fit (shape, order, volts that are no counts, end of the room),
-            or the disk has failed. What was committed is kept.
+        Raises RecordingError when the block does not fit (shape, order, volts that are no counts, end of the
+        room), or the disk has failed. What was committed is kept.
         """
         self._check(block)
         # A converter's own counts are recorded as they are.
@@ -226,11 +220,8 @@ class RecordingWriter:
     def finish(self, state: RecordingState, reason: str = "") -> Path:
         """End the recording and turn it into ``NAME.h5``; calling again changes nothing.
 
-        Raises
-        ------
-        RecordingError
-            When the disk failed on the way. The samples committed before are kept, in ``NAME.h5``
-            or in ``NAME.h5.part``; the text says which.
+        Raises RecordingError when the disk failed on the way. The samples committed before are kept, in
+        ``NAME.h5`` or in ``NAME.h5.part``; the text says which.
         """
         if state not in ENDINGS:
             raise RecordingError(

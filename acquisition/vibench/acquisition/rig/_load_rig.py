@@ -65,10 +65,7 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
 def with_faults(rig: Rig, script: Path) -> Rig:
     """Have a script of faults played on a virtual rig.
 
-    Raises
-    ------
-    ConfigurationError
-        When the rig is a real one, whose faults come by themselves.
+    Raises ConfigurationError when the rig is a real one, whose faults come by themselves.
     """
     if rig.virtual is None:
         raise ConfigurationError(
@@ -89,10 +86,7 @@ class GeneratorDriver(Protocol):
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open a generator, its output off, at its smallest amplitude.
 
-        Raises
-        ------
-        InstrumentError
-            When none answers, or another one; nothing stays open then.
+        Raises InstrumentError when none answers, or another one; nothing stays open then.
         """
 
 

@@ -125,10 +125,7 @@ def sorted_curve(curve: Curve) -> Curve:
 def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     """Return how far a curve lies above another, at its own frequencies within both.
 
-    Raises
-    ------
-    NotEnoughData
-        When the two have no frequency in common.
+    Raises NotEnoughData when the two have no frequency in common.
     """
     for each in (curve, reference):
         if not each.is_single_valued:

@@ -213,10 +213,7 @@ X, VX = 0, 3
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
     """Yield each run as soon as it has been computed; stop asking, and no more is computed.
 
-    Raises
-    ------
-    InvalidRequest
-        When the recording cannot be read, or a run is not possible.
+    Raises InvalidRequest when the recording cannot be read, or a run is not possible.
     """
     for cells in request.lengths:
         chain = request.chain(cells)

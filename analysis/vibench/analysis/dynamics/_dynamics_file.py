@@ -84,10 +84,7 @@ _LINEAR_UNITS = {
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     """Write branches, a group each; a file that exists is refused.
 
-    Raises
-    ------
-    InvalidRequest
-        When the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the name is taken, or nothing can be written there.
     """
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
@@ -109,10 +106,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
 def read_diagram(path: Path) -> BranchDiagram:
     """Read the branches that `write_diagram` or ``vibench branches`` wrote.
 
-    Raises
-    ------
-    InvalidRequest
-        When the file is not there, or holds none.
+    Raises InvalidRequest when the file is not there, or holds none.
     """
     if not path.is_file():
         raise InvalidRequest(f"{path} does not exist, or is no file; give a file that vibench branches wrote")
@@ -132,10 +126,8 @@ def read_diagram(path: Path) -> BranchDiagram:
 def branch_curves(path: Path) -> tuple[Curve, ...]:
     """Read the curves of branches, to be overlaid on recordings.
 
-    Raises
-    ------
-    InvalidRequest
-        When the file holds none, or branches along the level, which no recording's frequencies fit.
+    Raises InvalidRequest when the file holds none, or branches along the level, which no recording's
+    frequencies fit.
     """
     found = read_diagram(path).curves()
     if not found:
@@ -161,10 +153,7 @@ def _read_line(group: h5py.Group) -> BranchLine:
 def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
     """Write all exponents, a dataset a quantity; a file that exists is refused.
 
-    Raises
-    ------
-    InvalidRequest
-        When the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the name is taken, or nothing can be written there.
     """
     with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _SPECTRUM_UNITS.items():
@@ -178,10 +167,7 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
 def write_chain(found: ChainAnswer, path: Path) -> Path:
     """Write the endless chain and every run, a group each; a file that exists is refused.
 
-    Raises
-    ------
-    InvalidRequest
-        When the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the name is taken, or nothing can be written there.
     """
     with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _LINEAR_UNITS.items():

@@ -42,10 +42,8 @@ def require_unused(path: Path) -> None:
 def new_file(path: Path) -> Iterator[Path]:
     """Give a name to write to; when all went well the file has ``path`` as its name, else it is gone.
 
-    Raises
-    ------
-    InvalidRequest
-        When ``path`` or its unfinished form exists, the folder does not, or the disk refuses.
+    Raises InvalidRequest when ``path`` or its unfinished form exists, the folder does not, or the disk
+    refuses.
     """
     unfinished = path.with_name(path.name + UNFINISHED)
     for each in (path, unfinished):

@@ -192,10 +192,7 @@ class FrequencyResponseRequest:
     def segment_samples(self, samples: int, sample_rate_hz: float) -> int:
         """Choose the length of a segment for a record of this many samples.
 
-        Raises
-        ------
-        NotEnoughData
-            When the record does not hold two segments of the length asked for.
+        Raises NotEnoughData when the record does not hold two segments of the length asked for.
         """
         wished = self._wished(samples, sample_rate_hz)
         # Beyond the record first: what is beyond all numbers is no whole one.

@@ -59,10 +59,7 @@ def resonances(
     noise explains is left out. Then all modes are fitted together, and that fit stands where it explains
     the whole band: no polynomial follows the skirt of a neighbour to the last digit of a fine measurement.
 
-    Raises
-    ------
-    InvalidRequest
-        When fewer than eight lines lie in the band.
+    Raises InvalidRequest when fewer than eight lines lie in the band.
     """
     band = frequency_response.between(low_hz, high_hz)
     if band.frequency_hz.size < _LEAST_LINES:

@@ -392,10 +392,7 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
 
     Exports take it along (`vibench export --results`). Not followed samples are NaN.
 
-    Raises
-    ------
-    RecordingError
-        When the recording is not finished, or the disk refuses.
+    Raises RecordingError when the recording is not finished, or the disk refuses.
     """
     arrays = {**_channels(motion), **_tracked_impacts(motion), **_free_impacts(motion)}
     settings = {"told": motion.to_dict(), "sentences": list(motion.sentences)}

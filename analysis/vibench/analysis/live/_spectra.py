@@ -250,10 +250,8 @@ class DensityPicture:
 def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
     """Picture a stretch; every sample of it is in the picture.
 
-    Raises
-    ------
-    RecordingError, InvalidRequest, NotEnoughData
-        When the file, the channel or the stretch cannot be pictured.
+    Raises RecordingError or InvalidRequest or NotEnoughData when the file, the channel or the stretch cannot
+    be pictured.
     """
     with open_recording(request.path) as recording:
         rate_hz = recording.sample_rate_hz

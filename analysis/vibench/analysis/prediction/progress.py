@@ -199,10 +199,7 @@ def picture_of(results: MapResults) -> MapPicture:
 def settled_motion(request: MotionRequest) -> SettledMotion:
     """Follow a specimen from rest until its motion has settled, and sample what it does then.
 
-    Raises
-    ------
-    ValueError
-        When it cannot be followed.
+    Raises ValueError when it cannot be followed.
     """
     plan = MapRequest(
         **request.model_dump(exclude={"frequency_hz", "amplitude_m"}),

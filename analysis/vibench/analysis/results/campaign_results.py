@@ -329,10 +329,7 @@ def result_of(
 def recordings_in(folder: Path) -> tuple[Path, ...]:
     """List the recordings in a folder, finished or interrupted, in the order they were started.
 
-    Raises
-    ------
-    NotEnoughData
-        When there are none.
+    Raises NotEnoughData when there are none.
     """
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:

@@ -77,10 +77,7 @@ def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisF
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
     """Return the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
 
-    Raises
-    ------
-    NotEnoughData
-        When the recording is of another kind, or of one frequency.
+    Raises NotEnoughData when the recording is of another kind, or of one frequency.
     """
     result, _ = kept_result(compared)
     found = drive_level(result)

@@ -39,10 +39,8 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     sum of all needs is distributed in their proportion. Sweeps, and measurements without a prediction, keep
     their times.
 
-    Raises
-    ------
-    ConfigurationError
-        When no measurement has wishes that can be predicted, or the time is too short for all wishes.
+    Raises ConfigurationError when no measurement has wishes that can be predicted, or the time is too short
+    for all wishes.
 
     """
     needs = {each.name: time_to_wishes_s(each, rig) for each in campaign.measurements}

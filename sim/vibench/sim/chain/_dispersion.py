@@ -96,10 +96,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
 
     Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
 
-    Raises
-    ------
-    ValueError
-        When a wave number is not finite.
+    Raises ValueError when a wave number is not finite.
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
     if not np.all(np.isfinite(phase)):

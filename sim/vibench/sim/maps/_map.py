@@ -399,10 +399,7 @@ class Map(GridPlan):
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
         """Make the scene at a place of the grid, from its own start or another.
 
-        Raises
-        ------
-        ValueError
-            When a scene of these numbers is not allowed.
+        Raises ValueError when a scene of these numbers is not allowed.
         """
         said = self._numbers(place)
         frequency_hz = said["frequency_hz"]

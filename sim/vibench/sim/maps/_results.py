@@ -258,10 +258,7 @@ def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
 def open_map(path: Path | str) -> MapResults:
     """Read a map's file, finished or growing.
 
-    Raises
-    ------
-    StudyError
-        When it is no map's file, or another version's.
+    Raises StudyError when it is no map's file, or another version's.
     """
     path = Path(path)
     plan = read_plan(path, Map)

@@ -79,10 +79,7 @@ def write_all(descriptor: int, data: Buffer, offset: int) -> None:
 class OpenFile:
     """An existing file, open to be written; its marks vanish with the process, however that ends.
 
-    Raises
-    ------
-    OSError
-        When it cannot be opened.
+    Raises OSError when it cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:

@@ -107,10 +107,7 @@ def periodic_branch(
     The branch ends at ``stop``, or back at its start's value where it turned round. Pseudo-arclength
     continuation (Keller 1977): steps along the curve, so that folds are passed.
 
-    Raises
-    ------
-    ValueError
-        When the orbit did not converge, or ``stop`` is not allowed.
+    Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
     """
     parameter = chosen(Parameter, parameter)
     path = path_from(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m)

@@ -191,10 +191,7 @@ class NoForce:
 def spring_of(specimen: Specimen) -> RestoringForce:
     """Turn a specimen's stops into the function that harmonic balance needs.
 
-    Raises
-    ------
-    ValueError
-        When the stops are rigid, whose force is not finite.
+    Raises ValueError when the stops are rigid, whose force is not finite.
     """
     lower, upper = specimen.gaps_m
     match specimen.contact:

@@ -140,11 +140,8 @@ class _Start:
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     """Give answers to a scene with a target, each better than the one before; the last one is the best.
 
-    Raises
-    ------
-    ValueError
-        When the scene has no target, the specimen cannot be followed in time, or not even one drive period
-        could be followed in the requested time.
+    Raises ValueError when the scene has no target, the specimen cannot be followed in time, or not even one
+    drive period could be followed in the requested time.
 
     """
     if scene.target is None:

@@ -86,10 +86,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     start. Where the two part, the start is forgotten and another run is another draw: the error is then what
     two draws differ by in 19 cases of 20.
 
-    Raises
-    ------
-    ValueError
-        When the specimen cannot be followed in time, or not from such a start.
+    Raises ValueError when the specimen cannot be followed in time, or not from such a start.
     """
     question = chosen(Question, question)
     if scene.target is not None:
@@ -115,10 +112,7 @@ def settle_scene(scene: Scene) -> ScenePrediction:
     It is the same motion that `solve_scene` describes, in a third of the time or less. Chaos is followed on
     for as long as the scene's duration allows. One of an automatic duration ends after whole drive periods.
 
-    Raises
-    ------
-    ValueError
-        When the specimen cannot be followed in time, or not from such a start.
+    Raises ValueError when the specimen cannot be followed in time, or not from such a start.
     """
     return solve_scene(scene, Question.MOTION)
 
@@ -142,10 +136,7 @@ def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) 
 
     The answer to each does not depend on the others. Of chaos it is another draw than that of `solve_scene`.
 
-    Raises
-    ------
-    ValueError
-        When one of them cannot be followed in time, or not from its start.
+    Raises ValueError when one of them cannot be followed in time, or not from its start.
     """
     found: list[Solved] = []
     together: list[Scene] = []

@@ -66,10 +66,7 @@ def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> f
     k = 4/3 E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; Johnson, Contact Mechanics (1985),
     eq. 4.23. Holds for frictionless, elastic contact much smaller than the radius.
 
-    Raises
-    ------
-    ValueError
-        When the radius is not positive.
+    Raises ValueError when the radius is not positive.
     """
     if not 0.0 < radius_m < math.inf:
         msg = f"Sphere radius {radius_m} m is not allowed: it must be positive and finite."

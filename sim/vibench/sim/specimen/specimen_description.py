@@ -295,10 +295,7 @@ def usual_specimen() -> SpecimenTable:
 def load_specimen(specimen: str | Path) -> SpecimenDescription:
     """Read a described specimen: the name of a shipped one, or the path of a TOML file.
 
-    Raises
-    ------
-    UnknownSpecimenError
-        When there is no such file, or it does not describe a specimen.
+    Raises UnknownSpecimenError when there is no such file, or it does not describe a specimen.
     """
     try:
         return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})

@@ -14,10 +14,7 @@ class UnreadableTomlError(ValueError):
 def toml_table(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
-    Raises
-    ------
-    UnreadableTomlError
-        When the file is missing, is not text, or is not TOML.
+    Raises UnreadableTomlError when the file is missing, is not text, or is not TOML.
     """
     try:
         # Editors on Windows begin a file with a byte-order mark.

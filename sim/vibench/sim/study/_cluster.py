@@ -38,10 +38,8 @@ def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
 class ClusterExecutor:
     """The workers behind a Dask scheduler.
 
-    Raises
-    ------
-    ClusterLost
-        When nobody answers at the address, no worker comes, or a worker has no vibench or another one.
+    Raises ClusterLost when nobody answers at the address, no worker comes, or a worker has no vibench or
+    another one.
     """
 
     def __init__(

@@ -109,10 +109,7 @@ Item = TypeVar("Item")
 class ThreadExecutor:
     """As many threads as asked for; one for each processor when None.
 
-    Raises
-    ------
-    InvalidStudy
-        When fewer than one worker is asked for.
+    Raises InvalidStudy when fewer than one worker is asked for.
     """
 
     def __init__(self, workers: int | None = None, solver: Solver = solve_scene) -> None:

@@ -206,10 +206,8 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 class FileStore:
     """Keeps answers in a study's file; a context that releases it.
 
-    Raises
-    ------
-    StudyError
-        When the file is another study's, is being written by another run, or is no study's file.
+    Raises StudyError when the file is another study's, is being written by another run, or is no study's
+    file.
     """
 
     def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], OpenFile] = sole_writer) -> None:

@@ -53,10 +53,7 @@ def read_plan(path: Path, kind: type[Plan]) -> Plan:
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
     """Read every answer, each of shape (points, ...); a point that is under way counts as missing.
 
-    Raises
-    ------
-    StudyError
-        When the file cannot be read, or is of another kind than the plan.
+    Raises StudyError when the file cannot be read, or is of another kind than the plan.
     """
     with _open_store(path, type(plan)) as file:
         return _arrays(file, plan)
@@ -275,10 +272,7 @@ class StudyResults(GridResults[Study]):
 def open_study(path: Path | str) -> StudyResults:
     """Read a study's file, finished or growing.
 
-    Raises
-    ------
-    StudyError
-        When it is no study's file, or another version's.
+    Raises StudyError when it is no study's file, or another version's.
     """
     path = Path(path)
     study = read_plan(path, Study)

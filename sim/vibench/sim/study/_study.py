@@ -291,10 +291,7 @@ class Study(GridPlan):
     def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
         """Make the scene at a place of the grid.
 
-        Raises
-        ------
-        ValueError
-            When a scene of these numbers is not allowed.
+        Raises ValueError when a scene of these numbers is not allowed.
         """
         model, damping, gap, amplitude, _, frequency = place
         return Scene(
