@@ -18,7 +18,7 @@ from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RecordedChannels
-from ..recordings.response import VELOCITY, velocity_noise
+from ..recordings.response import VELOCITY, noise_as_read
 from ..signals.arrays import Reals, Samples
 from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
@@ -403,7 +403,7 @@ def _moved(
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
     for role, seen in ((BASE, motion.base_acceleration), (rig.response, motion.m0_velocity)):
         rate_hz, first = recording.sample_rate_hz, 0
-        for block in velocity_noise(role, rate_hz, seen.size, _BLOCK, rng):
+        for block in noise_as_read(role, rate_hz, seen.size, _BLOCK, rng):
             seen[first : first + block.size] += np.float32(noise.rms[role]) * block
             first += block.size
     return motion

@@ -161,12 +161,12 @@ class ResponseChannel:
         return self._block[1]
 
 
-def velocity_noise(
+def noise_as_read(
     role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
 ) -> Iterator[Samples]:
-    """Yield white noise of unit variance at a sensor as `ResponseChannel` reads it, block by block."""
-    quantity = _quantity(role)
-    kernel = _CONVERSIONS[quantity][0](rate_hz) if quantity in _CONVERSIONS else np.ones(1)
+    """Yield white noise of unit variance at a sensor as analyses read it: that of a mass as a velocity."""
+    conversion = None if role.startswith("base_") else _CONVERSIONS.get(_quantity(role))
+    kernel = np.ones(1) if conversion is None else conversion[0](rate_hz)
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
     for first in range(0, count, block):
         white = np.concatenate((before, rng.standard_normal(min(block, count - first), np.float32)))
