@@ -171,7 +171,8 @@ relative_sd_magnitude residue residue_acceleration response_i response_ii rest_b
 restitution runs
 sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
 share_at_full_scale share_told sides spectrum_error standard_errors statistic steady_relative_sd stop
-is_clear slow_change strobe_sample surrogates transmission turns_per_period up whole_stretches
+is_clear slow_change strobe_sample surrogates transmission
+transmission_error turns_per_period up whole_stretches
 """
 PURE = set(_PURE.split())
 """Counts, shares, ratios, flags and numbers of samples: names that mean the same in every result."""

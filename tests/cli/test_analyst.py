@@ -16,4 +16,4 @@ def test_the_end_of_the_process_that_analyses_is_told_and_ends_no_measurement(tm
         with pytest.raises(AnalysisError, match=r"every recording is kept: vibench analyse '.*of today'"):
             list(analyst.results())
         analyst.take(recording)
-        assert analyst.asked == 2
+        assert analyst.submitted == 2

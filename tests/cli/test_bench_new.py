@@ -137,7 +137,7 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
     switch = StopSwitch()
     with (
         stop_on_signal(switch),
-        pytest.raises(CheckStopped, match=r'before anything played.*--bench "my own'),
+        pytest.raises(CheckStopped, match=r'before any output.*--bench "my own'),
     ):
         _confirm_wire(Path("my own.toml"), "the T-piece")
     assert switch.request is None

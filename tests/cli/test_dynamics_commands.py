@@ -134,7 +134,7 @@ def test_zero_is_named_as_it_was_typed(command):
             ("branches", "--like", "any.h5", "--amplitude", "1e-6:5e-6"),
             "leave --amplitude out (--frequency START:STOP may stay",
         ),
-        (("branches", "--resonance", "92:97"), "give --amplitude START:STOP beside it"),
+        (("branches", "--resonance", "92:97"), "give --amplitude START:STOP too"),
         (
             ("branches", "--resonance", "92", "--amplitude", "1e-8:1e-7"),
             "--resonance was given as '92': 1 numbers are",

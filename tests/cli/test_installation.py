@@ -99,7 +99,7 @@ def test_a_disk_without_room_is_one_sentence(vibench_here, tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert told.returncode == 1
-    assert re.search(r"there is no room for .*ine/campaigns/branch\.toml", told.stderr)
+    assert re.search(r"there is no space for .*ine/campaigns/branch\.toml", told.stderr)
     assert "Traceback" not in told.stderr
 
 

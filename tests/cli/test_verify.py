@@ -135,7 +135,7 @@ def test_a_recording_that_is_not_finished_is_left_out_of_a_crate_and_named(viben
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     found, names, _ = packed(vibench_here, folder)
     assert (found.returncode, "five.h5.part" in names) == (0, False)
-    assert "note: five.h5.part is not finished and was left out" in found.stderr
+    assert "note: five.h5.part is not finished and was omitted" in found.stderr
 
 
 def test_a_crate_calls_no_damaged_recording_complete(vibench_here, folder):

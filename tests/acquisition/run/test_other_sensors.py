@@ -202,7 +202,7 @@ def test_a_first_day_asks_for_the_sensors_that_the_template_has(tmp_path):
 
 def test_feedback_without_a_velocity_of_m0_is_refused_before_anything_plays(tmp_path):
     level = {"displacement_m": 1e-6}
-    with pytest.raises(ConfigurationError, match=r"feedback listens to m0_velocity.*Nothing was played"):
+    with pytest.raises(ConfigurationError, match=r"feedback needs m0_velocity.*Nothing was played"):
         measured(
             WITHOUT, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
             base_level=level, duration_s=1.0,

@@ -149,16 +149,16 @@ def test_random_scatter_of_parts_is_no_slow_change_and_a_trend_is():
     assert slow_change(1 - 1e-3 * np.exp(-np.linspace(0, 0.6, 10))) > 0
 
 
-def test_a_drift_of_the_sensor_does_not_swing_at_the_ends_of_a_step(synthetic_module, tmp_path):
+def test_a_drift_of_the_sensor_does_not_swing_at_the_ends_of_a_step(tmp_path):
     """Response I 0.0886 +- 0.0006 was reported of a weak step whose truth is 0.0871."""
     hz = 416.15
-    motion, time_s = synthetic_module.sine(2.0, hz, A0_M), synthetic_module.times(2.0)
+    motion, time_s = synthetic.sine(2.0, hz, A0_M), synthetic.times(2.0)
     velocity = A0_M * 2 * np.pi * hz * np.cos(2 * np.pi * hz * time_s)
     velocity *= 1 + 1e-6 * np.random.default_rng(1).standard_normal(velocity.size)
     drift = 0.02 * A0_M * 2 * np.pi * hz * time_s
     plan = SteppedSine(amplitude_vpp=0.02, frequencies_hz=(hz,), settle_s=1.0, record_s=1.0)
-    part = synthetic_module.Part("step", 1.0, 2.0, {"frequency_hz": hz, "direction": "up"})
-    synthetic_module.write_recording(tmp_path, plan, motion, velocity + drift, [part], name="drift")
+    part = synthetic.Part("step", 1.0, 2.0, {"frequency_hz": hz, "direction": "up"})
+    synthetic.write_recording(tmp_path, plan, motion, velocity + drift, [part], name="drift")
     (result,) = analyse_files([tmp_path / "drift.h5"], "steps", Simulation.LEFT_OUT).results
     assert result.analysis.response.response_i[0] == pytest.approx(1.0, abs=2e-3)
 

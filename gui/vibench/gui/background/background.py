@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from PySide6.QtCore import QObject, QTimer
+from shiboken6 import isValid
 
 from vibench.sim.background import Job, Pool
 
@@ -97,12 +98,16 @@ class LatestRequest(QObject, Generic[Question, Answer]):
 
     def _answered(self, answer: Answer) -> None:
         self._job = None
+        if not isValid(self):  # its page was deleted meanwhile
+            return
         if self._wanted is None:
             self._on_answer(answer)
         self._ask()
 
     def _failed(self, error: BaseException) -> None:
         self._job = None
+        if not isValid(self):
+            return
         if self._wanted is None:
             self._on_error(error)
         self._ask()
