@@ -67,6 +67,15 @@ def test_four_times_the_time_halves_the_scatter_and_no_calibration():
     assert Cause.VIBROMETER not in stated[2].not_stated
 
 
+@pytest.mark.parametrize("role", ["m0_velocity", "base_acceleration"])
+def test_a_rig_that_cannot_see_a_motion_promises_nothing_of_it(role):
+    daq = RIG.daq.model_copy(update={"channels": tuple(c for c in RIG.daq.channels if c.role != role)})
+    rig = RIG.model_copy(update={"daq": daq})
+    sine = Dwell(amplitude_vpp=0.2, frequency_hz=130.0, duration_s=2.0)
+    for excitation in (NOISE, sine):
+        assert expected_uncertainty(Measurement(name="blind", excitation=excitation), rig) == ()
+
+
 def test_noise_that_collides_promises_nothing():
     plan = Measurement(name="strong", excitation=NOISE.model_copy(update={"amplitude_vpp": 3.0}))
     for each in expected_uncertainty(plan, RIG):

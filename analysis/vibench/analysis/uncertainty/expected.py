@@ -203,7 +203,8 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
     Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
     runs of the described rig under its voltage, analysed like a recording; where these settle on different
-    motions nothing is stated. Scatter falls with the root of the time. Other kinds of plan give nothing.
+    motions nothing is stated. Scatter falls with the root of the time. Other kinds of plan give nothing, nor
+    does a rig without a channel for the motion of m0 or for the base's acceleration.
 
     Parameters
     ----------
@@ -212,7 +213,10 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     rig
         What it is played on: its specimen, and what it states of sensors and noise.
     """
-    stated = stated_uncertainties(rig.model_dump(mode="json"), rig.response or Role.M0_VELOCITY)
+    has_base = any(channel.role is Role.BASE_ACCELERATION for channel in rig.daq.channels)
+    if rig.response is None or not has_base:
+        return ()
+    stated = stated_uncertainties(rig.model_dump(mode="json"), rig.response)
     match measurement.excitation:
         case Dwell(frequency_hz=at_hz) | HeldDwell(frequency_hz=at_hz):
             return tuple(_of_sine(measurement, rig, stated, at_hz))
