@@ -28,6 +28,7 @@ from vibench.analysis import (
 )
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.response import derivative_kernel
+from vibench.analysis.report import write_report
 from vibench.sim import base_transmissibility
 
 BASE, WITHOUT = load_rig("virtual_rig"), load_rig("virtual_rig_accelerometers")
@@ -157,6 +158,8 @@ def test_a_dwell_by_accelerometers_has_the_responses_and_causes_of_its_sensors(t
     said = " ".join(budget_sentences(results[1]))
     assert "accelerometer calibration" in said
     assert "vibrometer" not in said
+    report = write_report(results[1], tmp_path / "report.html")
+    assert "IEPE accelerometer 10 mV/g" in report.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -179,7 +182,7 @@ def test_a_sensor_that_does_not_fit_is_refused(change, words):
 
 def test_a_channel_without_a_sensor_names_the_table_to_add():
     said = WITHOUT.model_dump(mode="json") | {"sensors": {}}
-    with pytest.raises(ValidationError, match=re.escape("add the table [sensors.m0_acceleration]")):
+    with pytest.raises(ValidationError, match=re.escape("[sensors.m0_acceleration] (docs/sensor-units.md)")):
         Rig.model_validate(said)
 
 

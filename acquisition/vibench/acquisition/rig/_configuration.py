@@ -631,7 +631,7 @@ class Rig(FrozenModel):
             if not is_described and (channel.sensor is None or self.virtual is not None):
                 table = "vibrometer" if role is Role.M0_VELOCITY else f"sensors.{role}"
                 raise ValueError(
-                    f"the channel {role} has no sensor; add the table [{table}] (docs/configuration.md)"
+                    f"the channel {role} has no sensor; add the table [{table}] (docs/sensor-units.md)"
                 )
         if self.controller is not None and self.vibrometer is None:
             raise ValueError("a controller samples the velocity of m0; add the table [vibrometer]")

@@ -284,18 +284,12 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
     rows += [
         (part, _part_name(facts.bench[part]))
         for part in ("amplifier", "shaker", "vibrometer", "accelerometer")
-        if part in facts.bench
+        if facts.bench.get(part)
     ]
     specimen = facts.bench.get("specimen")
     if specimen:
-        rows.append(
-            (
-                "specimen",
-                ", ".join(
-                    f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources"
-                ),
-            )
-        )
+        said = (f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources")
+        rows.append(("specimen", ", ".join(said)))
     rows.append(("bench check", bench_check_text(facts)))
     rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
     rows.append(("sample rate", rate))
