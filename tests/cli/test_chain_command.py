@@ -93,6 +93,12 @@ def test_a_run_that_is_lost_says_how_it_ended_and_nothing_else_is_claimed(freque
     assert "1 did not reach their end" in run(*options).output
 
 
+def test_a_run_without_time_for_an_error_says_that_it_is_not_known():
+    found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
+    assert "error not known" in found.output
+    assert "inf" not in found.output
+
+
 def test_an_exponent_is_told_with_its_error():
     result = run(
         "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,

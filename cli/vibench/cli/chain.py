@@ -141,7 +141,8 @@ def _run_in_words(run: ChainRun) -> str:
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "
     if not math.isnan(run.transmission_error[0]):
-        across += f"error {100.0 * run.transmission_error.max():.2g} % at most; "
+        most = run.transmission_error.max()
+        across += f"error {100.0 * most:.2g} % at most; " if most < math.inf else "error not known; "
     exponent = (
         ""
         if math.isnan(run.exponent_per_s)
