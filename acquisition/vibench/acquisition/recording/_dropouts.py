@@ -34,6 +34,10 @@ _MOST_RUNS = 12
 """Close to each other; this many corners are made by the motion."""
 _FLANK_S = 1e-3
 """Length of motion on either side by which a drop-out is recognised."""
+_LEAST_HELD = 8
+"""Equal samples in a row that no motion shows between two changes of `_QUANTA`."""
+_QUANTA = 4.0
+"""Change from sample to sample, over the smallest of the channel, at both ends of equal samples."""
 _LEAST_OF_FLANK = 0.25
 """Part of it that another drop-out close by must leave."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
@@ -75,11 +79,11 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
         return ()
-    sharp, usual = _corners(velocity)
-    if usual == 0.0 or not np.any(sharp > _FAR * usual):
-        return ()
-    rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
     longest = LONGEST_S * sample_rate_hz
+    found = _held(velocity, longest)
+    velocity = bridged(velocity, tuple(found))
+    sharp, usual = _corners(velocity)
+    rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
 
     def explained(edges: Places) -> tuple[Dropout, ...]:
         runs = [
@@ -91,13 +95,25 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         ]
         return _explain(velocity, runs, flank, longest) if len(runs) <= _MOST_RUNS else ()
 
-    found: list[Dropout] = []
-    for edges in _apart(far, longest):
+    for edges in _apart(far, longest) if far.size else ():
         together = explained(edges)
         for each in [] if together else _apart(edges, flank):
             together += explained(each)
         found += together
-    return _join(found, flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+    return _join(sorted(found), flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+
+
+def _held(velocity: Samples, longest: float) -> list[Dropout]:
+    """Find where the decoder holds one value; noise may hide the edges of such a drop-out."""
+    change = np.abs(np.diff(velocity))
+    moves = np.flatnonzero(change != 0.0)
+    first, last, equal = moves[:-1], moves[1:], np.diff(moves)
+    steep = change > _QUANTA * np.min(change, where=change > 0.0, initial=np.inf)
+    # A clipped peak is held too, at the largest value.
+    is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
+    held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
+    ends = zip(np.maximum(first[held] - 1, 0).tolist(), (last[held] + 3).tolist(), strict=True)
+    return [Dropout(*each) for each in ends]
 
 
 def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
@@ -105,7 +121,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
     joined: list[Dropout] = []
     for each in found:
         if joined and each.first - joined[-1].stop < flank:
-            joined[-1] = Dropout(joined[-1].first, each.stop)
+            joined[-1] = Dropout(joined[-1].first, max(joined[-1].stop, each.stop))
         else:
             joined.append(each)
     return tuple(joined)
@@ -126,7 +142,7 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
         return velocity.size
     sharp, usual = _corners(velocity)
-    far = np.flatnonzero(sharp > _FAR * usual) if usual else np.empty(0, dtype=np.int64)
+    far = np.flatnonzero(sharp > _FAR * usual)
     far = far[far >= velocity.size - round(DROPOUTS_TOLD_AFTER_S * sample_rate_hz)]
     known = np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
@@ -136,10 +152,10 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
 
 
 def _corners(velocity: Samples) -> tuple[Samples, float]:
-    """Difference twice, and twice again, which leaves a motion's sharpest corners; and give their median."""
+    """Return fourth differences, in which sharp corners stand out, and their median; infinite for zero."""
     sharp = np.zeros(velocity.size)
     sharp[2:-2] = np.abs(np.diff(velocity, 4))
-    return sharp, float(np.nanmedian(sharp))
+    return sharp, float(np.nanmedian(sharp)) or np.inf
 
 
 def _apart(places: Places, distance: float) -> list[Places]:

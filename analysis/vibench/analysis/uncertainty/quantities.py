@@ -232,7 +232,8 @@ def _largest(
         own = [from_scatter(Cause.NOISE, float(scatter[top]), value, source)]
         if isinstance(found, SweepResponse):
             is_hidden = ~found.is_clear | np.isnan(found.response_i)
-            if np.any(found.response_ii[is_hidden] > found.response_ii[top]):
+            # What a bridge misses scatters within its interval.
+            if np.any((found.response_ii + 2 * sd)[is_hidden] > found.response_ii[top]):
                 own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
         if collides[top]:
             is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
