@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.noise_verdicts import noise_points
+from benchmarks.noise_verdicts import noise_points, regular_points
 from vibench.analysis import AnalysisError, motion_verdict
 from vibench.analysis.chaos.period import Points, shortest_period
 from vibench.analysis.chaos.verdict import MotionKind
@@ -234,6 +234,13 @@ def test_points_that_only_scatter_have_no_exponent():
     rng = np.random.default_rng(2)
     found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
     assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
+
+
+@pytest.mark.parametrize(("seed", "number"), [(4303, 0), (52, 42), (54, 42), (51, 36), (65, 30)])
+def test_a_decaying_transient_neither_repeats_late_nor_is_quasi_periodic(seed, number):
+    """The first was "every 22 drive periods", the last turned round a closed curve."""
+    _, points = regular_points(number, seed)
+    assert motion_verdict(points, DRIVE_HZ).kind is MotionKind.UNDECIDED
 
 
 @pytest.mark.parametrize("number", range(5))

@@ -21,6 +21,9 @@ _BLOCKS = 10
 _DRIFT = 5.0
 """Standard errors of a slope that a settled record reaches once in 250 (four figures, eight free blocks)."""
 
+_STEADY_SCATTER = 0.9
+"""Scatter of one half of a record over that of the other, above which it does not decay."""
+
 
 @dataclass(frozen=True, eq=False)
 class Points(Labelled):
@@ -105,3 +108,10 @@ def slow_share(points: Points) -> float:
 def is_settled(points: Points) -> bool:
     """Whether mean and scatter stay what they are over the record."""
     return drift(points) <= _DRIFT
+
+
+def scatter_drifts(points: Points) -> bool:
+    """Whether the scatter about the mean point changes by a tenth, even below a drive's steadiness."""
+    sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
+    relative = Points(points.value / points.spread, points.noise)
+    return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

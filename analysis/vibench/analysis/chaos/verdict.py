@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
 from ..tables import Labelled
-from .period import Points, is_settled, shortest_period, slow_share
+from .period import Points, is_settled, scatter_drifts, shortest_period, slow_share
 from .witnesses import (
     FEWEST,
     Divergence,
@@ -248,8 +248,9 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     if count - before < FEWEST:
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
-    # A settled end is seen to repeat, however long the transient; an irregular one may be a transient.
-    if found.kind is not MotionKind.PERIODIC and count - before < before:
+    # A settled end is seen to repeat, however long the transient; an irregular one may be a transient, and
+    # so may a long period: what decays into noise turns round a point.
+    if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
 
@@ -268,6 +269,8 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
             evidence,
         )
     period = shortest_period(last)
+    if (period or math.inf) > _LOW_PERIOD and scatter_drifts(last):
+        return _undecided("the scatter about the mean point still changes; settle for longer", evidence)
     if period is None:
         return _aperiodic(Points(last.value[-MOST_POINTS:], last.noise), evidence, seed)
     if period > 1:
