@@ -112,8 +112,8 @@ def _held(velocity: Samples, longest: float) -> list[Dropout]:
     # A clipped peak is held too, at the largest value.
     is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
     held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
-    ends = zip(np.maximum(first[held] - 1, 0).tolist(), (last[held] + 3).tolist(), strict=True)
-    return [Dropout(*each) for each in ends]
+    ends = zip(first[held].tolist(), last[held].tolist(), strict=True)
+    return [Dropout(max(begin - 1, 0), end + 3) for begin, end in ends]
 
 
 def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:

@@ -62,35 +62,27 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     name = str(channel["long_name"]) or role
     data = view.create_group(role)
     write_attributes(data, {"NX_class": "NXdata", "signal": SIGNAL, "axes": layout.TIME, "time_indices": 0})
+    # Low and high of each bin by turns; NaN where all of its samples are lost.
+    counts = np.column_stack((overview.low, overview.high)).ravel()
+    values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
+    physical = np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)
     # silx names no vertical axis: the unit stands in the title as well.
     write_text_dataset(data, "title", f"{title}: {role.replace('_', ' ')} [{channel['units']}]")
     write_attributes(
-        data.create_dataset(SIGNAL, data=_physical(overview, channel), compression="gzip", shuffle=True),
+        data.create_dataset(SIGNAL, data=physical, compression="gzip", shuffle=True),
         {
             "units": channel["units"],
             "long_name": f"{name} [{channel['units']}]",
             "comment": f"smallest and largest of every {BIN_SAMPLES} samples, by turns",
         },
     )
-    data[layout.TIME] = _time_axis(file, view, overview.low.size)
-
-
-def _physical(overview: CountOverview, channel: dict[str, str | int | float]) -> np.ndarray:
-    """Low and high of each bin by turns; NaN where all of its samples are lost."""
-    counts = np.column_stack((overview.low, overview.high)).ravel()
-    values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
-    return np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)
-
-
-def _time_axis(file: h5py.File, view: h5py.Group, bins: int) -> h5py.Dataset:
-    """Return the one dataset of times, which each channel's group has under its own name."""
-    for data in view.values():
-        if layout.TIME in data:
-            return data[layout.TIME]
-    half_bin_s = 0.5 * BIN_SAMPLES / float(file.attrs["sample_rate_hz"])
-    made = view.create_dataset(None, data=np.arange(2 * bins) * half_bin_s, compression="gzip", shuffle=True)
-    write_attributes(made, {"units": "s", "long_name": "time since the first sample [s]"})
-    return made
+    # One dataset of times, which each channel's group has under its own name.
+    times = next((each[layout.TIME] for each in view.values() if layout.TIME in each), None)
+    if times is None:
+        time_s = np.arange(counts.size) * (0.5 * BIN_SAMPLES / float(file.attrs["sample_rate_hz"]))
+        times = view.create_dataset(None, data=time_s, compression="gzip", shuffle=True)
+        write_attributes(times, {"units": "s", "long_name": "time since the first sample [s]"})
+    data[layout.TIME] = times
 
 
 IN_FLIGHT_PER_WORKER = 4
@@ -276,7 +268,7 @@ def _copy_channel(
 ) -> tuple[str, CountOverview]:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
     digest, sums = hashlib.sha256(), OverviewSums()
-    write_chunks(dataset, sums.summed(_hash_pieces(_pieces(source, samples), digest)))
+    write_chunks(dataset, sums.summed(_hashed_pieces(source, samples, digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)
@@ -285,13 +277,9 @@ def _copy_channel(
     return digest.hexdigest(), overview
 
 
-def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:
+def _hashed_pieces(dataset: h5py.Dataset, samples: int, digest: "hashlib._Hash") -> Iterator[Counts]:
     for begin in range(0, samples, layout.CHUNK_SAMPLES):
-        yield dataset[begin : min(begin + layout.CHUNK_SAMPLES, samples)]
-
-
-def _hash_pieces(pieces: Iterator[Counts], digest: "hashlib._Hash") -> Iterator[Counts]:
-    for piece in pieces:
+        piece = dataset[begin : min(begin + layout.CHUNK_SAMPLES, samples)]
         digest.update(piece.data)
         yield piece
 

@@ -374,7 +374,10 @@ class Recording(RecordingDescription):
 
         Raises RecordingError when the recording is not finished, an axis does not fit, or the disk refuses.
         """
-        self._require_finished("added to")
+        if self.path.suffix == layout.PART_SUFFIX:
+            raise RecordingError(
+                f"{self.path} is not finished, so nothing was added to it: let it end, or recover it."
+            )
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
         key = seal_key()
         seal = self.check_seal(SealDepth.QUICK)
@@ -397,12 +400,6 @@ class Recording(RecordingDescription):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _require_finished(self, verb: str) -> None:
-        if self.path.suffix == layout.PART_SUFFIX:
-            raise RecordingError(
-                f"{self.path} is not finished, so it cannot be {verb}: let the recording end, or recover it."
-            )
 
     def _range(self, start: int, stop: int | None) -> tuple[int, int]:
         end = self.samples if stop is None else stop

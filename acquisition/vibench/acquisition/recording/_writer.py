@@ -240,7 +240,8 @@ class RecordingWriter:
         part = layout.part_of(self.path)
         try:
             self._write_ending(state, reason)
-            finalise(part, self._key, self._written() if failure is None else None)
+            checksums = {role: digest.hexdigest() for role, digest in self._digests.items()}
+            finalise(part, self._key, checksums if failure is None else None)
         finally:
             # What a close can still refuse (a network folder), the ending's sync has refused before.
             with suppress(OSError):
@@ -322,10 +323,6 @@ class RecordingWriter:
             )
             self._committer.put(Batch(writes=self._channel_writes(begin, counts), samples=counts.shape[1]))
         self._committer.put(self._journal.gap(first, stop - 1))
-
-    def _written(self) -> dict[str, str]:
-        """Checksum of each channel as it was handed over."""
-        return {role: digest.hexdigest() for role, digest in self._digests.items()}
 
     def _channel_writes(self, first_sample: int, counts: Counts) -> tuple[tuple[int, Buffer], ...]:
         for digest, row in zip(self._digests.values(), counts, strict=True):

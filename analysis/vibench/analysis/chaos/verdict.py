@@ -341,13 +341,13 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
     test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
     bent_test = _bent_test(points, seed) if noise_test.rejects_linear_noise else noise_test
-    parting = _parting(points)
-    return _verdict(
-        replace(evidence, zero_one=test, surrogates=bent_test, divergence=parting),
-        test,
-        noise_test,
-        bent_test,
-    )
+    try:
+        space = delay_vectors(points.value, _DELAYS)
+        parting = divergence(space, steps=_STEPS, noise=points.noise_level)
+    except NotEnoughData:
+        parting = None
+    evidence = replace(evidence, zero_one=test, surrogates=bent_test, divergence=parting)
+    return _verdict(evidence, test, noise_test, bent_test)
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
@@ -404,11 +404,3 @@ def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
         f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"
     )
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
-
-
-def _parting(points: Points) -> Divergence | None:
-    space: Reals = delay_vectors(points.value, _DELAYS)
-    try:
-        return divergence(space, steps=_STEPS, noise=points.noise_level)
-    except NotEnoughData:
-        return None

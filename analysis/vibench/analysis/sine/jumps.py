@@ -78,7 +78,9 @@ def jumps(
     found = []
     for place in _peaks(np.where(clear, np.abs(size), 0.0)):
         near = slice(max(0, place - _SIDE), place + _SIDE)
-        if not _one_side(allowed, place):
+        before = allowed[max(0, place - _SIDE) : max(0, place - _TRANSITION)]
+        after = allowed[place + _TRANSITION : place + _SIDE]
+        if not (before.all() or after.all()):
             continue
         low, best, high = _likely(logarithm[near])
         first = near.start
@@ -116,12 +118,6 @@ def _peaks(size: Reals) -> list[int]:
         found.append(place)
         left[max(0, place - _SIDE) : place + _SIDE + 1] = 0.0
     return sorted(found)
-
-
-def _one_side(smooth: Flags, place: int) -> bool:
-    before = smooth[max(0, place - _SIDE) : max(0, place - _TRANSITION)]
-    after = smooth[place + _TRANSITION : place + _SIDE]
-    return bool(before.all() or after.all())
 
 
 def _likely(logarithm: Reals) -> tuple[int, int, int]:

@@ -95,6 +95,8 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
     of_base = from_scatter(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
+    is_chance = not (is_steady or np.isnan(found.slow_change))
+    one_draw = [_scatter(laid, RESPONSE_I, 0) or of_one_draw(found)] if is_chance else []
     noise = from_scatter(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
     return (
         _amplitude(drive.amplitude_m, stated, of_base),
@@ -107,7 +109,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
                 noise,
                 *_of_change(found.slow_change),
                 *((_of_base(drive.sd_amplitude_m, drive.amplitude_m),) if is_steady else ()),
-                *(() if is_steady or np.isnan(found.slow_change) else _one_draw(analysis, laid)),
+                *one_draw,
             ),
         ),
         Budget(
@@ -141,12 +143,6 @@ def _of_change(relative: float) -> tuple[Contribution, ...]:
     if relative == 0.0:
         return ()
     return (from_scatter(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
-
-
-def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
-    """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
-    drawn = _scatter(laid, RESPONSE_I, 0)
-    return (of_one_draw(analysis.response) if drawn is None else drawn,)
 
 
 def of_one_draw(found: DwellResponse) -> Contribution:
