@@ -81,7 +81,7 @@ def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_pat
     for point in points:
         assert point["amplitude_m"] == pytest.approx(path.drive(point["frequency_hz"])[1], rel=1e-9)
     refused = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), "--amplitude", "1e-6"])
-    assert "the recording has its own level" in str(refused.exception)
+    assert "the recording defines the amplitude" in str(refused.exception)
 
 
 @pytest.mark.thorough

@@ -9,7 +9,7 @@ from statistics import fmean
 from typing import ClassVar
 
 import numpy as np
-from scipy.signal import detrend
+import scipy
 
 from vibench.acquisition.plan import (
     HeldResponse,
@@ -115,7 +115,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     if np.isnan(data).any():
         return None
     # Where the record is continued, a drift of the sensor would be a jump, which integration makes a swing.
-    data[-1] = detrend(data[-1])
+    data[-1] = scipy.signal.detrend(data[-1])
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1

@@ -11,7 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 from scipy import fft
-from scipy.signal import argrelmax
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import far_from
@@ -464,7 +463,9 @@ def _largest_steady(linear: Transmission, low_hz: float, high_hz: float) -> floa
     """Return the largest magnitude between two frequencies, narrow modes included."""
     hz, step_hz = np.linspace(low_hz, high_hz, _STEADY_POINTS, retstep=True)
     steady = np.abs(linear(hz))
-    near_hz = hz[argrelmax(steady)[0], np.newaxis] + step_hz * np.linspace(-1, 1, _PEAK_POINTS)
+    rising = np.diff(steady) > 0
+    peaks = np.flatnonzero(rising[:-1] & (steady[1:-1] > steady[2:])) + 1
+    near_hz = hz[peaks, np.newaxis] + step_hz * np.linspace(-1, 1, _PEAK_POINTS)
     return float(np.max(np.append(steady, np.abs(linear(near_hz.ravel())))))
 
 
