@@ -124,10 +124,18 @@ def models_figure(rows):
                 label=f"{1e6 * amplitude_m:g} µm",
             )
         labelled = sorted((row for row in rows if row[1] == LABELLED_M), key=lambda row: row[2])
-        for place, (name, _, cost_s, rate, *_) in enumerate(labelled):
-            offset = (6, (4, -8, -2)[place % 3])
+        for name, _, cost_s, rate, *_ in labelled:
+            alike = [row[2] for row in labelled if row[3] == rate]
+            # Of models with equal similarity the fastest has its name on the left, the slowest on the right.
+            is_first = cost_s == alike[0] and (len(alike) > 1 or cost_s == labelled[0][2])
+            side = -1 if is_first else 1 if cost_s == alike[-1] else 0
             axes.annotate(
-                name, (1e3 * cost_s, 100.0 * rate), textcoords="offset points", xytext=offset, fontsize=7
+                name,
+                (1e3 * cost_s, 100.0 * rate),
+                textcoords="offset points",
+                xytext=(6 * side, -2 if side else 5),
+                ha=("center", "left", "right")[side],
+                fontsize=7,
             )
         axes.set_xscale("log")
         axes.set_xlabel("processor time of a point [ms]")
@@ -185,7 +193,14 @@ def chaos_figure(rows):
             axes.plot([row[3] for row in own], [row[2] for row in own], color=colour, linestyle=line,
                       marker="o", markersize=4, label=label)  # fmt: skip
         for _, count, error, cost_s in (row for row in rows if row[0] == WINDOWS_S[-1]):
-            axes.annotate(f"{count}", (cost_s, error), textcoords="offset points", xytext=(3, 4), fontsize=7)
+            axes.annotate(
+                f"{count:g} starts",
+                (cost_s, error),
+                textcoords="offset points",
+                xytext=(-3, -9),
+                ha="right",
+                fontsize=7,
+            )
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("processor time [s]")

@@ -1,7 +1,6 @@
 """Error over time: every method that can answer a scene."""
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 
 import numpy as np
 
@@ -24,20 +23,24 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
 
     """
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
-    looks = dict(zip(methods, zip(cycle(LEVELS), cycle(LEVEL_STYLES), strict=False), strict=False))
+    # Markers of their own distinguish methods beyond the number of colours.
+    looks = {
+        method: (LEVELS[place % len(LEVELS)], LEVEL_STYLES[place % len(LEVELS)], place // len(LEVELS))
+        for place, method in enumerate(methods)
+    }
     columns = min(2, len(curves))
     with styled():
         figure = new_figure(4.6 if len(curves) == 1 else 6.6)
         panels = figure.subplots(-(-len(curves) // columns), columns, squeeze=False, sharex=True, sharey=True)
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
-            for method, (colour, line) in looks.items():
+            for method, (colour, line, more) in looks.items():
                 own = sorted((each for each in points if each.method == method), key=lambda each: each.time_s)
                 axes.plot(
                     [each.time_s for each in own],
                     [max(each.error, _LEAST) for each in own],
                     color=colour,
                     linestyle=line,
-                    marker="o" if all(each.is_stated for each in own) else "x",
+                    marker=("os^" if all(each.is_stated for each in own) else "x+1")[more % 3],
                     markersize=4,
                     label=method,
                 )
@@ -58,8 +61,8 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
         name="tradeoff_scene" if len(curves) == 1 else "tradeoff",
         title=f"Speed against accuracy: {'; '.join(curves)}",
         caption=(
-            f"Largest relative error of the four responses over processor time: {'; '.join(curves)}. Dots: "
-            "as stated by the method; crosses: difference from the best answer. Ring: the answer requested."
+            f"Largest relative error of the four responses over processor time: {'; '.join(curves)}. "
+            "Filled: stated by the method; crosses: difference from the best answer. Ring: the requested one."
         ),
         figure=figure,
         tables=(
