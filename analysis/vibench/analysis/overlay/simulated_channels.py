@@ -105,8 +105,6 @@ class SimulatedChannels:
     """Lag of the response channel behind the base channel."""
     base_acceleration: Samples
     """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
-    drive_v: Samples
-    """Recorded drive voltage, shape (samples,) [V]."""
     sensors: Callable[[Reals], Complexes]
     """Gain of the response's sensor over that of the base's, without their delays."""
 
@@ -129,9 +127,11 @@ class SimulatedChannels:
         return self.recorded.stretches(label)
 
     def read(self, start: int, stop: int) -> Reals:
-        """Return drive, base acceleration and simulated velocity, shape (3, samples)."""
-        channels = (self.drive_v, self.base_acceleration, self.velocity)
-        return np.stack([each[start:stop] for each in channels], dtype=np.float64)
+        """Return the recorded drive, base acceleration and simulated velocity, shape (3, samples)."""
+        drive_v = self.recorded.recording.read(DRIVE, start, stop)
+        return np.stack(
+            [drive_v, self.base_acceleration[start:stop], self.velocity[start:stop]], dtype=np.float64
+        )
 
     def overloaded(self, start: int, stop: int) -> Flags:
         """Where the recording was overloaded: what is compared must rest on the same samples."""
@@ -172,7 +172,6 @@ def under_base_motion(
         counted,
         -base.delay_s,
         recording.read(BASE),
-        recording.read(DRIVE),
         # What the base's sensor did is taken for the base's motion, and the response has no sensor.
         lambda frequency_hz: np.ones(frequency_hz.size, dtype=np.complex128),
     )

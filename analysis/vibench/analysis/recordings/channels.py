@@ -216,6 +216,8 @@ class RecordedChannels:
 
 def far_from(marks: Flags, reach: int) -> Flags:
     """Return which samples lie more than ``reach`` samples from any that is marked, shape (samples,)."""
+    if not marks.any():
+        return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))
     places = np.arange(marks.size)
     low, high = np.maximum(places - reach, 0), np.minimum(places + reach + 1, marks.size)

@@ -97,10 +97,11 @@ def converted_signal(
     edge = min(disturbed_samples(sample_rate_hz, low_hz), samples.size // 2)
     padded = fft.next_fast_len(samples.size + edge, real=True)
     frequency_hz = fft.rfftfreq(padded, 1 / sample_rate_hz)
-    factor = np.zeros(frequency_hz.size, dtype=np.complex128)
-    factor[1:] = derivative_factor(frequency_hz[1:], given, wanted) * _band(frequency_hz[1:], low_hz, high_hz)
     spectrum = fft.rfft(scipy.signal.detrend(samples), padded)
-    result = np.asarray(fft.irfft(spectrum * factor, padded)[: samples.size])
+    spectrum[0] = 0.0
+    spectrum[1:] *= derivative_factor(frequency_hz[1:], given, wanted)
+    spectrum[1:] *= _band(frequency_hz[1:], low_hz, high_hz)
+    result = np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: samples.size])
     return ConvertedSignal(result, sample_rate_hz, wanted, low_hz, high_hz, edge)
 
 
