@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Measurement, SineSweep
 from vibench.acquisition.rig import Rig, load_rig

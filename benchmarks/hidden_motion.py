@@ -16,7 +16,7 @@ from types import ModuleType
 
 import numpy as np
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_recording
 from vibench.analysis.hidden_motion import HiddenMotion, Numbers, hidden_motion
 from vibench.sim import Specimen

@@ -18,7 +18,7 @@ import numpy as np
 from report_coverage import drawn
 from twin_agreement import random_rig
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import LimitExceeded, open_bench, run_measurement
 from vibench.acquisition.plan import Measurement
 from vibench.analysis import Simulation, analyse_files, budgets_of

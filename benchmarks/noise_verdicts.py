@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.analysis import motion_verdict
 from vibench.analysis.chaos.period import Points
 from vibench.analysis.chaos.verdict import MotionKind

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError
 from vibench.analysis.fit.statistical_numbers import statistical_numbers

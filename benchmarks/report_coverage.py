@@ -26,7 +26,7 @@ import numpy as np
 from scipy.stats import binom
 from twin_agreement import random_rig
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import LimitExceeded, open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.acquisition.rig import Rig, specimen_of

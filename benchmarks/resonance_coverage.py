@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.analysis.frequency_response.resonance import resonances
 from vibench.analysis.frequency_response.transmissibility import transmissibility
 from vibench.sim import gong2025

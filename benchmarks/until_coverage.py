@@ -29,7 +29,7 @@ from resonance_coverage import peak as largest, transmission
 from scipy.signal import lfilter
 from twin_agreement import random_rig
 
-import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import (
     FEWEST_REALISATIONS,

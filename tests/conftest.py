@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import hypothesis
 import pytest
 
-import vibench.cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
+import vibench.cli.environment  # noqa: F401 - it is the import that counts, before any test imports numpy
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_SCALE_FACTOR", "1")
@@ -122,7 +122,7 @@ LONG = (
     "tests/sim/study/test_kill.py",
     "tests/cli/test_analyse.py",
     "tests/cli/test_analyse_hidden.py",
-    "tests/cli/test_blas_threads.py",
+    "tests/cli/test_environment.py",
     "tests/analysis/figures/test_figures.py",
     "tests/sim/rigid/test_rigid_stops.py",
     "tests/gui/pages/simulate/test_simulate_page.py",

@@ -76,7 +76,7 @@ def _files(folder: Path) -> set[str]:
 
 def serve() -> None:
     """Fork for each line of standard input, and say on standard output how the command ended."""
-    import vibench.cli.blas_threads  # noqa: I001 - numpy reads its setting, so it comes first
+    import vibench.cli.environment  # noqa: I001 - numpy reads its setting, so it comes first
     import vibench.analysis
     import vibench.cli.__main__
     import vibench.cli.analyse

@@ -270,7 +270,7 @@ LATEST_S = 4.0
 
 def serve() -> None:
     """Fork for each line of standard input, and say on standard output how the run ended."""
-    import vibench.cli.blas_threads  # noqa: I001 - numpy reads its setting, so it comes first
+    import vibench.cli.environment  # noqa: I001 - numpy reads its setting, so it comes first
     import vibench.cli.__main__
     import vibench.cli.measure  # noqa: F401
 

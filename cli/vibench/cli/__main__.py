@@ -35,7 +35,7 @@ from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
 from vibench.stop_files import SWITCH_OFF
 
-from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
+from . import environment  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
 from .options import SectionedCommand, SectionedGroup, with_options
 from .output import errors
