@@ -361,8 +361,7 @@ def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
     exits: dict[str, int | None] = {}
     load = os.getloadavg()[0]
     with ExitStack() as stack:
-        stack.callback(laboratory.virtual.faults.turn_gain_back)
-        stack.callback(laboratory.virtual.faults.heal_daq)
+        stack.callback(laboratory.virtual.faults.heal)
         laboratory.start(cell.subject)
         laboratory.run_into(cell.state, after_s)
         stack.enter_context(contextmanager(CONDITIONS[cell.condition])(laboratory))

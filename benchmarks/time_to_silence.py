@@ -342,8 +342,7 @@ def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> 
     laboratory.ready()
     before = resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE)
     with ExitStack() as stack:
-        stack.callback(laboratory.virtual.faults.turn_gain_back)
-        stack.callback(laboratory.virtual.faults.heal_daq)
+        stack.callback(laboratory.virtual.faults.heal)
         laboratory.run_into(state)
         if condition == "stopped, continued":
             with stalled(laboratory):

@@ -108,12 +108,6 @@ class LoopbackWorld:
         start_s = end_s if end_s > self.time_s - 1e-9 else self.time_s
         stretches.append(Played(start_s, sample_rate_hz, np.array(volts)))
 
-    def unplayed(self, channel: str) -> int:
-        return sum(
-            int(min(stretch.volts.size, max(0, (stretch.end_s - self.time_s) * stretch.rate_hz)))
-            for stretch in self.played.get(channel, [])
-        )
-
     def silence(self, channel: str) -> None:
         kept = []
         for stretch in self.played.get(channel, []):

@@ -121,7 +121,7 @@ class TestOpening:
         virtual.faults.pull_usb_cable()
         with pytest.raises(InstrumentLost, match=r"no instrument answers"):
             open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
-        virtual.faults.plug_usb_cable()
+        virtual.faults.heal()
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
     def test_a_knob_that_is_not_confirmed_leaves_everything_closed_and_silent(self, laboratory, virtual):
@@ -192,7 +192,7 @@ class TestLeaving:
     def test_the_converter_is_released_although_the_generator_is_gone(self, laboratory, virtual):
         with pytest.raises(InstrumentLost), laboratory_bench(laboratory):
             virtual.faults.pull_usb_cable()
-        virtual.faults.plug_usb_cable()
+        virtual.faults.heal()
         with laboratory_bench(laboratory):
             pass
         assert output_of(virtual) == b"0\n"

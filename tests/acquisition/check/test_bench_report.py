@@ -181,7 +181,7 @@ def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):
         virtual.faults.pull_usb_cable()
         with pytest.raises(InstrumentLost):
             bench_report(bench, tmp_path)
-        virtual.faults.plug_usb_cable()
+        virtual.faults.heal()
 
 
 def test_the_report_reads_as_a_table_and_survives_json(checked, rig, tmp_path):

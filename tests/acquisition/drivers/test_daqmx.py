@@ -53,7 +53,7 @@ def running(configured):
 @pytest.fixture
 def virtual(running):
     yield running
-    running.faults.heal_daq()
+    running.faults.heal()
     running.generator.execute(b"OUTP1 OFF")
 
 
@@ -242,7 +242,7 @@ class TestFaults:
         virtual.faults.fail_daq("ReadAnalogF64", code)
         with pytest.raises(kind, match=complaint):
             digitizer.read(100)
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
         with pytest.raises(InstrumentError, match=r"not sampling"):
             digitizer.read(100)
         digitizer.stop()
@@ -254,7 +254,7 @@ class TestFaults:
         virtual.faults.fail_daq(call, -50103)
         with pytest.raises(InstrumentBusy):
             DaqmxDigitizer.open(rig)
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
         DaqmxDigitizer.open(rig).close()
 
     def test_a_server_that_dies_is_lost_and_closing_is_still_possible(self, configured, opened):

@@ -202,7 +202,9 @@ def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_says_so(
     virtual.faults.lose_daq_server()
     with pytest.raises(InstrumentLost, match=r"MAY STILL BE PLAYING.*0\.5 s.*switch the amplifier off"):
         output.stop()
-    virtual.faults.heal_daq()
+    virtual.faults.heal()
+    with pytest.raises(InstrumentLost, match="no longer knows the task"):
+        digitizer.close()
 
 
 def test_the_driver_keeps_the_promises_of_an_analogue_output(output):

@@ -84,7 +84,7 @@ def test_a_converter_that_fails_leaves_silence_and_the_record_so_far(laboratory,
     with bench_on(connected) as bench:
         with pytest.raises(kind) as failure:
             run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=fail)
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
         assert terminal_v(virtual) < 1e-2
     assert re.search(said, str(failure.value), re.IGNORECASE), str(failure.value)
     kept(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
@@ -96,7 +96,7 @@ def test_a_device_in_another_programs_hands_is_named_before_anything_plays(labor
         # The generator is let go of first, so that it is the converter that is found busy.
         with pytest.raises(InstrumentError), bench_on(connected):
             pass
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
     virtual.faults.fail_daq("CfgSampClkTiming", -50103)
     with pytest.raises(InstrumentBusy, match="another program"):
         bench_on(connected)
@@ -111,7 +111,7 @@ def test_a_pulled_usb_cable_tells_the_operator_to_switch_the_amplifier_off(labor
     # Nobody can silence what cannot be reached: it is said, and the next program can.
     assert "MAY STILL BE ON" in "".join([str(failure.value), *getattr(failure.value, "__notes__", [])])
     kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
-    virtual.faults.plug_usb_cable()
+    virtual.faults.heal()
     with bench_on(connected):
         assert terminal_v(virtual) < 1e-2
 
@@ -127,7 +127,7 @@ def test_a_server_that_dies_is_lost_and_the_generator_silent(laboratory, tmp_pat
 
 def test_a_reply_that_comes_too_late_silences(laboratory, tmp_path):
     virtual, connected = laboratory()
-    delay = when_recording(lambda: virtual.faults.delay_next_reply(60.0))
+    delay = when_recording(lambda: virtual.faults.delay_reply(60.0))
     with bench_on(connected) as bench:
         with pytest.raises(InstrumentError, match="did not answer"):
             run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=delay)
@@ -187,4 +187,4 @@ def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_
         report = bench_report(bench, tmp_path)
         assert report.verdict is Verdict.FAIL
         assert report["drive left after stop"].verdict is Verdict.FAIL
-        virtual.faults.free_output()
+        virtual.faults.heal()

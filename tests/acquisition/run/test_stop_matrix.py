@@ -201,7 +201,7 @@ def check_silence(virtual, fault, error):
         said = "".join([str(error), *getattr(error, "__notes__", [])])
         assert "MAY STILL BE ON" in said or terminal_v(virtual) < SILENT_V
     if not fault.is_reachable:
-        virtual.faults.plug_usb_cable()
+        virtual.faults.heal()
 
 
 def check_time(stop, fault, error, state, took_s):

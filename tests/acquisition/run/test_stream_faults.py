@@ -122,7 +122,7 @@ def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
     with bench_on(connected) as bench:
         with pytest.raises(DataLost, match=r"ran out of samples.*To do: write further ahead") as failure:
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
         assert at_the_amplifier_v(virtual) < SILENT_V
     one_sentence(failure)
     kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
@@ -161,7 +161,7 @@ def test_inputs_that_fail_let_the_output_fade(laboratory, tmp_path, code, kind):
     with bench_on(connected) as bench:
         with pytest.raises(kind) as failure:
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
-        virtual.faults.heal_daq()
+        virtual.faults.heal()
         assert at_the_amplifier_v(virtual) < SILENT_V
     one_sentence(failure)
     kept(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)

@@ -13,6 +13,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
 from vibench.acquisition import ConfigurationError
+from vibench.virtual_rig.daqmx.errors import ServerGone
 from vibench.virtual_rig.daqmx.server import DaqServer
 
 PATIENCE_S = 20.0
@@ -41,15 +42,24 @@ def test_a_program_in_another_process_reads_the_same_world(daq):
     assert [float(each) for each in done.stdout.split()] == pytest.approx([2, 3, 4], rel=1e-3)
 
 
-def test_tasks_of_a_vanished_client_are_there_until_the_reset(daq):
+def restart(daq):
+    """Let the server be gone for a moment; its tasks end with the next call."""
+    gone = ServerGone()
+    daq.server.faults.add(gone)
+    daq.server.faults.remove(gone)
+
+
+def test_tasks_of_a_vanished_client_are_there_until_the_restart(daq):
     leaked = Task("leaked", grpc_options=daq.options)
     leaked.ai_channels.add_ai_voltage_chan("Dev1/ai0")
     leaked.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
     leaked.start()
     leaked._close_on_exit, leaked._handle = False, None  # the program is gone; its task is not
-    assert daq.server.task_names == ("leaked",)
-    daq.server.reset()
-    assert daq.server.task_names == ()
+    with Task("rival", grpc_options=daq.options) as rival:
+        rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+        with pytest.raises(DaqError, match="held by task leaked"):
+            rival.start()
+    restart(daq)
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
     task.start()
@@ -72,7 +82,7 @@ def test_a_message_of_many_megabytes_passes(daq):
     assert np.shape(task.read(400_000)) == (2, 400_000)
 
 
-def test_the_end_of_the_server_frees_a_reader_that_waits_for_ever(connect):
+def test_a_restart_of_the_server_frees_a_reader_that_waits_for_ever(connect):
     daq = connect()
     task = Task(grpc_options=daq.options)
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
@@ -89,10 +99,11 @@ def test_the_end_of_the_server_frees_a_reader_that_waits_for_ever(connect):
 
     reader = threading.Thread(target=read_for_ever)
     reader.start()
-    daq.server.reset()
+    restart(daq)
+    daq.task()
     reader.join(PATIENCE_S)
     assert not reader.is_alive()
-    # Whether the reset came during the read or just before it is a race that both outcomes may win.
+    # Whether the restart came during the read or just before it is a race that both outcomes may win.
     assert ends[0] in (DAQmxErrors.RUNTIME_ABORTED_ROUTING, DAQmxErrors.INVALID_TASK)
     task._close_on_exit, task._handle = False, None
 

@@ -153,7 +153,7 @@ def test_a_stuck_output_reports_off_and_stays_on(switch_on):
     assert program.generator.query("OUTP1:STAT?").strip() in ("0", "OFF")
     task = program.task()
     assert amplitude(program.read(task, 6400)[DRIVE]) == pytest.approx(0.05, rel=0.02)
-    program.rig.faults.free_output()
+    program.rig.faults.heal()
     program.read(task, 128)
     assert amplitude(program.read(task, 1280)[DRIVE]) < 1e-3
 

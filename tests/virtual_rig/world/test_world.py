@@ -194,16 +194,6 @@ def test_an_analogue_output_drives_the_amplifier_beside_the_generator():
         assert abs(phasor(volts, frequency_hz, 51_200.0)) * attenuation == pytest.approx(expected_v, rel=2e-2)
 
 
-def test_an_analogue_output_counts_down_and_can_be_silenced():
-    world = World(QUIET, Silence())
-    world.play("Dev1/ao0", np.ones(1000), 10_240.0)
-    assert world.unplayed("Dev1/ao0") == 1000
-    world.advance(0.05)
-    assert world.unplayed("Dev1/ao0") == pytest.approx(488, abs=1)
-    world.silence("Dev1/ao0")
-    assert world.unplayed("Dev1/ao0") == 0
-
-
 def test_an_output_that_is_not_wired_moves_nothing():
     world = World(QUIET, Silence())
     world.play("Dev2/ao0", np.ones(1000), 10_240.0)

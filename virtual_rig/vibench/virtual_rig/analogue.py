@@ -57,8 +57,5 @@ class AnalogueWorld(Protocol):
     def play(self, physical_channel: str, volts: NDArray[np.float64], sample_rate_hz: float) -> None:
         """Append samples to the queue of an analogue output; an idle output starts now."""
 
-    def unplayed(self, physical_channel: str) -> int:
-        """Return the number of queued samples that have not been played."""
-
     def silence(self, physical_channel: str) -> None:
         """Clear the queue and hold the output at zero."""

@@ -139,18 +139,6 @@ class DaqServer:
     ) -> None:
         self.close()
 
-    @property
-    def task_names(self) -> tuple[str, ...]:
-        """Names of all tasks, including those of disconnected clients."""
-        with self._rig.changed:
-            return tuple(self._system.tasks)
-
-    def reset(self) -> None:
-        """Delete every task and every fault, as after a restart of the computer."""
-        with self._rig.changed:
-            self._system.reset()
-            self.faults.clear()
-
     def let_pass(self, duration_s: float) -> None:
         """Advance rig time without a request."""
         with self._rig.changed:
@@ -198,7 +186,7 @@ class DaqServer:
         Successful calls take no time, because readers would otherwise fall behind.
         """
         try:
-            self.faults.check(name, self._rig.now_s)
+            self.faults.check(name)
         except DaqmxRefusal:  # a missing server does not advance time
             if name in self._refused:
                 self._pace.delay_retry(self._rig)
@@ -209,7 +197,7 @@ class DaqServer:
     def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
             with _report_refusals(context), self._rig.changed:
-                self.faults.check(name, self._rig.now_s)
+                self.faults.check(name)
                 listener = call(request, context)
             context.send_initial_metadata(())  # the client waits for the metadata
             yield from listener

@@ -1,4 +1,4 @@
-"""A script of faults by rig time, to rehearse a long campaign in minutes.
+"""Faults of the virtual rig, on demand or by a script of rig times, to rehearse a long campaign in minutes.
 
 ::
 
@@ -35,8 +35,15 @@ _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 
 
+def nothing_to_heal() -> None:
+    """Do nothing, because the fault ends by itself."""
+
+
 class RigFaults:
-    """Faults of a running virtual rig; each acts at once, and calls are thread-safe."""
+    """Faults of a running virtual rig: each method starts one at once and returns what ends it. Thread-safe.
+
+    The methods have the names and parameters of scripted faults.
+    """
 
     def __init__(
         self, world: World, generator: AFG1022, cable: UsbTmcInstrument, daq: DaqServer, disk: DiskTrouble
@@ -45,102 +52,107 @@ class RigFaults:
         self._generator = generator
         self._cable = cable
         self._daq = daq
-        self.disk = disk
-        """Disk of the recordings of this process."""
+        self._disk = disk
+        self._heals: list[Heal] = []
 
-    def pull_usb_cable(self) -> None:
+    def heal(self) -> None:
+        """End every fault."""
+        while self._heals:
+            self._heals.pop()()
+
+    def _until(self, heal: Heal) -> Heal:
+        self._heals.append(heal)
+        return heal
+
+    def pull_usb_cable(self) -> Heal:
         """Disconnect the generator: every transfer fails, and its output continues."""
         self._cable.pull_cable()
+        return self._until(self._cable.plug_cable)
 
-    def plug_usb_cable(self) -> None:
-        """Reconnect the generator."""
-        self._cable.plug_cable()
-
-    def hang_generator(self) -> None:
+    def hang_generator(self) -> Heal:
         """Make the generator unresponsive; its output continues."""
         self._cable.hang()
+        return self._until(self._cable.wake)
 
-    def wake_generator(self) -> None:
-        """Make the generator responsive again."""
-        self._cable.wake()
-
-    def jump_clock(self, by_s: float) -> None:
+    def jump_clock(self, by_s: float) -> Heal:
         """Shift the generator's clock [s], and thus the phase of its output."""
         self._generator.jump_clock(by_s)
+        return nothing_to_heal
 
-    def delay_next_reply(self, delay_s: float) -> None:
+    def delay_reply(self, delay_s: float) -> Heal:
         """Delay the generator's next reply."""
         self._generator.delay_next_reply(delay_s)
+        return nothing_to_heal
 
-    def corrupt_next_reply(self) -> None:
+    def corrupt_reply(self) -> Heal:
         """Corrupt the generator's next reply."""
         self._generator.corrupt_next_reply()
+        return nothing_to_heal
 
-    def stick_output(self) -> None:
+    def stick_output(self) -> Heal:
         """Weld the generator's output relay: it reports off and stays on."""
         self._generator.weld_output_relay()
+        return self._until(self._generator.repair_output_relay)
 
-    def free_output(self) -> None:
-        """Repair the generator's output relay."""
-        self._generator.repair_output_relay()
-
-    def turn_amplifier_gain(self, gain_db: float) -> None:
+    def turn_amplifier_gain(self, gain_db: float) -> Heal:
         """Set the amplifier's gain to a value other than the configured one."""
         self._world.set_amplifier_gain_db(gain_db)
+        return self._until(self._world.restore_amplifier_gain)
 
-    def turn_gain_back(self) -> None:
-        """Restore the configured gain of the amplifier."""
-        self._world.restore_amplifier_gain()
-
-    def widen_gaps(self, by_m: float) -> None:
+    def widen_gaps(self, by_m: float) -> Heal:
         """Move the specimen's stops away from m1, or closer [m], as by a loose screw or wear."""
         self._world.widen_gaps(by_m)
+        return self._until(lambda: self._world.widen_gaps(0.0))
 
-    def drop_laser(self, duration_s: float) -> None:
+    def drop_laser(self, for_s: float) -> Heal:
         """Let the sensor of m0 show nothing for a while, like a vibrometer without light."""
-        self._world.disturb_response(duration_s, DROPOUT_LEVEL)
+        self._world.disturb_response(for_s, DROPOUT_LEVEL)
+        return nothing_to_heal
 
-    def over_range(self, duration_s: float) -> None:
+    def over_range(self, for_s: float) -> Heal:
         """Hold the sensor of m0 at full scale for a while."""
-        self._world.disturb_response(duration_s, OVER_RANGE_LEVEL)
+        self._world.disturb_response(for_s, OVER_RANGE_LEVEL)
+        return nothing_to_heal
 
-    def disconnect(self, physical_channel: str) -> None:
+    def disconnect(self, channel: str) -> Heal:
         """Disconnect an input of the converter, such as ``"cDAQ1Mod1/ai2"``."""
-        self._world.disconnect(physical_channel)
+        self._world.disconnect(channel)
+        return self._until(lambda: self._world.connect(channel))
 
-    def connect(self, physical_channel: str) -> None:
-        """Reconnect an input of the converter."""
-        self._world.connect(physical_channel)
+    def reverse(self, channel: str) -> Heal:
+        """Swap the two wires of an input of the converter."""
+        self._world.reverse(channel)
+        return self._until(lambda: self._world.connect(channel))
 
-    def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input of the converter; `connect` restores them."""
-        self._world.reverse(physical_channel)
-
-    def overrun(self, from_s: float = 0.0) -> Heal:
-        """Overwrite the converter's buffer before it is read, from a rig time on [s]."""
+    def overrun(self) -> Heal:
+        """Overwrite the converter's buffer before it is read."""
         code = DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE.value
-        return self._in_force(*(Fault(call, code, from_s=from_s) for call in _READS))
+        return self._in_force(*(Fault(call, code) for call in _READS))
 
     def reserve_device(self) -> Heal:
-        """Reserve the converter for another program: creating or starting a task fails."""
+        """Reserve the converter for another program: running tasks continue, new ones are refused."""
         code = DAQmxErrors.PAL_RESOURCE_RESERVED.value
         return self._in_force(*(Fault(call, code) for call in _RESERVING))
 
-    def fail_daq(self, call: str, code: int, from_s: float = 0.0) -> Heal:
-        """Make a DAQmx call fail with a code (``nidaqmx.error_codes``), from a rig time on.
+    def fail_daq(self, call: str, code: int) -> Heal:
+        """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
         A fault of one call that reads samples also applies to the other, because drivers may use either.
         """
         calls = _READS if call in _READS else (call,)
-        return self._in_force(*(Fault(each, code, from_s=from_s) for each in calls))
+        return self._in_force(*(Fault(each, code) for each in calls))
 
-    def lose_daq_server(self, from_s: float = 0.0) -> Heal:
-        """Stop the DAQ server from answering, from a rig time on [s]."""
-        return self._in_force(ServerGone(from_s=from_s))
+    def lose_daq_server(self) -> Heal:
+        """Stop the DAQ server from answering."""
+        return self._in_force(ServerGone())
 
-    def heal_daq(self) -> None:
-        """End every fault of the DAQ server."""
-        self._daq.faults.clear()
+    def fill_disk(self, refusals: int | None = None) -> Heal:
+        """Let writes of recordings of this process fail as on a full disk: this many, or until healed."""
+        return self._until(self._disk.fill() if refusals is None else self._disk.fill(refusals))
+
+    def slow_disk(self, delay_s: float) -> Heal:
+        """Delay every write of recordings of this process, in wall-clock time [s]."""
+        return self._until(self._disk.slow_down(delay_s))
 
     def _in_force(self, *rules: Fault | ServerGone) -> Heal:
         for rule in rules:
@@ -150,53 +162,37 @@ class RigFaults:
             for rule in rules:
                 self._daq.faults.remove(rule)
 
-        return heal
-
-
-def nothing_to_heal() -> None:
-    """Do nothing, because the fault ends by itself."""
+        return self._until(heal)
 
 
 class ScriptedFault(FrozenModel):
-    """Start and duration of a fault."""
+    """Start and duration of a fault; a subclass has the parameters of the method that its ``fault`` names."""
 
     at_s: NonNegativeFloat
     """Rig time since switch-on [s]."""
     for_s: PositiveFloat | None = None
     """Duration in rig time [s]; absent: permanent, or ending by itself."""
-
-
-class PullUsbCable(ScriptedFault):
-    """The generator's cable is disconnected: it cannot be reached, and its output continues."""
-
-    fault: Literal["pull_usb_cable"]
+    fault: str
 
     def begin(self, rig: RigFaults) -> Heal:
-        """Disconnect the cable."""
-        rig.pull_usb_cable()
-        return rig.plug_usb_cable
+        """Start the fault; return what ends it."""
+        parameters = {name: getattr(self, name) for name in type(self).__annotations__ if name != "fault"}
+        heal: Heal = getattr(rig, self.fault)(**parameters)
+        return heal
 
 
-class HangGenerator(ScriptedFault):
-    """The generator does not respond, and its output continues."""
+class SimpleFault(ScriptedFault):
+    """A fault without parameters."""
 
-    fault: Literal["hang_generator"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Make it unresponsive."""
-        rig.hang_generator()
-        return rig.wake_generator
-
-
-class StickOutput(ScriptedFault):
-    """The generator's output relay sticks: it reports off and stays on."""
-
-    fault: Literal["stick_output"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Block the relay."""
-        rig.stick_output()
-        return rig.free_output
+    fault: Literal[
+        "pull_usb_cable",
+        "hang_generator",
+        "stick_output",
+        "corrupt_reply",
+        "overrun",
+        "reserve_device",
+        "lose_daq_server",
+    ]
 
 
 class DelayReply(ScriptedFault):
@@ -204,22 +200,6 @@ class DelayReply(ScriptedFault):
 
     fault: Literal["delay_reply"]
     delay_s: PositiveFloat
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Delay the next reply."""
-        rig.delay_next_reply(self.delay_s)
-        return nothing_to_heal
-
-
-class CorruptReply(ScriptedFault):
-    """One reply of the generator is unreadable."""
-
-    fault: Literal["corrupt_reply"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Corrupt the next reply."""
-        rig.corrupt_next_reply()
-        return nothing_to_heal
 
 
 class JumpClock(ScriptedFault):
@@ -229,34 +209,12 @@ class JumpClock(ScriptedFault):
     by_s: float
     """Positive: forwards [s]."""
 
-    def begin(self, rig: RigFaults) -> Heal:
-        """Shift the clock."""
-        rig.jump_clock(self.by_s)
-        return nothing_to_heal
 
+class Disturbed(ScriptedFault):
+    """The sensor of m0 shows nothing, like a vibrometer without light, or stays at full scale."""
 
-class DropLaser(ScriptedFault):
-    """The sensor of m0 shows nothing, like a vibrometer without light."""
-
-    fault: Literal["drop_laser"]
+    fault: Literal["drop_laser", "over_range"]
     for_s: PositiveFloat
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Block the laser."""
-        rig.drop_laser(self.for_s)
-        return nothing_to_heal
-
-
-class OverRange(ScriptedFault):
-    """The sensor of m0 stays at full scale."""
-
-    fault: Literal["over_range"]
-    for_s: PositiveFloat
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Hold it at full scale."""
-        rig.over_range(self.for_s)
-        return nothing_to_heal
 
 
 class TurnGain(ScriptedFault):
@@ -264,11 +222,6 @@ class TurnGain(ScriptedFault):
 
     fault: Literal["turn_amplifier_gain"]
     gain_db: float = Field(ge=-60, le=60)
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Change the gain; healing restores the configured one."""
-        rig.turn_amplifier_gain(self.gain_db)
-        return rig.turn_gain_back
 
 
 class WidenGaps(ScriptedFault):
@@ -278,11 +231,6 @@ class WidenGaps(ScriptedFault):
     by_m: float = Field(ge=-1e-4, le=1e-3)
     """Change of the configured gaps [m]."""
 
-    def begin(self, rig: RigFaults) -> Heal:
-        """Move the stops; healing restores them."""
-        rig.widen_gaps(self.by_m)
-        return lambda: rig.widen_gaps(0.0)
-
 
 class Disconnect(ScriptedFault):
     """An input of the converter is disconnected."""
@@ -290,31 +238,6 @@ class Disconnect(ScriptedFault):
     fault: Literal["disconnect"]
     channel: str
     """``"cDAQ1Mod1/ai2"``."""
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Disconnect it; healing reconnects it."""
-        rig.disconnect(self.channel)
-        return lambda: rig.connect(self.channel)
-
-
-class Overrun(ScriptedFault):
-    """The converter's buffer is overwritten before it is read."""
-
-    fault: Literal["overrun"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Lose samples at every read."""
-        return rig.overrun()
-
-
-class ReserveDevice(ScriptedFault):
-    """Another program reserves the converter: running tasks continue, new ones are refused."""
-
-    fault: Literal["reserve_device"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Reserve it."""
-        return rig.reserve_device()
 
 
 class FailDaq(ScriptedFault):
@@ -324,20 +247,6 @@ class FailDaq(ScriptedFault):
     call: str
     code: int
 
-    def begin(self, rig: RigFaults) -> Heal:
-        """Make the call fail."""
-        return rig.fail_daq(self.call, self.code)
-
-
-class LoseDaqServer(ScriptedFault):
-    """The gRPC server of the converter does not answer."""
-
-    fault: Literal["lose_daq_server"]
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Stop answering."""
-        return rig.lose_daq_server()
-
 
 class FillDisk(ScriptedFault):
     """The disk of the recording program is full."""
@@ -345,10 +254,6 @@ class FillDisk(ScriptedFault):
     fault: Literal["fill_disk"]
     refusals: PositiveInt | None = None
     """Number of failing writes; absent: until healed."""
-
-    def begin(self, rig: RigFaults) -> Heal:
-        """Fill the disk."""
-        return rig.disk.fill() if self.refusals is None else rig.disk.fill(self.refusals)
 
 
 class SlowDisk(ScriptedFault):
@@ -358,30 +263,19 @@ class SlowDisk(ScriptedFault):
     delay_s: PositiveFloat
     """Delay in wall-clock time, as for any disk [s]."""
 
-    def begin(self, rig: RigFaults) -> Heal:
-        """Slow down the disk."""
-        return rig.disk.slow_down(self.delay_s)
-
 
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
 """Faults of the recording program, not of the rig."""
 
 FaultKind = Annotated[
-    PullUsbCable
-    | HangGenerator
-    | StickOutput
+    SimpleFault
     | DelayReply
-    | CorruptReply
     | JumpClock
-    | DropLaser
-    | OverRange
+    | Disturbed
     | TurnGain
     | WidenGaps
     | Disconnect
-    | Overrun
-    | ReserveDevice
     | FailDaq
-    | LoseDaqServer
     | FillDisk
     | SlowDisk,
     Field(discriminator="fault"),

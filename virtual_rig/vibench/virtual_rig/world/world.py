@@ -262,11 +262,6 @@ class World:
         with self._turn:
             self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
 
-    def unplayed(self, physical_channel: str) -> int:
-        """Return the number of queued samples that have not been played."""
-        with self._turn:
-            return self._output(physical_channel).unplayed(self._step)
-
     def silence(self, physical_channel: str) -> None:
         """Clear the queue and hold the output at zero."""
         with self._turn:
