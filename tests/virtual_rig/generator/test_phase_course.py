@@ -33,7 +33,7 @@ def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
 
 @pytest.mark.parametrize("spacing", Spacing)
 def test_a_sweep_has_its_start_and_stop_frequency_at_its_ends(spacing):
-    sweep = SweptPhase(100.0, 900.0, 2.0, spacing, begin_s=0.0, offset=0.0)
+    sweep = SweptPhase(100.0, 900.0, 2.0, 1.0, spacing, begin_s=0.0, anchor_s=0.0, offset=0.0)
     edges = np.array([0.0, 1e-6, 1.0, 1.0 + 1e-6, 2.0 - 1e-6, 2.0])
     _, span = sweep.stretches(edges)
     rates = span[::2] / np.diff(edges)[::2]
@@ -41,7 +41,7 @@ def test_a_sweep_has_its_start_and_stop_frequency_at_its_ends(spacing):
     assert rates == pytest.approx([100.0, middle, 900.0], rel=1e-5)
 
 
-def test_a_repeating_sweep_never_jumps_in_phase():
-    sweep = SweptPhase(100.0, 900.0, 0.25, Spacing.LINEAR, begin_s=0.1, offset=0.2)
-    for turn_s in (0.35, 0.6, 0.85):
+def test_a_sweep_never_jumps_in_phase():
+    sweep = SweptPhase(100.0, 900.0, 0.25, 0.5, Spacing.LINEAR, begin_s=0.1, anchor_s=0.0, offset=0.2)
+    for turn_s in (0.1, 0.35, 0.85):
         assert turn(sweep.phase(turn_s - 1e-9), sweep.phase(turn_s + 1e-9)) < 5e-6

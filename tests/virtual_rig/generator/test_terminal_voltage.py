@@ -5,20 +5,18 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.terminal_voltage import Terminal
 
 INTERVAL_S = 1 / 51_200
-PANEL = Panel()
 OPEN = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0.0)
 
 
 class Rig:
     """A generator whose clock is what has been rendered so far, as in the virtual rig."""
 
-    def __init__(self, terminal=OPEN, panel=PANEL):
+    def __init__(self, terminal=OPEN):
         self.time_s = 0.0
-        self.generator = AFG1022(lambda: self.time_s, terminal=terminal, panel=panel)
+        self.generator = AFG1022(lambda: self.time_s, terminal=terminal)
         self.send("OUTP1:IMP INF")
 
     def send(self, message):
@@ -139,7 +137,6 @@ MODES = {
     "sine": "FREQ 123.4",
     "square": "FUNC SQU;:FREQ 123.4",
     "arbitrary": "FUNC EMEM;:FREQ 2",
-    "sweep": "FREQ:STAR 50;STOP 900;MODE SWE",
     "burst": "FREQ 100;:BURS:NCYC 3;:BURS ON;*TRG",
 }
 
@@ -201,16 +198,6 @@ def test_a_gated_burst_never_opens_because_the_gate_input_is_empty():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:BURS:MODE GAT;:BURS ON;:OUTP ON;*TRG")
     assert rig.render(2000) == pytest.approx(np.zeros(2000), abs=1e-12)
-
-
-def test_a_sweep_runs_from_start_to_stop_in_the_time_set_at_the_panel():
-    rig = Rig(panel=Panel(sweep_s=0.5))
-    rig.send("VOLT 2;:FREQ:STAR 100;STOP 500;:PHAS:INIT;:FREQ:MODE SWE;:OUTP ON")
-    volts = rig.render(25_600)
-    time_s = (np.arange(25_600) + 0.5) * INTERVAL_S
-    phase = 2 * np.pi * (100 * time_s + 0.5 * (400 / 0.5) * time_s**2)
-    # The mean differs from the middle value by the sine's sag over one interval, (pi f dt)^2 / 6.
-    assert volts == pytest.approx(np.sin(phase), abs=2e-4)
 
 
 def test_noise_is_accepted_but_the_shape_before_goes_on_playing():

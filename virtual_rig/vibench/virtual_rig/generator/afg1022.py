@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ class AFG1022(ScpiInstrument):
         self.memory = self._new_memory()
         power_on = self._power_on(panel.declared_load_ohm)
         self._channels: dict[int, ChannelSettings] = dict.fromkeys(range(1, CHANNELS + 1), power_on)
-        self._output = ChannelOutput(terminal, panel, self.memory, power_on)
+        self._output = ChannelOutput(terminal, self.memory, power_on)
         self.frequencies_are_locked = False
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
@@ -220,15 +221,19 @@ def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Channel
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
 
 
+def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
+    """Return settings without a mode that is not simulated: it can be switched off, but not on (-241)."""
+    if wanted:
+        raise ScpiError(ErrorCode.HARDWARE_MISSING)
+    return with_mode(mode, settings, wanted)
+
+
 def modulation_switch(mode: RunMode) -> Command:
-    """Return the command of a modulation: it can be switched off, but not on (-241)."""
-
-    def put(settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-        if wanted:
-            raise ScpiError(ErrorCode.HARDWARE_MISSING)
-        return with_mode(mode, settings, wanted)
-
-    return switch(f"[SOURce#:]{mode.value}:STATe", "IVI; on: not simulated", lambda s: s.mode is mode, put)
+    """Return the command of a modulation."""
+    return switch(
+        f"[SOURce#:]{mode.value}:STATe", "IVI; on: not simulated",
+        lambda s: s.mode is mode, partial(without_mode, mode),
+    )  # fmt: skip
 
 
 class _FrequencyMode(Enum):
@@ -374,10 +379,6 @@ SHARED_COMMANDS = (
         default=1.0, decimals=4, scale=_share),
     number("[SOURce#:]VOLTage[:LEVel][:IMMediate]:OFFSet", "IVI", "offset_v", VOLTAGE_UNITS,
         lambda s: (-OPEN_PEAK_V * _share(s), OPEN_PEAK_V * _share(s)), default=0.0, decimals=4, scale=_share),
-    number("[SOURce#:]FREQuency:STARt", "IVI", "sweep_start_hz", FREQUENCY_UNITS,
-        lambda s: s.frequency_range_hz, default=100e3, decimals=6),
-    number("[SOURce#:]FREQuency:STOP", "IVI", "sweep_stop_hz", FREQUENCY_UNITS,
-        lambda s: s.frequency_range_hz, default=1e6, decimals=6),
 )
 COMMANDS = (
     *SHARED_COMMANDS,
@@ -387,9 +388,9 @@ COMMANDS = (
     Command(_DUTY.header, _DUTY.source, _write_duty, _DUTY.ask),
     Command("[SOURce#:]FREQuency:CONCurrent[:STATe]", "drivers",
         _write_lock, lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
-    choice("[SOURce#:]FREQuency:MODE", "IVI", _FrequencyMode,
+    choice("[SOURce#:]FREQuency:MODE", "IVI; sweep: not simulated", _FrequencyMode,
         lambda s: _FrequencyMode.SWEEP if s.mode is RunMode.SWEEP else _FrequencyMode.FIXED,
-        lambda s, word: with_mode(RunMode.SWEEP, s, word is _FrequencyMode.SWEEP)),
+        lambda s, word: without_mode(RunMode.SWEEP, s, word is _FrequencyMode.SWEEP)),
     switch("[SOURce#:]BURSt[:STATe]", "IVI, drivers",
         lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on), channels=1),
     burst_cycles(50_000, channels=1),

@@ -3,11 +3,12 @@
 import math
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase, TriggeredSweepPhase
+from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase
 from .scpi_message import ArbitraryMemory, ErrorCode, ScpiError, mnemonic_matches, short_form
 from .terminal_voltage import (
     OUTPUT_RESISTANCE_OHM,
@@ -97,21 +98,11 @@ class BurstMode(Enum):
     GATED = "GATed"
 
 
-class SweepTrigger(Enum):
-    """Start of a sweep or burst, for generators with a choice."""
+class Trigger(Enum):
+    """Start of a sweep, for generators with a choice."""
 
     IMMEDIATE = "IMMediate"
     BUS = "BUS"
-
-
-@dataclass(frozen=True)
-class OwnSweep:
-    """A sweep with remotely set times, for generators that support it."""
-
-    sweep_s: float = 1.0
-    hold_s: float = 0.0
-    spacing: Spacing = Spacing.LINEAR
-    trigger: SweepTrigger = SweepTrigger.IMMEDIATE
 
 
 @dataclass(frozen=True)
@@ -132,8 +123,10 @@ class ChannelSettings:
     mode: RunMode = RunMode.CONTINUOUS
     sweep_start_hz: float = 100e3
     sweep_stop_hz: float = 1e6
-    sweep: OwnSweep | None = None
-    """None if time and spacing are set at the panel."""
+    sweep_s: float = 1.0
+    sweep_hold_s: float = 0.0
+    sweep_spacing: Spacing = Spacing.LINEAR
+    trigger: Trigger = Trigger.IMMEDIATE
     burst_cycles: float = 5
     """``math.inf`` for an endless burst."""
     burst_mode: BurstMode = BurstMode.TRIGGERED
@@ -152,13 +145,11 @@ class ChannelSettings:
     def checked(self) -> "ChannelSettings":
         """Return the settings if they are consistent.
 
-        Raises ScpiError -221 for a peak beyond the output stage, a sweep of pulse or noise, and a burst or
-        modulation of noise.
+        Raises ScpiError -221 for a peak beyond the output stage, and for noise in another mode.
         """
-        is_swept_pulse = self.mode is RunMode.SWEEP and self.shape == PULSE
         is_moded_noise = self.mode is not RunMode.CONTINUOUS and self.shape == NOISE
         peak_v = abs(self.offset_v) + self.amplitude_vpp / 2
-        if peak_v > OPEN_PEAK_V + _PEAK_ROUNDING_V or is_swept_pulse or is_moded_noise:
+        if peak_v > OPEN_PEAK_V + _PEAK_ROUNDING_V or is_moded_noise:
             raise ScpiError(ErrorCode.SETTINGS_CONFLICT)
         return self
 
@@ -178,8 +169,6 @@ class Panel:
 
     declared_load_ohm: float = 50.0
     """Declared load at power-on; ``math.inf`` for high impedance."""
-    sweep_s: float = 1.0
-    sweep_spacing: Spacing = Spacing.LINEAR
 
 
 def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShape | None:
@@ -201,11 +190,8 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 class ChannelOutput:
     """Plays the settings, each from the rig time of its change."""
 
-    def __init__(
-        self, terminal: Terminal, panel: Panel, memory: ArbitraryMemory, power_on: ChannelSettings
-    ) -> None:
+    def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False
-        self._panel = panel
         self._memory = memory
         carrier = SteadyPhase(round(power_on.frequency_hz * UHZ_PER_HZ), 0.0)
         self._timeline = Timeline(terminal, Signal(course=carrier, amplitude_vpp=power_on.amplitude_vpp))
@@ -284,19 +270,14 @@ class ChannelOutput:
         return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
 
     def _swept(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
-        ends = settings.sweep_start_hz, settings.sweep_stop_hz
-        sweep = settings.sweep or OwnSweep(self._panel.sweep_s, spacing=self._panel.sweep_spacing)
-        if sweep.trigger is SweepTrigger.IMMEDIATE:
-            return SweptPhase(*ends, sweep.sweep_s, sweep.spacing, own_s, phase)
-        return TriggeredSweepPhase(*ends, sweep.sweep_s, sweep.hold_s, sweep.spacing, begin_s, own_s, phase)
+        return SweptPhase(
+            settings.sweep_start_hz, settings.sweep_stop_hz, settings.sweep_s, settings.sweep_hold_s,
+            settings.sweep_spacing, begin_s, own_s, phase,
+        )  # fmt: skip
 
 
-def _course_key(settings: ChannelSettings) -> tuple[object, ...]:
-    return (
-        settings.mode,
-        settings.frequency_hz,
-        settings.phase_deg,
-        settings.sweep_start_hz,
-        settings.sweep_stop_hz,
-        settings.sweep,
-    )
+_course_key = attrgetter(
+    "mode", "frequency_hz", "phase_deg",
+    "sweep_start_hz", "sweep_stop_hz", "sweep_s", "sweep_hold_s", "sweep_spacing",
+)  # fmt: skip
+"""Settings that determine the phase course."""

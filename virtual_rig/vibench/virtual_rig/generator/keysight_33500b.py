@@ -4,18 +4,29 @@ Source: Keysight Trueform Series Operating and Service Guide, as used by public 
 ``agilent33500``, MATLAB and Python programs of laboratories); not compared with an instrument.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .afg1022 import AFG1022, SHARED_COMMANDS, burst_cycles, load_command, modulation_switch, with_mode
-from .channel_output import SINE, BurstMode, ChannelSettings, OwnSweep, RunMode, SweepTrigger
+from .afg1022 import (
+    AFG1022,
+    SHARED_COMMANDS,
+    burst_cycles,
+    load_command,
+    modulation_switch,
+    with_mode,
+    without_mode,
+)
+from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
 from .phase_course import Spacing
-from .scpi_instrument import Command, Parameters, Quirks, choice, none, only, switch
+from .scpi_instrument import Command, Parameters, Quirks, choice, none, number, only, switch
 from .scpi_message import (
     EDIT_MEMORY,
+    FREQUENCY_UNITS,
     NO_UNITS,
     ArbitraryMemory,
     Codes,
@@ -24,7 +35,7 @@ from .scpi_message import (
     as_number,
     block,
     integer,
-    number,
+    number as value_of,
     text,
 )
 
@@ -50,11 +61,6 @@ class _Shape(Enum):
     ARBITRARY = "ARB"
 
 
-class _Spacing(Enum):
-    LINEAR = "LINear"
-    LOGARITHMIC = "LOGarithmic"
-
-
 class _Unit(Enum):
     VPP = "VPP"
 
@@ -70,6 +76,14 @@ class _Filter(Enum):
     NORMAL = "NORMal"
 
 
+@dataclass(frozen=True)
+class _Settings(ChannelSettings):
+    frequency_hz: float = 1e3
+    amplitude_vpp: float = 0.2
+    order: _Order = _Order.NORMAL
+    filter: _Filter = _Filter.NORMAL
+
+
 class Keysight33500B(AFG1022):
     """The generator; see `AFG1022`. Its waveforms have names, its sweeps a time, a hold and a trigger."""
 
@@ -77,8 +91,6 @@ class Keysight33500B(AFG1022):
 
     def __init__(self, *arguments: object, **options: object) -> None:
         super().__init__(*arguments, **{"serial": DEFAULT_SERIAL, **options, "quirks": _QUIRKS})  # type: ignore[arg-type]
-        self.order = _Order.NORMAL
-        self.filter = _Filter.NORMAL
         self.waveforms: dict[str, Codes] = {}
         self.selected = ""
 
@@ -86,26 +98,19 @@ class Keysight33500B(AFG1022):
         return ArbitraryMemory(POINTS[1], TOP_CODE)
 
     def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
-        return ChannelSettings(
-            declared_load_ohm=declared_load_ohm, frequency_hz=1e3, amplitude_vpp=0.2, sweep=OwnSweep()
-        )
+        return _Settings(declared_load_ohm=declared_load_ohm)
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
         del quirks
         return (*_COMMANDS, *SHARED_COMMANDS)
 
 
-def _sweep(settings: ChannelSettings) -> OwnSweep:
-    return settings.sweep or OwnSweep()
-
-
 def _name(parameter: bytes) -> str:
     return text(parameter).strip('"').upper()
 
 
-def _write_dac(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
+def _write_dac(own: Keysight33500B, _: int, parameters: Parameters) -> None:
     """Store a waveform from a binary block of 16-bit numbers, or from a list."""
-    del channel
     if len(parameters) < 2:
         raise ScpiError(ErrorCode.MISSING_PARAMETER)
     name = _name(parameters[0])
@@ -121,7 +126,8 @@ def _write_dac(own: Keysight33500B, channel: int, parameters: Parameters) -> Non
 
 def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]:
     if parameters[0].startswith(b"#"):
-        order = ">i2" if own.order is _Order.NORMAL else "<i2"
+        settings: Any = own.settings(1)
+        order = ">i2" if settings.order is _Order.NORMAL else "<i2"
         data = block(parameters[0])
         if len(data) % 2:
             raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
@@ -129,10 +135,16 @@ def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]
     return np.array([float(integer(each)) for each in parameters])
 
 
-def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
+def _stored(own: Keysight33500B, parameters: Parameters) -> str:
+    """Return the name of a stored waveform."""
     name = _name(only(parameters))
     if name not in own.waveforms:
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+    return name
+
+
+def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
+    name = _stored(own, parameters)
     rate_hz = _rate_hz(own, channel)
     own.selected = name
     own.memory.hold(own.waveforms[name])
@@ -149,18 +161,13 @@ def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     own.selected = ""
 
 
-def _points(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
-    name = _name(only(parameters))
-    if name not in own.waveforms:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    return as_number(len(own.waveforms[name]))
+def _attribute(node: str, of: Callable[[Codes], float]) -> Command:
+    """Return the query of a number of a stored waveform."""
 
+    def ask(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
+        return as_number(of(own.waveforms[_stored(own, parameters)]))
 
-def _average(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
-    name = _name(only(parameters))
-    if name not in own.waveforms:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    return as_number(float(np.mean(own.waveforms[name])) / _MIDDLE - 1)
+    return Command(f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, None, ask)
 
 
 def _rate_hz(own: Keysight33500B, channel: int) -> float:
@@ -173,43 +180,17 @@ def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
 
 
 def _write_rate(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    rate_hz = number(only(parameters), NO_UNITS)
+    rate_hz = value_of(only(parameters), NO_UNITS)
     if not 0 < rate_hz <= HIGHEST_RATE_HZ:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
     _set_rate(own, channel, rate_hz)
 
 
-def _write_order(own: Keysight33500B, _: int, parameters: Parameters) -> None:
-    word = _name(only(parameters))
-    own.order = _Order.SWAPPED if word.startswith("SWAP") else _Order.NORMAL
-
-
-def _write_filter(own: Keysight33500B, _: int, parameters: Parameters) -> None:
-    word = _name(only(parameters))
-    if word not in ("OFF", "STEP", "NORM", "NORMAL"):
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    own.filter = _Filter[{"NORM": "NORMAL"}.get(word, word)]
-
-
-def _set_sweep(own: Keysight33500B, channel: int, field: str, value: object) -> None:
-    settings = own.settings(channel)
-    own.configure(channel, replace(settings, sweep=replace(_sweep(settings), **{field: value})))  # type: ignore[arg-type]
-
-
-def _sweep_seconds(node: str, field: str, range_s: tuple[float, float]) -> Command:
-    """Return the command of a sweep time [s]."""
-
-    def write(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-        seconds = number(only(parameters), _SECONDS)
-        if not range_s[0] <= seconds <= range_s[1]:
-            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        _set_sweep(own, channel, field, round(seconds, 6))
-
-    def ask(own: Keysight33500B, channel: int, parameters: Parameters) -> bytes:
-        none(parameters)
-        return as_number(getattr(_sweep(own.settings(channel)), field))
-
-    return Command(f"[SOURce#:]SWEep:{node}", _GUIDE, write, ask)
+def _sweeping(settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
+    """Return settings with the sweep on or off; sweeps that repeat without a trigger are not simulated."""
+    if settings.trigger is Trigger.IMMEDIATE:
+        return without_mode(RunMode.SWEEP, settings, wanted)
+    return with_mode(RunMode.SWEEP, settings, wanted)
 
 
 _GUIDE = "Operating and Service Guide"
@@ -223,23 +204,25 @@ _COMMANDS = (
     Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, *_: own.selected.encode()),
     Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
         lambda own, channel, _: as_number(_rate_hz(own, channel))),
-    Command("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, _write_filter,
-        lambda own, *_: own.filter.name[:4].encode()),
+    choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, _Filter,
+        lambda s: s.filter, lambda s, word: replace(s, filter=word)),
     Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, None),
     Command("[SOURce#:]DATA:VOLatile:CLEar", _GUIDE, _clear, None),
-    Command("[SOURce#:]DATA:ATTRibute:POINts", _GUIDE, None, _points),
-    Command("[SOURce#:]DATA:ATTRibute:AVERage", _GUIDE, None, _average),
-    Command("FORMat:BORDer", _GUIDE, _write_order, lambda own, *_: own.order.name[:4].encode()),
+    _attribute("POINts", len),
+    _attribute("AVERage", lambda codes: float(np.mean(codes)) / _MIDDLE - 1),
+    choice("FORMat:BORDer", _GUIDE, _Order, lambda s: s.order, lambda s, word: replace(s, order=word)),
     choice("[SOURce#:]VOLTage:UNIT", _GUIDE, _Unit, lambda _: _Unit.VPP, lambda s, _: s),
-    switch("[SOURce#:]SWEep:STATe", _GUIDE,
-        lambda s: s.mode is RunMode.SWEEP, lambda s, on: with_mode(RunMode.SWEEP, s, on)),
-    _sweep_seconds("TIME", "sweep_s", SWEEP_S),
-    _sweep_seconds("HTIMe", "hold_s", HOLD_S),
-    choice("[SOURce#:]SWEep:SPACing", _GUIDE, _Spacing,
-        lambda s: _Spacing[_sweep(s).spacing.name],
-        lambda s, word: replace(s, sweep=replace(_sweep(s), spacing=Spacing[word.name]))),
-    choice("TRIGger#:SOURce", _GUIDE, SweepTrigger,
-        lambda s: _sweep(s).trigger, lambda s, word: replace(s, sweep=replace(_sweep(s), trigger=word))),
+    number("[SOURce#:]FREQuency:STARt", _GUIDE, "sweep_start_hz", FREQUENCY_UNITS,
+        lambda s: s.frequency_range_hz, default=100e3, decimals=6),
+    number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", FREQUENCY_UNITS,
+        lambda s: s.frequency_range_hz, default=1e6, decimals=6),
+    switch("[SOURce#:]SWEep:STATe", _GUIDE, lambda s: s.mode is RunMode.SWEEP, _sweeping),
+    number("[SOURce#:]SWEep:TIME", _GUIDE, "sweep_s", _SECONDS, lambda _: SWEEP_S, default=1.0, decimals=6),
+    number("[SOURce#:]SWEep:HTIMe", _GUIDE, "sweep_hold_s", _SECONDS, lambda _: HOLD_S,
+        default=0.0, decimals=6),
+    choice("[SOURce#:]SWEep:SPACing", _GUIDE, Spacing,
+        lambda s: s.sweep_spacing, lambda s, word: replace(s, sweep_spacing=word)),
+    choice("TRIGger#:SOURce", _GUIDE, Trigger, lambda s: s.trigger, lambda s, word: replace(s, trigger=word)),
     switch("[SOURce#:]BURSt:STATe", _GUIDE,
         lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on)),
     burst_cycles(MOST_BURST_CYCLES, channels=2),

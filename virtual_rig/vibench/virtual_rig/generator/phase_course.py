@@ -6,8 +6,7 @@ over hours (like a DDS accumulator that never overflows).
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Protocol
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +20,6 @@ CURVATURE_TOLERANCE_CYCLES = 1e-6
 FINEST_SPLIT = 256
 """Most pieces per interval; only sweeps above about 1e9 Hz/s would need more."""
 NO_TIMES: Samples = np.empty(0)
-
-
-class PhaseCourse(Protocol):
-    """Phase as a function of time."""
-
-    def phase(self, time_s: float) -> float:
-        """Return the phase at one instant, as a fraction of a cycle."""
-
-    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start (fraction of a cycle) and span (cycles) of the phase between consecutive edges."""
-
-    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return the times within (begin, end) between which the phase is straight."""
 
 
 @dataclass(frozen=True)
@@ -69,68 +55,16 @@ class SteadyPhase:
         return NO_TIMES
 
 
-class Spacing(StrEnum):
+class Spacing(Enum):
     """Spacing of frequencies in a sweep."""
 
-    LINEAR = "linear"
-    LOGARITHMIC = "logarithmic"
+    LINEAR = "LINear"
+    LOGARITHMIC = "LOGarithmic"
 
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """Repeated sweeps from start to stop with continuous phase."""
-
-    start_hz: float
-    stop_hz: float
-    sweep_s: float
-    spacing: Spacing
-    begin_s: float
-    offset: float
-    """Phase at that time [cycles]."""
-
-    def phase(self, time_s: float) -> float:
-        """Return the phase at one instant [cycles, 0..1)."""
-        return float(_fraction(self.offset + self._cycles(np.asarray([time_s])))[0])
-
-    def _cycles(self, time_s: Samples) -> Samples:
-        sweeps = np.floor((time_s - self.begin_s) / self.sweep_s)
-        within = (time_s - self.begin_s) - sweeps * self.sweep_s
-        per_sweep = self._cycles_within(np.asarray([self.sweep_s]))[0]
-        return np.asarray(sweeps * per_sweep + self._cycles_within(within))
-
-    def _cycles_within(self, time_s: Samples) -> Samples:
-        """Integrate the frequency from the start of a sweep."""
-        if self.spacing is Spacing.LINEAR or self.start_hz == self.stop_hz:
-            rate = (self.stop_hz - self.start_hz) / self.sweep_s
-            return np.asarray(time_s * (self.start_hz + 0.5 * rate * time_s))
-        growth = np.log(self.stop_hz / self.start_hz) / self.sweep_s
-        return np.asarray(self.start_hz * np.expm1(growth * time_s) / growth)
-
-    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start and span between consecutive edges."""
-        cycles = self.offset + self._cycles(edges_s)
-        return _fraction(cycles[:-1]), np.diff(cycles)
-
-    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return the starts of the sweeps, and points between them as required by the curvature."""
-        steepest = abs(self.stop_hz - self.start_hz) / self.sweep_s
-        if self.spacing is Spacing.LOGARITHMIC:
-            steepest = (
-                max(self.start_hz, self.stop_hz) * abs(np.log(self.stop_hz / self.start_hz)) / self.sweep_s
-            )
-        turns = _grid(self.begin_s, self.sweep_s, begin_s, end_s)
-        if steepest == 0:
-            return turns
-        step = np.sqrt(8 * CURVATURE_TOLERANCE_CYCLES / steepest)
-        if step >= interval_s:
-            return turns
-        step = max(step, interval_s / FINEST_SPLIT)
-        return np.concatenate((turns, _grid(self.begin_s, float(step), begin_s, end_s)))
-
-
-@dataclass(frozen=True)
-class TriggeredSweepPhase:
-    """One triggered sweep: start frequency before it, stop frequency for a time after it."""
+    """One triggered sweep: start frequency before it, then stop frequency for a time, then start again."""
 
     start_hz: float
     stop_hz: float
@@ -152,13 +86,20 @@ class TriggeredSweepPhase:
         return np.asarray(self.offset + self._since_zero(time_s) - before)
 
     def _since_zero(self, time_s: Samples) -> Samples:
-        inside = SweptPhase(self.start_hz, self.stop_hz, self.sweep_s, self.spacing, 0.0, 0.0)
         after_s = np.maximum(time_s - self.begin_s, 0.0)
-        swept = inside._cycles_within(np.minimum(after_s, self.sweep_s))  # noqa: SLF001 - its own kind
+        swept = self._cycles_within(np.minimum(after_s, self.sweep_s))
         held_s = np.clip(after_s - self.sweep_s, 0.0, self.hold_s)
         back_s = np.maximum(after_s - self.sweep_s - self.hold_s, 0.0)
         waited_s = np.minimum(time_s, self.begin_s) + back_s
         return np.asarray(self.start_hz * waited_s + swept + self.stop_hz * held_s)
+
+    def _cycles_within(self, time_s: Samples) -> Samples:
+        """Integrate the frequency from the start of the sweep."""
+        if self.spacing is Spacing.LINEAR or self.start_hz == self.stop_hz:
+            rate = (self.stop_hz - self.start_hz) / self.sweep_s
+            return np.asarray(time_s * (self.start_hz + 0.5 * rate * time_s))
+        growth = np.log(self.stop_hz / self.start_hz) / self.sweep_s
+        return np.asarray(self.start_hz * np.expm1(growth * time_s) / growth)
 
     def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
         """Return start and span between consecutive edges."""
@@ -171,21 +112,23 @@ class TriggeredSweepPhase:
         corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
         corners = corners[(corners > begin_s) & (corners < end_s)]
         first_s, last_s = max(begin_s, self.begin_s), min(end_s, end_of_sweep_s)
-        if not first_s < last_s:
+        steepest = abs(self.stop_hz - self.start_hz) / self.sweep_s
+        if self.spacing is Spacing.LOGARITHMIC:
+            growth = abs(np.log(self.stop_hz / self.start_hz)) / self.sweep_s
+            steepest = max(self.start_hz, self.stop_hz) * growth
+        if first_s >= last_s or steepest * interval_s**2 <= 8 * CURVATURE_TOLERANCE_CYCLES:
             return corners
-        inside = SweptPhase(self.start_hz, self.stop_hz, self.sweep_s, self.spacing, self.begin_s, 0.0)
-        return np.concatenate((corners, inside.breakpoints(first_s, last_s, interval_s)))
+        step_s = max(np.sqrt(8 * CURVATURE_TOLERANCE_CYCLES / steepest), interval_s / FINEST_SPLIT)
+        first = int(np.floor((first_s - self.begin_s) / step_s)) + 1
+        last = int(np.ceil((last_s - self.begin_s) / step_s)) - 1
+        times = self.begin_s + step_s * np.arange(first, last + 1)
+        return np.concatenate((corners, times[(times > first_s) & (times < last_s)]))
+
+
+PhaseCourse = SteadyPhase | SweptPhase
 
 
 def _fraction(cycles: Samples) -> Samples:
     """Return the fractional part, strictly below one (a tiny negative number would round up to it)."""
     fraction = cycles - np.floor(cycles)
     return np.asarray(np.where(fraction >= 1.0, 0.0, fraction))
-
-
-def _grid(origin_s: float, step_s: float, begin_s: float, end_s: float) -> Samples:
-    """Return all ``origin + k step`` strictly between begin and end."""
-    first = int(np.floor((begin_s - origin_s) / step_s)) + 1
-    last = int(np.ceil((end_s - origin_s) / step_s)) - 1
-    times = origin_s + step_s * np.arange(first, last + 1)
-    return np.asarray(times[(times > begin_s) & (times < end_s)])

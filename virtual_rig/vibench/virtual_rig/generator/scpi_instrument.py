@@ -103,8 +103,8 @@ def choice(
     header: str,
     source: str,
     words: type[Enum],
-    get: Callable[[ChannelSettings], Enum],
-    put: Callable[[ChannelSettings, Any], ChannelSettings],
+    get: Callable[[Any], Enum],
+    put: Callable[[Any, Any], ChannelSettings],
     channels: int = CHANNELS,
 ) -> Command:
     """Return the command of a setting whose values are the words of an enum."""
