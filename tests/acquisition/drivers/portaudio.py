@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.world.wiring import Coupling, Input
 
 FRAMES = 512
 

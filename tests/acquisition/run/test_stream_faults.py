@@ -24,7 +24,7 @@ from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import InRunLimits, Measurement, RunState, StreamedNoise
 from vibench.acquisition.recording import RecordingState, create_recording
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
-from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.world.wiring import Coupling, Input
 
 try:
     import resource

@@ -16,7 +16,7 @@ from vibench.acquisition.recording import (
 )
 from vibench.acquisition.rig import channels_of, load_rig, specimen_of
 from vibench.sim import Specimen
-from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

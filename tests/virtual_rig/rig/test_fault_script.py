@@ -13,8 +13,8 @@ from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.recording._disk import meet_trouble
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
-from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.rig.fault_script import DISK_FAULTS, FaultScript, PlayedFault
+from vibench.virtual_rig.world.wiring import Coupling, Input
 
 ROOT = Path(__file__).parents[3]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"

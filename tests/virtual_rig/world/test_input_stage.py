@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world.conversion import AC_CUT_HZ, OVER_RANGE, InputStage, clip_v
 from vibench.virtual_rig.world.sensors import IEPE_BIAS_V
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
-from vibench.virtual_rig.world.wiring import OPEN_INPUT, Behind, Cable, Signal
+from vibench.virtual_rig.world.wiring import OPEN_INPUT, Behind, Cable, Coupling, Input, Signal
 
 SENSOR = Cable(Behind.IEPE_SENSOR, Signal.BASE_ACCELERATION)
 SOURCE = Cable(Behind.VOLTAGE_SOURCE, Signal.DRIVE)

@@ -11,9 +11,9 @@ from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS
-from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES, volts_per_count
 from vibench.virtual_rig.world.time_grid import USUAL_GRID, relative_clock_ppm
+from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s

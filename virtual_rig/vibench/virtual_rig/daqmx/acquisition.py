@@ -14,7 +14,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ..analogue import Sampler
+from ..world.conversion import Conversion
 from .errors import DaqmxRefusal, unsupported_value
 
 MOST_SAMPLES = 1 << 27
@@ -121,7 +121,7 @@ class Acquisition:
 
     def __init__(
         self,
-        sampler: Sampler,
+        sampler: Conversion,
         channels: int,
         rate_hz: float,
         began_s: float,

@@ -22,13 +22,14 @@ from nidaqmx.constants import (
 )
 from nidaqmx.error_codes import DAQmxErrors
 
-from ..analogue import Coupling
+from ..world.wiring import Coupling
 from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem
 from .channels import OutputChannel
 from .data_calls import count_available, default_samples, newest
 from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
 from .errors import DaqmxRefusal, member, unsupported_value
+from .rig import QUESTION_S
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
@@ -147,7 +148,7 @@ def _overloaded_names(task: Task) -> str:
 def _total_generated(task: Task) -> int:
     if task.generation is None:
         return 0
-    task.rig.pace.answer_progress(task.rig)
+    task.rig.pace.pass_time(task.rig, QUESTION_S)
     return task.generation.generated
 
 

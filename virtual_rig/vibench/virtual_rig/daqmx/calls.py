@@ -4,6 +4,8 @@ Names are those of NI's protocol file (`nidaqmx.proto`); with the prefix ``DAQmx
 describes them.
 """
 
+import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,7 @@ from .channels import InputChannel, OutputChannel, channel_names, expand
 from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
 from .generation import Generation
-from .rig import Rig
+from .rig import QUESTION_S, Rig
 from .tasks import Task
 
 
@@ -128,8 +130,8 @@ def _with_devices(names: Iterable[str]) -> Iterable[str]:
 
 Fields = Mapping[str, object]
 """The fields of a response; status 0 is omitted."""
-Call = Callable[[DaqmxSystem, Any], Fields | bytes]
-"""Takes system and request; returns the response as fields or as bytes."""
+Call = Callable[[DaqmxSystem, Any], Fields]
+"""Takes system and request; returns the fields of the response."""
 
 NOTHING: Fields = {}
 
@@ -137,6 +139,11 @@ NOTHING: Fields = {}
 def pick(request: Any, field: str) -> int:
     """Return an enum of a request: the raw number if given, else the named value."""
     return int(getattr(request, f"{field}_raw") or getattr(request, field))
+
+
+def deadline(timeout_s: float) -> float:
+    """Return the time of the monotonic clock at which a timeout ends; infinite for a negative one [s]."""
+    return math.inf if timeout_s < 0 else time.monotonic() + timeout_s
 
 
 def task_of(system: DaqmxSystem, request: Any) -> Task:
@@ -165,7 +172,7 @@ def _create(system: DaqmxSystem, request: Any) -> Fields:
 def _is_done(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
     if not task.is_done():
-        task.rig.pace.answer_progress(task.rig)
+        task.rig.pace.pass_time(task.rig, QUESTION_S)
     return {"is_task_done": task.is_done()}
 
 
@@ -268,7 +275,7 @@ CALLS: Mapping[str, Call] = {
     "TaskControl": _does(_control),
     "IsTaskDone": _is_done,
     "WaitUntilTaskDone": _does(
-        lambda system, request: task_of(system, request).wait_until_done(request.time_to_wait)),
+        lambda system, request: task_of(system, request).wait_until_done(deadline(request.time_to_wait))),
     "CreateAIVoltageChan": _add_inputs,
     "CreateAOVoltageChan": _add_outputs,
     "CfgSampClkTiming": _set_clock,
@@ -286,8 +293,7 @@ CALLS: Mapping[str, Call] = {
 
 Listener = Iterator[Any]
 Stream = Acquisition | Generation
-_FOR_EVER = -1.0
-_BY_OTHERS = float("inf")
+_BY_OTHERS = math.inf
 """Rig time of an event that depends on other calls."""
 
 
@@ -344,7 +350,7 @@ class _Subscription:
         return not self._context.is_active() or self._system.tasks.get(self._task.name) is not self._task
 
     def _wait(self, until_s: float, is_there: Callable[[], bool]) -> None:
-        self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, _FOR_EVER)
+        self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, math.inf)
 
     def await_run(self) -> Stream | None:
         """Wait for the next run; None when the client or the task is gone."""

@@ -9,7 +9,7 @@ from nidaqmx.constants import ExcitationSource, TerminalConfiguration
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ..analogue import Coupling, Input
+from ..world.wiring import Coupling, Input
 from .devices import AnalogInputs, AnalogOutputs, Device
 from .errors import DaqmxRefusal, unsupported_value
 

@@ -1,8 +1,7 @@
 """Calls that transfer samples between a program and a task, with their protobuf encoding."""
 
 import math
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +12,10 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from .acquisition import Acquisition, StartsItself, check_memory
-from .calls import Call, DaqmxSystem, Fields, pick, task_of
+from .calls import Call, DaqmxSystem, Fields, deadline, pick, task_of
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation
+from .rig import QUESTION_S
 from .tasks import Task
 
 READ_ALL = -1
@@ -38,7 +38,7 @@ class Reading:
         return int(self.volts.shape[1])
 
 
-def read(task: Task, samples: int, timeout_s: float) -> Reading:
+def read(task: Task, samples: int, deadline_s: float) -> Reading:
     """Read ``samples`` per channel, starting the task if necessary; a negative number reads all.
 
     Raises
@@ -55,7 +55,7 @@ def read(task: Task, samples: int, timeout_s: float) -> Reading:
         reading = _read_on_demand(task, max(1, samples))
     else:
         wanted = default_samples(task) if samples < 0 else samples
-        reading = _read_buffered(task, wanted, timeout_s)
+        reading = _read_buffered(task, wanted, deadline_s)
     if has_to_start and _is_used_up(task):
         task.stop()
     return reading
@@ -89,7 +89,7 @@ def available(task: Task) -> int:
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
-        task.rig.pace.answer_progress(task.rig)
+        task.rig.pace.pass_time(task.rig, QUESTION_S)
     return min(task.acquisition.available, task.acquisition.buffer_size)
 
 
@@ -116,9 +116,11 @@ def _read_on_demand(task: Task, samples: int) -> Reading:
     return Reading(volts, began_s=task.rig.now_s - samples / rate_hz)
 
 
-def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
-    deadline_s = math.inf if timeout_s < 0 else time.monotonic() + timeout_s
-    if not _await(task, math.inf, lambda: task.acquisition is not None or not task.is_running, deadline_s):
+def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
+    def has_begun() -> bool:
+        return task.acquisition is not None or not task.is_running
+
+    if not task.rig.pace.ask(task.rig, math.inf, has_begun, deadline_s):
         return _nothing_in_time(task, wanted)
     acquisition = task.acquisition
     if acquisition is None:
@@ -162,41 +164,13 @@ def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: f
             or task.acquisition is not acquisition
         )
 
-    has_come = _await(task, acquisition.time_of(end), is_there, deadline_s)
+    has_come = task.rig.pace.ask(task.rig, acquisition.time_of(end), is_there, deadline_s)
     if task.acquisition is not acquisition:
         raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_read=0)
     return has_come
 
 
-def _await(task: Task, until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:
-    left_s = -1.0 if math.isinf(deadline_s) else max(0.0, deadline_s - time.monotonic())
-    return task.rig.pace.ask(task.rig, until_s, is_there, left_s)
-
-
-_STATUS_TAG = b"\x08"
-"""Field 1, varint."""
-_ARRAY_TAG = b"\x12"
-"""Field 2, length-delimited."""
-_COUNT_TAG = b"\x18"
-"""Field 3, varint."""
-_MORE = 0x80
-_SEVEN_BITS = 0x7F
-_INT64_WRAP = 1 << 64
-
-
-def varint(number: int) -> bytes:
-    """Return a number in base-128 digits, least significant first; a negative one as 64-bit complement."""
-    if number < 0:
-        number += _INT64_WRAP
-    digits = bytearray()
-    while number > _SEVEN_BITS:
-        digits.append(number & _SEVEN_BITS | _MORE)
-        number >>= 7
-    digits.append(number)
-    return bytes(digits)
-
-
-def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s: float) -> int:
+def write(task: Task, volts: NDArray[np.float64], start: StartsItself, deadline_s: float) -> int:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
     Raises
@@ -211,7 +185,7 @@ def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s
     if task.kind is SampleTimingType.ON_DEMAND:
         return _write_on_demand(task, volts, start)
     if task.is_running:
-        written = _write_running(task, volts, timeout_s)
+        written = _write_running(task, volts, deadline_s)
     else:
         written = _write_stopped(task, volts)
         if start is StartsItself.YES:
@@ -253,8 +227,7 @@ def _write_stopped(task: Task, volts: NDArray[np.float64]) -> int:
     return int(count)
 
 
-def _write_running(task: Task, volts: NDArray[np.float64], timeout_s: float) -> int:
-    deadline_s = math.inf if timeout_s < 0 else time.monotonic() + timeout_s
+def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) -> int:
     count, written = volts.shape[1], 0
     while written < count:
         piece = min(count - written, task.output_buffer.size)
@@ -272,8 +245,7 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
         has_ended = generation.failure is not None or task.generation is not generation
         return generation.space >= samples or has_ended
 
-    left_s = -1.0 if math.isinf(deadline_s) else max(0.0, deadline_s - time.monotonic())
-    has_come = task.rig.pace.ask(task.rig, generation.time_of_room(samples), is_there, left_s)
+    has_come = task.rig.pace.ask(task.rig, generation.time_of_room(samples), is_there, deadline_s)
     if generation.failure is not None:
         raise generation.failure
     if task.generation is not generation:
@@ -286,17 +258,22 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 _READ_BITS = {"I16": 16, "I32": 32}
 
 
-def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
+def _read_scaled(system: DaqmxSystem, request: Any) -> Fields:
     reading = _read_what_fits(task_of(system, request), request)
-    # Write a ReadAnalogF64Response, ready to send: status, array, samples per channel.
-    raw = np.ascontiguousarray(_lay_out(reading.volts, request), dtype="<f8").tobytes()
-    array = _ARRAY_TAG + varint(len(raw)) + raw
-    return b"".join((_STATUS_TAG, varint(reading.status), array, _COUNT_TAG, varint(reading.samples)))
+    return _response(reading, _lay_out(reading.volts, request))
+
+
+def _response(reading: Reading, values: NDArray[Any]) -> Fields:
+    return {
+        "status": reading.status,
+        "read_array": values.ravel().tolist(),
+        "samps_per_chan_read": reading.samples,
+    }
 
 
 def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
-    reading = read(task, request.num_samps_per_chan, request.timeout)
+    reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
     mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
     waveforms = [_waveform(task, row, reading, mode) for row in range(len(task.inputs))]
     return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
@@ -317,7 +294,7 @@ def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMod
 
 def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
-    reading = _whole(read(task, request.num_samps_per_chan, request.timeout))
+    reading = _whole(read(task, request.num_samps_per_chan, deadline(request.timeout)))
     size = task.inputs[0].raw_bits // 8
     raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()
     return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
@@ -333,12 +310,7 @@ def _binary_reader(bits: int) -> Call:
             detail = f"{task.inputs[0].inputs.bits}-bit samples need the 32-bit call\nTask Name: {task.name}"
             raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
         reading = _read_what_fits(task, request)
-        counts = _lay_out(_counts(task, reading), request)
-        return {
-            "status": reading.status,
-            "read_array": counts.astype(np.int64).ravel().tolist(),
-            "samps_per_chan_read": reading.samples,
-        }
+        return _response(reading, _lay_out(_counts(task, reading), request).astype(np.int64))
 
     return read_binary
 
@@ -351,7 +323,7 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     _check_size(task, values.size, samples)
     is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
     rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
-    return {"samps_per_chan_written": write(task, rows, _start(request), request.timeout)}
+    return {"samps_per_chan_written": write(task, rows, _start(request), deadline(request.timeout))}
 
 
 def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
@@ -361,7 +333,7 @@ def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
     if len({row.size for row in rows}) != 1:
         raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
     _check_size(task, sum(row.size for row in rows), rows[0].size)
-    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
+    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), deadline(request.timeout))}
 
 
 def _read_what_fits(task: Task, request: Any) -> Reading:
@@ -374,7 +346,7 @@ def _read_what_fits(task: Task, request: Any) -> Reading:
     if wanted > room:
         detail = f"Room for {room} samples per channel, {wanted} requested"
         raise DaqmxRefusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, detail, samples_read=0)
-    return read(task, wanted, request.timeout)
+    return read(task, wanted, deadline(request.timeout))
 
 
 def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from nidaqmx.constants import ProductCategory, TerminalConfiguration
 
 from vibench.acquisition import ConfigurationError
 
-from ..analogue import Coupling
+from ..world.wiring import Coupling
 
 _NI_9234_RATE_HZ = 13.1072e6 / 256
 _NI_9234_MAX_DIVISOR = 31

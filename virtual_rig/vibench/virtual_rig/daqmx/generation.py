@@ -7,7 +7,7 @@ from nidaqmx.constants import RegenerationMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ..analogue import AnalogueWorld
+from ..world.world import World
 from .devices import AnalogOutputs, Idle
 from .errors import DaqmxRefusal
 
@@ -56,7 +56,7 @@ class Generation:
 
     def __init__(
         self,
-        world: AnalogueWorld,
+        world: World,
         outputs: tuple[str, ...],
         rate_hz: float,
         began_s: float,

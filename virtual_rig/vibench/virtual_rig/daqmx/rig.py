@@ -1,15 +1,16 @@
 """The rig behind the simulated driver, and the passing of its time: on demand or in real time."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition import AcquisitionError
 
-from ..analogue import AnalogueWorld
+from ..world.world import World
 from .acquisition import Acquisition, Overflow
 from .devices import Catalogue
 from .errors import DaqmxRefusal
@@ -40,7 +41,7 @@ class Rig:
     ``changed`` guards tasks and trigger lines. The world has its own lock, because others use it too.
     """
 
-    def __init__(self, world: AnalogueWorld, pace: "Pace", catalogue: Catalogue) -> None:
+    def __init__(self, world: World, pace: "Pace", catalogue: Catalogue) -> None:
         self.world = world
         self.catalogue = catalogue
         self.pace = pace
@@ -144,35 +145,12 @@ class Rig:
         self.changed.notify_all()
 
 
-class Pace(Protocol):
-    """A rule for the passing of rig time; its methods are called with ``rig.changed`` held."""
-
-    @property
-    def overflow(self) -> Overflow:
-        """Behaviour of a full buffer."""
-
-    def open(self, rig: "Rig") -> None:
-        """Start the passing of time."""
-
-    def close(self) -> None:
-        """Stop the passing of time; called without the lock."""
-
-    def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until ``is_there()``, expected at rig time ``until_s``; return whether it became true.
-
-        ``timeout_s`` is wall time; a negative one waits for ever. An infinite ``until_s`` depends on other
-        calls.
-        """
-
-    def answer_progress(self, rig: "Rig") -> None:
-        """Ensure that a query of progress returns something newer than the one before."""
-
-    def delay_retry(self, rig: "Rig") -> None:
-        """Advance time before a failed call on demand is repeated."""
+def _wait(rig: "Rig", is_there: Callable[[], bool], deadline_s: float) -> bool:
+    left_s = None if math.isinf(deadline_s) else max(0.0, deadline_s - time.monotonic())
+    return rig.changed.wait_for(is_there, left_s)
 
 
-def _wait(rig: "Rig", is_there: Callable[[], bool], timeout_s: float) -> bool:
-    return rig.changed.wait_for(is_there, None if timeout_s < 0 else timeout_s)
+# The two rules for the passing of rig time have the same methods, which are called with ``rig.changed`` held.
 
 
 class OnDemandPace:
@@ -186,22 +164,22 @@ class OnDemandPace:
     def close(self) -> None:
         """Do nothing."""
 
-    def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
-        """Advance time at once; wait only for events from other calls, such as a trigger."""
+    def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:
+        """Advance time at once; wait only for events from other calls, such as a trigger.
+
+        ``until_s`` is the rig time at which ``is_there()`` is expected, infinite if other calls decide;
+        ``deadline_s`` is a time of the monotonic clock. Return whether it became true.
+        """
         if is_there():
             return True
-        if until_s < float("inf"):
+        if until_s < math.inf:
             rig.advance_to(until_s)
             return is_there()
-        return _wait(rig, is_there, timeout_s)
+        return _wait(rig, is_there, deadline_s)
 
-    def answer_progress(self, rig: "Rig") -> None:
-        """Advance by ``QUESTION_S``."""
-        rig.advance_to(rig.now_s + QUESTION_S)
-
-    def delay_retry(self, rig: "Rig") -> None:
-        """Advance by ``FAILED_CALL_S``."""
-        rig.advance_to(rig.now_s + FAILED_CALL_S)
+    def pass_time(self, rig: "Rig", duration_s: float) -> None:
+        """Advance by a time, for a call that would otherwise be repeated without an end."""
+        rig.advance_to(rig.now_s + duration_s)
 
 
 class WallPace:
@@ -236,16 +214,12 @@ class WallPace:
         if self._thread is not None:
             self._thread.join()
 
-    def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:  # noqa: ARG002 - this clock needs no hint
+    def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:  # noqa: ARG002 - this clock needs no hint
         """Wait for the clock."""
         self._step(rig)
-        return is_there() or _wait(rig, is_there, timeout_s)
+        return is_there() or _wait(rig, is_there, deadline_s)
 
-    def answer_progress(self, rig: "Rig") -> None:
-        """Advance the rig to the clock."""
-        self._step(rig)
-
-    def delay_retry(self, rig: "Rig") -> None:
+    def pass_time(self, rig: "Rig", duration_s: float) -> None:  # noqa: ARG002 - it passes by itself
         """Advance the rig to the clock."""
         self._step(rig)
 
@@ -265,3 +239,6 @@ class WallPace:
         target_s = rig_began_s + self.speed * (self._clock() - began_s)
         rig.advance_to(min(target_s, rig.now_s + SLICE_S))
         return target_s - rig.now_s
+
+
+Pace = OnDemandPace | WallPace

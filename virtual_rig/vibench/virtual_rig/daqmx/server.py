@@ -16,13 +16,13 @@ from nidaqmx.error_codes import DAQmxErrors
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
-from ..analogue import AnalogueWorld
+from ..world.world import World
 from .attributes import SERVICE, attribute_calls
 from .calls import CALLS, EVENTS, DaqmxSystem, Fields, Listener
 from .data_calls import DATA_CALLS
 from .devices import Catalogue
 from .errors import DaqmxRefusal, Faults, Unavailable
-from .rig import OnDemandPace, Pace, Rig
+from .rig import FAILED_CALL_S, OnDemandPace, Pace, Rig
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
 
@@ -97,7 +97,7 @@ class DaqServer:
 
     def __init__(
         self,
-        world: AnalogueWorld,
+        world: World,
         pace: Pace | None = None,
         address: str = LOOPBACK,
         *,
@@ -162,7 +162,7 @@ class DaqServer:
     # --- requests and responses -----------------------------------------------------------
 
     def _unary_calls(self) -> dict[str, Handler]:
-        calls: dict[str, Callable[[Any], Fields | bytes]] = {**attribute_calls(self._system)}
+        calls: dict[str, Callable[[Any], Fields]] = {**attribute_calls(self._system)}
         for name, call in {**CALLS, **DATA_CALLS}.items():
             calls[name] = partial(call, self._system)
         return {name: self._answer(name, call) for name, call in calls.items()}
@@ -170,8 +170,8 @@ class DaqServer:
     def _listening_calls(self) -> dict[str, Handler]:
         return {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
 
-    def _answer(self, name: str, call: Callable[[Any], Fields | bytes]) -> Handler:
-        def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
+    def _answer(self, name: str, call: Callable[[Any], Fields]) -> Handler:
+        def handle(request: Any, context: grpc.ServicerContext) -> Fields:
             with _report_refusals(context), self._rig.changed:
                 self._check_faults(name)
                 if self.faults.take_restart():
@@ -189,7 +189,7 @@ class DaqServer:
             self.faults.check(name)
         except DaqmxRefusal:  # a missing server does not advance time
             if name in self._refused:
-                self._pace.delay_retry(self._rig)
+                self._pace.pass_time(self._rig, FAILED_CALL_S)
             self._refused.add(name)
             raise
         self._refused.discard(name)
@@ -260,8 +260,8 @@ def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) 
             listening[method.name], request.FromString, lambda message: message.SerializeToString()
         )
 
-    def serialise(answer: Fields | bytes) -> bytes:
-        return answer if isinstance(answer, bytes) else bytes(response(**answer).SerializeToString())
+    def serialise(answer: Fields) -> bytes:
+        return bytes(response(**answer).SerializeToString())
 
     handler = unary.get(method.name) or _not_simulated(method.name)
     return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)

@@ -349,9 +349,8 @@ class Task:
         def is_there() -> bool:
             return self.acquisition is not acquisition or not acquisition.awaits_trigger
 
-        while not is_there() and (left_s := deadline_s - time.monotonic()) > 0:
-            wait_s = -1.0 if math.isinf(left_s) else left_s
-            self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, wait_s)
+        while not is_there() and time.monotonic() < deadline_s:
+            self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, deadline_s)
             self.rig.changed.wait(_BREATH_S)  # let other callers stop the task
         return is_there()
 
@@ -371,13 +370,11 @@ class Task:
             raise stream.failure
         return stream.is_done
 
-    def wait_until_done(self, timeout_s: float) -> None:
-        """Wait for the end of a finite task (-200560 after the timeout)."""
-        began_s = time.monotonic()
-        self.await_reference(math.inf if timeout_s < 0 else began_s + timeout_s)
+    def wait_until_done(self, deadline_s: float) -> None:
+        """Wait for the end of a finite task (-200560 after the deadline)."""
+        self.await_reference(deadline_s)
         until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
-        left_s = timeout_s if timeout_s < 0 else max(0.0, began_s + timeout_s - time.monotonic())
-        if not self.rig.pace.ask(self.rig, until_s, self.is_done, left_s):
+        if not self.rig.pace.ask(self.rig, until_s, self.is_done, deadline_s):
             code = DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
             raise DaqmxRefusal(code, f"Task Name: {self.name}")
 

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
-from ..analogue import Coupling, Input
 from .sensors import IEPE_BIAS_V, NoiseStream
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
-from .wiring import Behind, Cable
+from .wiring import Behind, Cable, Coupling, Input
 
 # The converter's anti-alias filter: from means over the world's steps to samples at any lower rate. A
 # windowed sinc (Kaiser window) of linear phase, corrected for the droop of the means, limits the band. It is
@@ -258,7 +257,7 @@ class ConverterInput:
 
 
 class Conversion:
-    """A `Sampler` of the world: samples are computed while the world advances, and stored until read."""
+    """A running conversion: samples are computed while the world advances, and stored until read."""
 
     def __init__(
         self,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum, IntEnum, StrEnum
 
 from vibench.acquisition.rig import Rig, Role
 
@@ -18,6 +18,26 @@ class Signal(IntEnum):
     AMPLIFIER = 1
     BASE_ACCELERATION = 2
     M0_VELOCITY = 3
+
+
+class Coupling(StrEnum):
+    """How an input is coupled."""
+
+    AC = "AC"
+    DC = "DC"
+
+
+@dataclass(frozen=True)
+class Input:
+    """Configuration of one converter input in a task."""
+
+    physical_channel: str
+    """``"cDAQ1Mod1/ai0"``: name of the input at the converter, which the wiring maps to a signal."""
+    range_v: float
+    """Full scale, plus and minus [V]."""
+    coupling: Coupling
+    iepe_current_a: float = 0.0
+    """Excitation current of an IEPE sensor [A]; a sensor that needs it gives no signal without it."""
 
 
 class Behind(Enum):

@@ -24,7 +24,6 @@ from vibench.acquisition.rig import (
 from vibench.sim import Specimen
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
-from ..analogue import Input
 from .conversion import Conversion, InputStage, converter_input, history_steps
 from .sensors import (
     LONGEST_DELAY_S,
@@ -35,7 +34,7 @@ from .sensors import (
     SensorParts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of, signal_rows
+from .wiring import OPEN_INPUT, Cable, Input, Signal, amplifier_input, cables_of, signal_rows
 
 
 class AnalogueOutput:
