@@ -24,7 +24,6 @@ from vibench.acquisition.rig import (
 )
 from vibench.acquisition.rig._knobs import confirm_by_asking
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 ROOT = Path(__file__).parents[3]
@@ -141,8 +140,7 @@ class TestOpening:
             asked.extend(knobs)
             return confirm_simulated(knobs)
 
-        panel = Panel(declared_load_ohm=float("inf"))
-        with VirtualRig(rig, quirks=Quirks(load_is_panel_only=True), panel=panel) as virtual:
+        with VirtualRig(rig, quirks=Quirks(panel_load_ohm=float("inf"))) as virtual:
             daq = rig.daq.model_copy(update={"server": virtual.daq_address})
             laboratory = rig.model_copy(update={"virtual": None, "daq": daq})
             open_bench(laboratory, confirm, CalibrationRule.WAIVED).close()

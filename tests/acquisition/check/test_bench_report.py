@@ -14,7 +14,6 @@ from vibench.acquisition.check.loop import clock_ratio, fit_sine
 from vibench.acquisition.errors import CheckStopped, InstrumentError, RunStalled
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.stop import Cause, StopRequest
-from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 ROOT = Path(__file__).parents[3]
@@ -165,15 +164,13 @@ def test_a_converter_that_hands_over_nothing_ends_the_check_in_silence(bench_of,
 
 def test_a_wrong_load_at_the_panel_is_named_as_such(checked, rig, tmp_path):
     # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
-    panel_only = Quirks(load_is_panel_only=True)
-    report = checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=50.0))
+    report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
     assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
 
 
 def test_a_right_load_that_nobody_can_ask_for_passes(checked, rig, tmp_path):
-    panel_only = Quirks(load_is_panel_only=True)
-    assert failed(checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=inf))) == set()
+    assert failed(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
 def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition.rig import GeneratorConfig
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.channel_output import ChannelSettings, Panel
+from vibench.virtual_rig.generator.channel_output import ChannelSettings
 from vibench.virtual_rig.generator.scpi_instrument import Quirks, Reply
 from vibench.virtual_rig.generator.scpi_message import ErrorCode
 from vibench.virtual_rig.usb.bus import plug_in, unplug
@@ -98,12 +98,8 @@ class Bus:
 
     plugged: list[Plugged] = field(default_factory=list)
 
-    def plug_in(
-        self, quirks: Quirks | None = None, panel: Panel | None = None, listener: type[Logged] = Logged
-    ) -> Plugged:
-        instrument = AFG1022(
-            lambda: 0.0, serial=next(_SERIALS), quirks=quirks or Quirks(), panel=panel or Panel()
-        )
+    def plug_in(self, quirks: Quirks | None = None, listener: type[Logged] = Logged) -> Plugged:
+        instrument = AFG1022(lambda: 0.0, serial=next(_SERIALS), quirks=quirks or Quirks())
         log = listener(instrument)
         usb = UsbTmcInstrument(log)
         plug_in(usb)

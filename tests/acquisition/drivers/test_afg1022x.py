@@ -11,7 +11,7 @@ from vibench.acquisition.drivers import AFG1022X
 from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
-from vibench.virtual_rig.generator.channel_output import OPEN_AMPLITUDE_RANGE_VPP, Panel, RunMode
+from vibench.virtual_rig.generator.channel_output import OPEN_AMPLITUDE_RANGE_VPP, RunMode
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
@@ -85,7 +85,7 @@ class TestLoad:
         assert generator.unconfirmed == ()
 
     def test_a_load_that_only_the_panel_knows_is_for_the_operator_to_confirm(self, bus):
-        plugged = bus.plug_in(Quirks(load_is_panel_only=True), Panel(declared_load_ohm=math.inf))
+        plugged = bus.plug_in(Quirks(panel_load_ohm=math.inf))
         generator = AFG1022X.open(plugged.config)
         assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
         generator.close()

@@ -21,7 +21,6 @@ from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 DWELL = Measurement(
@@ -150,9 +149,7 @@ def test_a_setting_that_the_instrument_replaced_in_silence_is_a_fault(laboratory
 
 
 def test_a_wrong_load_at_the_panel_is_found_before_the_full_level(laboratory, tmp_path):
-    virtual, connected = laboratory(
-        quirks=Quirks(load_is_panel_only=True), panel=Panel(declared_load_ohm=50.0)
-    )
+    virtual, connected = laboratory(quirks=Quirks(panel_load_ohm=50.0))
     with pytest.raises(AcquisitionError) as failure, bench_on(connected) as bench:
         run_measurement(bench, DWELL, tmp_path / "run.h5")
     assert isinstance(failure.value, CheckFailed | SettingRefused | InstrumentError)

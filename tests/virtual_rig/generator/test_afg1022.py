@@ -240,7 +240,7 @@ class TestQuirks:
         assert errors(device) == []
 
     def test_the_load_may_be_a_matter_of_the_panel_alone(self):
-        device = generator(replace(PLAIN, load_is_panel_only=True))
+        device = generator(replace(PLAIN, panel_load_ohm=50.0))
         device.execute(b"OUTP:IMP INF")
         assert errors(device) == [-113]
         device.execute(b"OUTP ON")

@@ -15,7 +15,6 @@ from nidaqmx.stream_readers import AnalogMultiChannelReader
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
@@ -139,7 +138,7 @@ def test_two_rigs_of_one_configuration_agree_bit_for_bit(switch_on):
 
 
 def test_a_load_that_only_the_panel_can_set_doubles_the_voltage(switch_on):
-    program = switch_on(quirks=Quirks(load_is_panel_only=True), panel=Panel(declared_load_ohm=50.0))
+    program = switch_on(quirks=Quirks(panel_load_ohm=50.0))
     program.play(160, 0.2)
     volts = program.read(program.task(), 6400)
     assert amplitude(volts[DRIVE]) * RIG.daq.channels[DRIVE].attenuation == pytest.approx(0.2, rel=0.01)

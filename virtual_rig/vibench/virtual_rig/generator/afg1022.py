@@ -22,7 +22,6 @@ from .channel_output import (
     BurstMode,
     ChannelOutput,
     ChannelSettings,
-    Panel,
     RunMode,
     highest_frequency_hz,
     shape_of,
@@ -80,8 +79,8 @@ class AFG1022(ScpiInstrument):
         See `ScpiInstrument`.
     serial
         Serial number, part of the VISA address.
-    quirks, panel, terminal
-        Peculiarities of the firmware; settings of the front panel; load, clock error and noise of the output.
+    quirks, terminal
+        Peculiarities of the firmware; load, clock error and noise of the output.
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
@@ -92,26 +91,25 @@ class AFG1022(ScpiInstrument):
         *,
         serial: str = DEFAULT_SERIAL,
         quirks: Quirks = Quirks(),  # noqa: B008 - frozen
-        panel: Panel = Panel(),  # noqa: B008 - frozen
         terminal: Terminal = Terminal(),  # noqa: B008 - frozen
     ) -> None:
         identity = f"{self.maker},{self.model},{serial},{self.firmware}"
         super().__init__(clock, identity, quirks, self._table(quirks))
         self.serial = serial
         self.memory = self._new_memory()
-        power_on = self._power_on(panel.declared_load_ohm)
+        power_on = self._power_on()
         self._channels: dict[int, ChannelSettings] = dict.fromkeys(range(1, CHANNELS + 1), power_on)
         self._output = ChannelOutput(terminal, self.memory, power_on)
         self.frequencies_are_locked = False
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
-        return COMMANDS if quirks.load_is_panel_only else (*COMMANDS, LOAD)
+        return (*COMMANDS, LOAD) if quirks.panel_load_ohm is None else COMMANDS
 
     def _new_memory(self) -> ArbitraryMemory:
         return ArbitraryMemory()
 
-    def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
-        return ChannelSettings(declared_load_ohm=declared_load_ohm)
+    def _power_on(self) -> ChannelSettings:
+        return ChannelSettings(declared_load_ohm=self.quirks.panel_load_ohm or 50.0)
 
     def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
         """Return the mean voltage at channel 1's terminal over consecutive intervals.
@@ -163,9 +161,8 @@ class AFG1022(ScpiInstrument):
     def reset(self) -> None:
         """Restore the defaults, except a load that only the panel can set."""
         self.frequencies_are_locked = False
-        for channel, settings in self._channels.items():
-            load_ohm = settings.declared_load_ohm if self.quirks.load_is_panel_only else 50.0
-            self._replace(channel, self._power_on(load_ohm))
+        for channel in self._channels:
+            self._replace(channel, self._power_on())
 
     def trigger(self) -> None:
         """Start a waiting burst or sweep."""

@@ -163,14 +163,6 @@ _DEGREES = 360.0
 _PERCENT = 100.0
 
 
-@dataclass(frozen=True)
-class Panel:
-    """Settings available at the front panel only."""
-
-    declared_load_ohm: float = 50.0
-    """Declared load at power-on; ``math.inf`` for high impedance."""
-
-
 def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShape | None:
     """Return the selected shape; None for noise. An empty user memory is refused."""
     duty = settings.duty_percent / _PERCENT

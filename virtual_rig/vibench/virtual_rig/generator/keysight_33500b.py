@@ -97,8 +97,8 @@ class Keysight33500B(AFG1022):
     def _new_memory(self) -> ArbitraryMemory:
         return ArbitraryMemory(POINTS[1], TOP_CODE)
 
-    def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
-        return _Settings(declared_load_ohm=declared_load_ohm)
+    def _power_on(self) -> ChannelSettings:
+        return _Settings()
 
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
         del quirks

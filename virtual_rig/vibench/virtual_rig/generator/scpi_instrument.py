@@ -202,8 +202,8 @@ class Quirks:
     """An unknown command queues -102; an unknown query also answers an empty line (else -113, silence)."""
     out_of_range_becomes_default: bool = True
     """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
-    load_is_panel_only: bool = False
-    """``OUTP:IMP`` is unknown: the load can be set at the front panel only (one driver's report)."""
+    panel_load_ohm: float | None = None
+    """Load that only the front panel can set, without ``OUTP:IMP`` (one driver's report); None: remote."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from ..daqmx.devices import catalogue_with
 from ..daqmx.rig import OnDemandPace, Pace, WallPace
 from ..daqmx.server import LOOPBACK, DaqServer, token_for
 from ..generator.afg1022 import AFG1022
-from ..generator.channel_output import Panel
 from ..generator.keysight_33500b import Keysight33500B
 from ..generator.scpi_instrument import Quirks, ScpiSocket
 from ..generator.terminal_voltage import Terminal
@@ -58,12 +57,10 @@ class VirtualRig:
         A rig with a ``[virtual]`` section.
     address
         ``"host:port"`` of the server; port 0 selects a free one. Loopback by default; otherwise every call
-        needs
-        `token`.
-    quirks, panel
-        Peculiarities of the generator's firmware, and settings of its front panel: a load of 50 ohm that is
-        set
-        there, and cannot be set remotely, doubles the voltage at the amplifier.
+        needs `token`.
+    quirks
+        Peculiarities of the generator's firmware; a load of 50 ohm that only its front panel can set doubles
+        the voltage at the amplifier.
     scpi_port
         Port of `socket_resource`; 0 selects a free one.
     disk
@@ -76,7 +73,6 @@ class VirtualRig:
         address: str = LOOPBACK,
         *,
         quirks: Quirks = Quirks(),  # noqa: B008 - frozen
-        panel: Panel = Panel(),  # noqa: B008 - frozen
         scpi_port: int = 0,
         disk: DiskFaults = DiskFaults.PLAYED,
     ) -> None:
@@ -94,7 +90,6 @@ class VirtualRig:
             lambda: self.world.time_s,
             serial=serial,
             quirks=quirks,
-            panel=panel,
             terminal=_terminal(rig, virtual),
         )
         self.controller = _controller(rig, lambda: self.world.time_s)

@@ -30,7 +30,7 @@ import usb.util
 from vibench.acquisition import ConfigurationError, InstrumentLost
 from vibench.acquisition.rig import TOKEN_KEY, given_token
 
-from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbDevice
+from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbTmcInstrument
 
 # A USB cable through the network: a device served over gRPC, and its proxy on a bus. Generic methods, bytes
 # in and bytes out; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
@@ -51,7 +51,7 @@ _TEXT_SEPARATOR = "\0"
 _Method = Callable[[bytes], bytes]
 
 
-def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
+def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
     """Return the handler that serves one device on a ``grpc.Server``."""
 
     def identify(_: bytes) -> bytes:
@@ -155,6 +155,8 @@ class RemoteUsbDevice:
         return bytes(answer[_ERRNO.size :])
 
 
+UsbDevice = UsbTmcInstrument | RemoteUsbDevice
+"""A device with one USBTMC interface, at the level of whole transfers."""
 _GET_DESCRIPTOR = 6
 _REQUEST_TYPE_MASK = 0x60
 

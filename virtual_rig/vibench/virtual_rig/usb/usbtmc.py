@@ -11,9 +11,9 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
-from ..generator.scpi_instrument import Reply
+from ..generator.afg1022 import AFG1022
 from ..generator.scpi_message import BYTE, LONGEST_MESSAGE, ErrorCode
 
 # A USB device for the bus: descriptors, and transfers that succeed or fail like real ones. The bus does not
@@ -54,23 +54,6 @@ class Setup:
     length: int
 
 
-class UsbDevice(Protocol):
-    """A device with one USBTMC interface, at the level of whole transfers."""
-
-    @property
-    def identification(self) -> Identification:
-        """Content of the descriptors."""
-
-    def bulk_out(self, data: bytes) -> None:
-        """Receive one transfer from the host."""
-
-    def bulk_in(self, length: int, timeout_ms: int) -> bytes:
-        """Send one transfer of at most ``length`` bytes to the host."""
-
-    def control(self, setup: Setup, data: bytes) -> bytes:
-        """Execute a class request; return the device's response."""
-
-
 VENDOR_ID = 0x0699
 PRODUCT_ID = 0x0353
 """Shared by AFG1022 and AFG1062."""
@@ -102,20 +85,6 @@ _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x0
 """USBTMC 1.0 with termination character; USB488 1.0 with 488.2; eight reserved bytes."""
 
 
-class MessageDevice(Protocol):
-    """The instrument behind the interface."""
-
-    serial: str
-    maker: str
-    model: str
-
-    def execute(self, message: bytes) -> Reply:
-        """Execute one complete message and return its reply."""
-
-    def report(self, code: ErrorCode) -> None:
-        """Queue an error detected by the interface."""
-
-
 @dataclass(frozen=True)
 class _Request:
     tag: int
@@ -145,7 +114,7 @@ class UsbTmcInstrument:
 
     def __init__(
         self,
-        device: MessageDevice,
+        device: AFG1022,
         packet_bytes: int = 64,
         usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID),
     ) -> None:

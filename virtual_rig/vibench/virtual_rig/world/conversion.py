@@ -214,11 +214,13 @@ def volts_per_count(range_v: float) -> float:
 class ConverterInput:
     """One channel: input stage, anti-alias filter, noise, quantiser."""
 
-    def __init__(self, stage: InputStage, filtered: Decimator, noise_v: float, noise: NoiseStream) -> None:
-        """``noise_v`` is the rms noise of the converter, in its band."""
+    def __init__(
+        self, stage: InputStage, steps_per_sample: float, start_step: int, noise_v: float, noise: NoiseStream
+    ) -> None:
+        """Begin at a step of the world; ``noise_v`` is the rms noise of the converter, in its band."""
         self.has_clipped = False
         self._stage = stage
-        self._filter = filtered
+        self._filter = decimator(steps_per_sample, start_step, stage.cable.delay_steps)
         self._noise_v = noise_v
         self._noise = noise
         self._count_v = volts_per_count(stage.configured.range_v)
@@ -324,11 +326,3 @@ class Conversion:
 
 _ROUNDING = 1e-6
 """Tolerance in steps, far above rounding errors and far below any relevant length."""
-
-
-def converter_input(
-    stage: InputStage, steps_per_sample: float, start_step: int, noise_v: float, noise: NoiseStream
-) -> ConverterInput:
-    """Return a channel for a conversion that begins at a step of the world."""
-    filtered = decimator(steps_per_sample, start_step, stage.cable.delay_steps)
-    return ConverterInput(stage, filtered, noise_v, noise)

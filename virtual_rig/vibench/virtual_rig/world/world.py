@@ -24,7 +24,7 @@ from vibench.acquisition.rig import (
 from vibench.sim import Specimen
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
-from .conversion import Conversion, InputStage, converter_input, history_steps
+from .conversion import Conversion, ConverterInput, InputStage, history_steps
 from .sensors import (
     LONGEST_DELAY_S,
     Disturbance,
@@ -239,7 +239,7 @@ class World:
             ratio = self._grid.rate_hz / sample_rate_hz
             ratio = round(ratio) if abs(ratio - round(ratio)) < PPM else ratio
             channels = tuple(
-                converter_input(
+                ConverterInput(
                     InputStage(
                         configured, self._cables.get(configured.physical_channel, OPEN_INPUT), self._grid
                     ),
