@@ -1,4 +1,4 @@
-"""A running acquisition: the sampler, and the circular buffer between the device and the reader."""
+"""A running acquisition: the conversion, and the buffer between the device and the reader."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ..world.conversion import Conversion
+from ..world.conversion import Conversion, SampleQueue
 from .errors import DaqmxRefusal, unsupported_value
 
 MOST_SAMPLES = 1 << 27
@@ -141,8 +141,9 @@ class Acquisition:
         self.failure: DaqmxRefusal | None = None
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
         self._sampler = sampler
-        self._ring = np.empty((channels, max(1, buffer_size)))
-        self._overflow = overflow
+        self._unread = SampleQueue(channels)
+        self.buffer_size = max(1, buffer_size)
+        self._capacity = MOST_SAMPLES // channels if overflow is Overflow.GROW else self.buffer_size
         self._samples = total
         self._reference = reference
         self._is_open = True
@@ -150,12 +151,7 @@ class Acquisition:
     @property
     def available(self) -> int:
         """Number of unread samples."""
-        return self.acquired - self.position
-
-    @property
-    def buffer_size(self) -> int:
-        """Buffer size in samples per channel."""
-        return int(self._ring.shape[1])
+        return 0 if self.awaits_trigger else self.acquired - self.position
 
     @property
     def is_done(self) -> bool:
@@ -207,53 +203,31 @@ class Acquisition:
         It is rejected until enough samples before it are stored.
         """
         assert self._reference is not None
-        kept = self._reference.pretrigger
-        if not self.awaits_trigger or self.acquired < kept:
+        if not self.awaits_trigger or self.acquired < self._reference.pretrigger:
             return False
-        self.position = self.acquired - kept
         self.total = self.position + self._samples
         return True
 
     def _store(self, block: NDArray[np.float64]) -> None:
-        count = block.shape[1]
-        if self.awaits_trigger:
-            self.position = self.acquired + count
-        elif self.available + count > self.buffer_size:
-            needed = self.available + count
-            if self._overflow is Overflow.GROW and self._ring.shape[0] * needed <= MOST_SAMPLES:
-                self._grow(needed)
-            else:
-                self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
-        first = self.acquired % self.buffer_size
-        head = min(count, self.buffer_size - first)
-        self._ring[:, first : first + head] = block[:, :head]
-        self._ring[:, : count - head] = block[:, head:]
-        self.acquired += count
+        self._unread.append(block)
+        self.acquired += block.shape[1]
+        if self._reference is not None and self.awaits_trigger:
+            self._take(max(0, self.acquired - self.position - self._reference.pretrigger))
+        elif self.available > self._capacity:
+            self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 
-    def _grow(self, needed: int) -> None:
-        unread = self._copy(self.position, self.available)
-        larger = np.empty((self._ring.shape[0], max(needed, 2 * self.buffer_size)))
-        at = (np.arange(self.available) + self.position) % larger.shape[1]
-        larger[:, at] = unread
-        self._ring = larger
+    def _take(self, count: int) -> NDArray[np.float64]:
+        self.position += count
+        return self._unread.take(count)
 
-    def _copy(self, first: int, count: int) -> NDArray[np.float64]:
-        start = first % self.buffer_size
-        head = min(count, self.buffer_size - start)
-        if head == count:
-            return self._ring[:, start : start + count].copy()
-        return np.concatenate([self._ring[:, start:], self._ring[:, : count - head]], axis=1)
-
-    def read_at(self, first: int, count: int) -> NDArray[np.float64]:
-        """Return ``count`` samples from number ``first`` on, shape (channels, count) [V].
+    def read(self, count: int) -> NDArray[np.float64]:
+        """Return the next ``count`` samples, shape (channels, count) [V].
 
         Raises DaqmxRefusal after a buffer overflow (-200279).
         """
         if self.failure is not None:
             raise self.failure
-        block = self._copy(first, count)
-        self.position = first + count
-        return block
+        return self._take(count)
 
     def look_for_overloads(self) -> None:
         """Latch the inputs that have clipped since the last call."""

@@ -90,7 +90,7 @@ def available(task: Task) -> int:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
         task.rig.pace.pass_time(task.rig, QUESTION_S)
-    return min(task.acquisition.available, task.acquisition.buffer_size)
+    return task.acquisition.available
 
 
 def newest(task: Task) -> int:
@@ -105,7 +105,7 @@ def count_available(task: Task) -> int:
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
     acquisition.queried_at = acquisition.position
-    return min(acquisition.available, acquisition.buffer_size)
+    return acquisition.available
 
 
 def _read_on_demand(task: Task, samples: int) -> Reading:
@@ -139,7 +139,7 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
         if not has_come:
             piece = max(0, min(piece, acquisition.acquired - first - taken))
             status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE)
-        blocks.append(acquisition.read_at(first + taken, piece))
+        blocks.append(acquisition.read(piece))
         taken += piece
         task.rig.changed.notify_all()
         if not has_come:

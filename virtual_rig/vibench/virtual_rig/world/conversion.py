@@ -258,6 +258,30 @@ class ConverterInput:
         return counts
 
 
+class SampleQueue:
+    """Samples in order of time, stored until they are taken."""
+
+    def __init__(self, channels: int) -> None:
+        self._empty = np.empty((channels, 0))
+        self._blocks: deque[FloatArray] = deque()
+
+    def append(self, block: FloatArray) -> None:
+        """Store samples, shape (channels, samples)."""
+        self._blocks.append(block)
+
+    def take(self, count: int) -> FloatArray:
+        """Return and remove the ``count`` oldest samples, shape (channels, count)."""
+        parts = [self._empty]
+        while count > 0:
+            block = self._blocks.popleft()
+            if block.shape[1] > count:
+                self._blocks.appendleft(block[:, count:])
+                block = block[:, :count]
+            parts.append(block)
+            count -= block.shape[1]
+        return np.concatenate(parts, axis=1)
+
+
 class Conversion:
     """A running conversion: samples are computed while the world advances, and stored until read."""
 
@@ -277,21 +301,13 @@ class Conversion:
         self._end = end
         self._converted = 0
         self._handed_out = 0
-        self._waiting: deque[FloatArray] = deque()
+        self._waiting = SampleQueue(len(inputs))
 
     def read(self, count: int) -> FloatArray:
         """Return the next ``count`` samples, shape (inputs, count) [V]; the world advances as necessary."""
         self._advance(self._step_after(self._handed_out + count))
-        parts, missing = [np.empty((len(self._inputs), 0))], count
-        while missing > 0:
-            part = self._waiting.popleft()
-            if part.shape[1] > missing:
-                self._waiting.appendleft(part[:, missing:])
-                part = part[:, :missing]
-            parts.append(part)
-            missing -= part.shape[1]
         self._handed_out += count
-        return np.concatenate(parts, axis=1)
+        return self._waiting.take(count)
 
     def overloaded(self) -> NDArray[np.bool_]:
         """Return which inputs have clipped since the last call, shape (inputs,)."""
