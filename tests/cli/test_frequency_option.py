@@ -10,25 +10,26 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
     assert frequencies("260") == (260.0,)
     assert frequencies("10:11:0.5") == (10.0, 10.5, 11.0)
     assert frequencies("10:10:1") == (10.0,)
+    assert frequencies("10:30:10") == (10.0, 20.0, 30.0)
 
 
 @pytest.mark.parametrize(
     ("typed", "why", "way"),
     [
-        ("600:10:1", "600 Hz lies above the stop of 10 Hz", "give 10:600:1"),
-        ("10:600:0", "a step of 0 Hz is not above 0", "START:STOP:STEP"),
-        ("10:600:-1", "a step of -1 Hz is not above 0", "START:STOP:STEP"),
-        ("600:10:-1", "a step of -1 Hz is not above 0", "START:STOP:STEP"),
-        ("abc", "'abc' is no number", "one frequency above 0 Hz"),
+        ("600:10:1", "600 is not below 10", "START:STOP:STEP"),
+        ("10:600:0", "0 is not above 0", "START:STOP:STEP"),
+        ("10:600:-1", "-1 is not above 0", "START:STOP:STEP"),
+        ("600:10:-1", "-1 is not above 0", "START:STOP:STEP"),
+        ("abc", "'abc' is no number", "one above 0 Hz"),
         ("10:abc:1", "'abc' is no number", "START:STOP:STEP"),
-        ("10:600", "2 numbers are neither", "START:STOP:STEP"),
-        ("10:600:1:2", "4 numbers are neither", "START:STOP:STEP"),
-        ("0:600:1", "0 Hz is not above 0", "one frequency above 0 Hz"),
-        ("-5", "-5 Hz is not above 0", "one frequency above 0 Hz"),
-        ("inf", "'inf' is not finite", "one frequency above 0 Hz"),
+        ("10:600", "2 numbers are not allowed", "START:STOP:STEP"),
+        ("10:600:1:2", "4 numbers are not allowed", "START:STOP:STEP"),
+        ("0:600:1", "0 is not above 0", "one above 0 Hz"),
+        ("-5", "-5 is not above 0", "one above 0 Hz"),
+        ("inf", "'inf' is not finite", "one above 0 Hz"),
         ("10:nan:1", "'nan' is not finite", "START:STOP:STEP"),
         ("1:1e9:1e-3", "1e+12 values is too long: at most 1000000", "give a larger step"),
-        ("", "'' is no number", "one frequency above 0 Hz"),
+        ("", "'' is no number", "one above 0 Hz"),
     ],
 )
 def test_what_lists_no_frequency_is_refused_with_what_was_typed_why_and_a_way_out(typed, why, way):

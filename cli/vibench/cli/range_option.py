@@ -52,8 +52,9 @@ def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
         raise ValueError(f"{len(numbers)} numbers are not allowed here")
     if min(numbers) <= 0.0:
         raise ValueError(f"{min(numbers):g} is not above 0")
-    if len(numbers) > 1 and numbers[0] >= numbers[1]:
-        raise ValueError(f"{numbers[0]:g} is not below {numbers[1]:g}")
+    start, *others = numbers
+    if others and (start > others[0] or others == [start]):  # a range with a step may hold one value
+        raise ValueError(f"{start:g} is not below {others[0]:g}")
     return numbers
 
 
@@ -67,36 +68,15 @@ def _number(part: str) -> float:
     return number
 
 
-_RANGE_PARTS = 3
-_ADVICE = "give one frequency above 0 Hz, or START:STOP:STEP [Hz] such as 10:600:1"
-
-
 def frequencies(text: str) -> tuple[float, ...]:
     """Parse ``260`` or ``10:600:1``.
 
-    Raises InvalidRequest for other text, an empty list or too many values.
+    Raises InvalidRequest for other text, or too many values.
     """
+    asked = range_of(text, Parameter.FREQUENCY, (1, 3))
+    if asked.stop is None or asked.step is None:
+        return (asked.start,)
     try:
-        numbers = [_number(part) for part in text.split(":")]
+        return frequency_range(asked.start, asked.stop, asked.step)
     except ValueError as error:
-        raise _refusal(text, f"{error}; {_ADVICE}") from error
-    if len(numbers) not in (1, _RANGE_PARTS):
-        raise _refusal(text, f"{len(numbers)} numbers are neither a frequency nor a range; {_ADVICE}")
-    if numbers[0] <= 0.0:
-        raise _refusal(text, f"{numbers[0]:g} Hz is not above 0; {_ADVICE}")
-    if len(numbers) == 1:
-        return (numbers[0],)
-    start, stop, step = numbers
-    if step <= 0.0:
-        raise _refusal(text, f"a step of {step:g} Hz is not above 0; {_ADVICE}")
-    if start > stop:
-        way = f"give {stop:g}:{start:g}:{step:g}, and --start down to come from above"
-        raise _refusal(text, f"the start of {start:g} Hz lies above the stop of {stop:g} Hz; {way}")
-    try:
-        return frequency_range(start, stop, step)
-    except ValueError as error:
-        raise _refusal(text, f"{error}; give a larger step") from error
-
-
-def _refusal(text: str, why: str) -> InvalidRequest:
-    return InvalidRequest(f"--frequency was given as {text!r}: {why}")
+        raise InvalidRequest(f"--frequency was given as {text!r}: {error}; give a larger step") from error
