@@ -41,8 +41,3 @@ def test_no_message_ends_before_it_is_complete(data, draw):
     message = b"DATA EMEM," + as_block(data) + b"\n"
     cut = draw.draw(st.integers(0, len(message) - 1))
     assert message_end(message[:cut]) is None
-
-
-def test_an_indefinite_block_lasts_to_the_end_of_the_message():
-    (upload,) = units(b"DATA EMEM,#0\x01\x02;\n\x03")
-    assert block(upload.parameters[1]) == b"\x01\x02;\n\x03"

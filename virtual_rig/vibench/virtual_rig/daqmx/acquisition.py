@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from nidaqmx.constants import (
     AcquisitionType,
-    RegenerationMode,
     SampleTimingType,
 )
 from nidaqmx.error_codes import DAQmxErrors
@@ -80,29 +79,11 @@ class LogSettings:
     group: str
 
 
-@dataclass
-class InputSettings:
-    """Read settings of a task."""
-
-    buffer_size: int | None = None
-    """None: chosen from rate and samples."""
-    logging: LogSettings | None = None
-
-
 class StartsItself(Enum):
     """Whether a write starts a stopped task."""
 
     YES = auto()
     NO = auto()
-
-
-@dataclass
-class OutputSettings:
-    """Write settings of a task."""
-
-    buffer_size: int = 0
-    """0: the size of the first writes."""
-    regeneration: RegenerationMode = RegenerationMode.ALLOW_REGENERATION
 
 
 def check_memory(samples: int, channels: int) -> None:

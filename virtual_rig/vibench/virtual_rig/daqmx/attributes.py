@@ -160,16 +160,16 @@ def _space(task: Task) -> int:
 
 def _set_regeneration(task: Task, mode: int) -> None:
     task.require_stopped()
-    task.writing.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
+    task.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
 
 
 def _set_input_buffer(task: Task, size: int) -> None:
-    task.reading.buffer_size = size
+    task.input_size = size
 
 
 def _set_output_buffer(task: Task, size: int) -> None:
     check_memory(size, len(task.outputs))
-    task.writing.buffer_size = size
+    task.output_size = size
     task.buffer = None
 
 
@@ -222,7 +222,7 @@ READ: Attributes = {
 }
 WRITE: Attributes = {
     "NUM_CHANS": Attribute(lambda task: len(task.outputs)),
-    "REGEN_MODE": Attribute(lambda task: task.writing.regeneration, _set_regeneration),
+    "REGEN_MODE": Attribute(lambda task: task.regeneration, _set_regeneration),
     "SPACE_AVAIL": Attribute(_space),
     "TOTAL_SAMP_PER_CHAN_GENERATED": Attribute(_total_generated),
 }

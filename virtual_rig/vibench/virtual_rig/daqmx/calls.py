@@ -249,7 +249,7 @@ def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
     if mode is LoggingMode.LOG_AND_READ and operation is not LoggingOperation.CREATE_OR_REPLACE:
         raise unsupported_value("Logging_TDMS_Operation", operation.name, "CREATE_OR_REPLACE")
     settings = LogSettings(Path(request.file_path), request.group_name or task.name)
-    task.reading.logging = None if mode is LoggingMode.OFF else settings
+    task.logging = None if mode is LoggingMode.OFF else settings
     return NOTHING
 
 

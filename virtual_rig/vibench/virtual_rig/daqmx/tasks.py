@@ -7,13 +7,13 @@ from enum import IntEnum
 from importlib.util import find_spec
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, SampleTimingType, TaskMode
+from nidaqmx.constants import AcquisitionType, RegenerationMode, SampleTimingType, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 
-from .acquisition import Acquisition, InputSettings, LogSettings, OutputSettings, Timing, check_memory
+from .acquisition import Acquisition, LogSettings, Timing, check_memory
 from .channels import Channel, InputChannel, OutputChannel, expand
 from .devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
 from .errors import DaqmxRefusal, unsupported_value
@@ -93,8 +93,12 @@ class Task:
         self.rig = rig
         self.state = TaskState.UNVERIFIED
         self.timing = Timing()
-        self.reading = InputSettings()
-        self.writing = OutputSettings()
+        self.input_size: int | None = None
+        """Buffer size in samples per channel; None: chosen from rate and samples."""
+        self.logging: LogSettings | None = None
+        self.output_size = 0
+        """Buffer size in samples per channel; 0: the size of the first writes."""
+        self.regeneration = RegenerationMode.ALLOW_REGENERATION
         self.inputs: list[InputChannel] = []
         self.outputs: list[OutputChannel] = []
         self.acquisition: Acquisition | None = None
@@ -152,8 +156,8 @@ class Task:
         """Size of the input buffer in samples per channel."""
         if self.kind is SampleTimingType.ON_DEMAND:
             return 0
-        if self.reading.buffer_size is not None:
-            return self.reading.buffer_size
+        if self.input_size is not None:
+            return self.input_size
         if self.timing.mode is AcquisitionType.FINITE:
             return self.timing.samples
         usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if self.rate_hz <= limit_hz)
@@ -309,7 +313,7 @@ class Task:
     def output_buffer(self) -> OutputBuffer:
         """Return the output buffer, created at first use."""
         if self.buffer is None:
-            self.buffer = OutputBuffer(len(self.outputs), self.writing.buffer_size)
+            self.buffer = OutputBuffer(len(self.outputs), self.output_size)
         return self.buffer
 
     def _begin(self) -> None:
@@ -323,8 +327,11 @@ class Task:
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
-        logging = self.reading.logging
-        self.log = None if logging is None else TdmsLog(logging, self.inputs, self.rate_hz, self.rig.wall_s)
+        self.log = (
+            None
+            if self.logging is None
+            else TdmsLog(self.logging, self.inputs, self.rate_hz, self.rig.wall_s)
+        )
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
@@ -358,7 +365,7 @@ class Task:
         physical = tuple(channel.physical for channel in self.outputs)
         return Generation(
             self.rig.world, physical, self.rate_hz, self.rig.now_s, self.timing.total,
-            self.output_buffer, self.writing.regeneration, self.outputs[0].outputs,
+            self.output_buffer, self.regeneration, self.outputs[0].outputs,
         )  # fmt: skip
 
     def is_done(self) -> bool:

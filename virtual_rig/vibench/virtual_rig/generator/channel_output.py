@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase
-from .scpi_message import ArbitraryMemory, ErrorCode, ScpiError, mnemonic_matches, short_form
+from .scpi_message import ArbitraryMemory, ErrorCode, ScpiError, mnemonic_matches
 from .terminal_voltage import (
     OUTPUT_RESISTANCE_OHM,
     Burst,
@@ -58,37 +58,23 @@ MODULATIONS = tuple(RunMode)[3:]
 """May be left on at the panel, and can be switched off remotely; their effect is not simulated."""
 
 
-class StandardShape(Enum):
-    """The shapes without a memory."""
-
-    SINE = "SINusoid"
-    SQUARE = "SQUare"
-    RAMP = "RAMP"
-    PULSE = "PULSe"
-    NOISE = "PRNoise"
-    DC = "DC"
-
-    @property
-    def short(self) -> str:
-        """Reply to a query."""
-        return short_form(self.value)
-
-
-SINE = StandardShape.SINE.short
-SQUARE = StandardShape.SQUARE.short
-RAMP = StandardShape.RAMP.short
-PULSE = StandardShape.PULSE.short
-NOISE = StandardShape.NOISE.short
-DC = StandardShape.DC.short
-
+SINE, SQUARE, RAMP, PULSE, NOISE, DC = "SIN", "SQU", "RAMP", "PULS", "PRN", "DC"
+_WORDS = {
+    "SINusoid": SINE,
+    "SQUare": SQUARE,
+    "RAMP": RAMP,
+    "PULSe": PULSE,
+    "PRNoise": NOISE,
+    "PRNO": NOISE,
+    "DC": DC,
+}
+"""Shapes without a memory; PRNO is a spelling of public drivers."""
 _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, NOISE: 25e6, DC: 1e6}
 
 
 def standard_shape(word: str) -> str | None:
-    """Return the canonical name of a shape without a memory; None for other words."""
-    if word.upper() in ("PRN", "PRNO"):  # spellings of public drivers and users
-        return NOISE
-    return next((shape.short for shape in StandardShape if mnemonic_matches(word, shape.value)), None)
+    """Return the short name of a shape without a memory; None for other words."""
+    return next((shape for known, shape in _WORDS.items() if mnemonic_matches(word, known)), None)
 
 
 class BurstMode(Enum):

@@ -16,13 +16,12 @@ from .scpi_message import (
     INFINITE,
     LONGEST_MESSAGE,
     ErrorCode,
-    HeaderPath,
-    HeaderPattern,
     ScpiError,
     Status,
     Unit,
     as_number,
     boolean,
+    header_pattern,
     message_end,
     mnemonic_matches,
     number as value_of,
@@ -45,17 +44,12 @@ class Command:
     """One command; without ``write`` it is query-only, without ``ask`` write-only."""
 
     header: str
-    """Header in the notation of manuals, see `HeaderPattern`."""
+    """Header in the notation of manuals, see `header_pattern`."""
     source: str
     write: Setter | None
     ask: Query | None
     channels: int = CHANNELS
     """Highest numeric suffix."""
-
-    @property
-    def pattern(self) -> HeaderPattern:
-        """Pattern that matches the header in a message."""
-        return HeaderPattern(self.header)
 
 
 def number(
@@ -239,7 +233,7 @@ class ScpiInstrument:
         """Arrival time of the current message."""
         self.clock = clock
         self.commands = (*commands, *COMMON_COMMANDS)
-        self._patterns = [(command.pattern, command) for command in self.commands]
+        self._patterns = [(header_pattern(command.header), command) for command in self.commands]
         self._identity = identity
         self._identity_is_due_empty = False
         self._next_delay_s = 0.0
@@ -293,11 +287,16 @@ class ScpiInstrument:
 
     def _answers(self, message: bytes) -> list[bytes]:
         """Execute all units of a message in order and return the replies."""
-        path = HeaderPath()
+        prefix = ""  # position in the command tree, to which headers are relative (SCPI-1999, 1, 6.2.4)
         answers: list[bytes] = []
         room = LONGEST_REPLY
         for unit in units(message):
-            header, path = (HeaderPath() if unit.starts_line else path).resolve(unit.header)
+            if unit.header.startswith("*"):
+                header = unit.header
+            else:
+                is_at_root = unit.starts_line or unit.header.startswith(":")
+                header = unit.header.removeprefix(":") if is_at_root else prefix + unit.header
+                prefix = header[: header.rfind(":") + 1]
             if unit.asks and room < 0:
                 continue
             try:
@@ -330,9 +329,8 @@ class ScpiInstrument:
     def _find(self, header: str) -> tuple[Command | None, int]:
         """Return the command of a header, and its numeric suffix."""
         for pattern, command in self._patterns:
-            suffix = pattern.match(header)
-            if suffix is not None:
-                return command, suffix
+            if found := pattern.fullmatch(header):
+                return command, int(found.groupdict().get("suffix") or 1)
         return None, 1
 
 

@@ -4,9 +4,9 @@ import math
 import re
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from decimal import Decimal
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,37 +54,23 @@ class ScpiError(Exception):
         self.code = code
 
 
-class Event(IntFlag):
-    """Bits of the standard event status register (IEEE 488.2-1992, 11.5.1)."""
-
-    NONE = 0
-    OPERATION_COMPLETE = 1
-    QUERY_ERROR = 4
-    DEVICE_ERROR = 8
-    EXECUTION_ERROR = 16
-    COMMAND_ERROR = 32
-    POWER_ON = 128
-
-
-_EVENT_OF_HUNDRED = {
-    1: Event.COMMAND_ERROR,
-    2: Event.EXECUTION_ERROR,
-    3: Event.DEVICE_ERROR,
-    4: Event.QUERY_ERROR,
-}
 BYTE = 255
 
 
+_OPERATION_COMPLETE, _POWER_ON = 1, 128
+"""Bits of the standard event status register (IEEE 488.2-1992, 11.5.1); that of an error is in `Status`."""
+
+
 class Status:
-    """Error queue and registers of one instrument."""
+    """Error queue and event register of one instrument."""
 
     def __init__(self) -> None:
         self._errors: deque[ErrorCode] = deque()
-        self._events = Event.POWER_ON
+        self._events = _POWER_ON
 
     def report(self, code: ErrorCode) -> None:
         """Queue an error and set its bit in the event register."""
-        self._events |= _EVENT_OF_HUNDRED[-int(code) // 100]
+        self._events |= 1 << (6 - -int(code) // 100)  # -1xx command, -2xx execution, -4xx query error
         if len(self._errors) < QUEUE_LENGTH:
             self._errors.append(code)
         else:
@@ -94,49 +80,32 @@ class Status:
         """Return and remove the oldest error; NO_ERROR from an empty queue."""
         return self._errors.popleft() if self._errors else ErrorCode.NO_ERROR
 
-    def take_events(self) -> Event:
+    def take_events(self) -> int:
         """Return and clear the event register."""
-        events, self._events = self._events, Event.NONE
+        events, self._events = self._events, 0
         return events
 
     def operation_complete(self) -> None:
         """Record that all operations are complete (``*OPC``)."""
-        self._events |= Event.OPERATION_COMPLETE
+        self._events |= _OPERATION_COMPLETE
 
     def clear(self) -> None:
         """Clear queue and event register (``*CLS``)."""
         self._errors.clear()
-        self._events = Event.NONE
+        self._events = 0
 
 
 _NODE = re.compile(r"(?P<short>\*?[A-Z]+)(?P<rest>[a-z]*)(?P<suffix>#?)")
 
 
-@dataclass(frozen=True)
-class HeaderPattern:
-    """A header in the notation of manuals: capitals are the short form, brackets optional, # a number.
+def header_pattern(header: str) -> re.Pattern[str]:
+    """Return the pattern of a header in the notation of manuals; its group ``suffix`` is the number.
 
-    ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on. A missing number
-    means 1 (SCPI-1999, volume 1, 6.2.5.2).
+    Capitals are the short form, brackets optional, # a number that may be missing.
+    ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on.
     """
-
-    text: str
-    _expression: re.Pattern[str] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_expression", re.compile(_expression(self.text), re.IGNORECASE))
-
-    def match(self, header: str) -> int | None:
-        """Return the numeric suffix (1 if absent) if the header matches, else None."""
-        found = self._expression.fullmatch(header)
-        if found is None:
-            return None
-        return int(found.groupdict().get("suffix") or 1)
-
-
-def _expression(pattern: str) -> str:
-    expression = pattern.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
-    return _NODE.sub(_node_expression, expression)
+    expression = header.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
+    return re.compile(_NODE.sub(_node_expression, expression), re.IGNORECASE)
 
 
 def _node_expression(node: re.Match[str]) -> str:
@@ -145,24 +114,9 @@ def _node_expression(node: re.Match[str]) -> str:
     return f"{node['short']}{rest}{suffix}"
 
 
-@dataclass(frozen=True)
-class HeaderPath:
-    """Position in the command tree to which the next header is relative (SCPI-1999, volume 1, 6.2.4)."""
-
-    prefix: str = ""
-
-    def resolve(self, header: str) -> tuple[str, "HeaderPath"]:
-        """Return the full header and the path for the next unit."""
-        if header.startswith("*"):
-            return header, self
-        full = header[1:] if header.startswith(":") else self.prefix + header
-        return full, HeaderPath(full[: full.rfind(":") + 1])
-
-
 def mnemonic_matches(word: str, mnemonic: str) -> bool:
     """Return whether a word is the long or the short form of a mnemonic such as ``SINusoid``, in any case."""
-    short = "".join(letter for letter in mnemonic if not letter.islower())
-    return word.upper() in (short.upper(), mnemonic.upper())
+    return word.upper() in (short_form(mnemonic), mnemonic.upper())
 
 
 def short_form(mnemonic: str) -> str:
@@ -197,29 +151,24 @@ class Unit:
 def block_length(data: bytes, start: int) -> int | None:
     """Return the length of a block that begins at ``start``, or None while it is unknown.
 
-    Definite: ``#<d><n><n bytes>``; indefinite: ``#0`` up to the end of the message (IEEE 488.2-1992, 7.7.6).
-    A ``#`` that begins no block has length one.
+    ``#<d><n><n bytes>`` (IEEE 488.2-1992, 7.7.6). A ``#`` that begins no block of definite length has length
+    one.
     """
     if start + 1 >= len(data):
         return None
-    if data[start + 1] not in DIGITS:
-        return 1
-    digits = int(data[start + 1 : start + 2])
-    if digits == 0:
-        return max(len(data) - start, 2)
+    digits = int(data[start + 1 : start + 2]) if data[start + 1] in DIGITS else 0
     number = data[start + 2 : start + 2 + digits]
-    if not all(byte in DIGITS for byte in number):
+    if digits == 0 or not all(byte in DIGITS for byte in number):
         return 1
     if len(number) < digits:
         return None
     return 2 + digits + int(number)
 
 
-def _marks(data: bytes, ends_blocks: int | None = None) -> Iterator[tuple[int, int]]:
+def _marks(data: bytes) -> Iterator[tuple[int, int]]:
     """Yield (position, byte) of every separator, comma and newline outside quotes and blocks.
 
-    Stops at a block or string whose end has not arrived. A block of indefinite length extends to the end, or
-    to the byte ``ends_blocks``, because a stream has no other sign for the end of its message.
+    Stops at a block or string whose end has not arrived.
     """
     position = 0
     while position < len(data):
@@ -231,9 +180,6 @@ def _marks(data: bytes, ends_blocks: int | None = None) -> Iterator[tuple[int, i
             position = end + 1
         elif byte == BLOCK:
             length = block_length(data, position)
-            if ends_blocks is not None and data[position + 1 : position + 2] == b"0":
-                found = data.find(ends_blocks, position)
-                length = None if found < 0 else found - position
             if length is None or position + length > len(data):
                 return
             position += length
@@ -247,9 +193,9 @@ def message_end(data: bytes) -> int | None:
     """Return the end of the first complete message (after its newline), or None.
 
     A newline inside a quoted string or a binary block does not end a message, because an uploaded waveform
-    may contain the byte 0x0A. A block of indefinite length ends at the first newline.
+    may contain the byte 0x0A.
     """
-    for position, byte in _marks(data, ends_blocks=NEWLINE):
+    for position, byte in _marks(data):
         if byte == NEWLINE:
             return position + 1
     return None
@@ -380,12 +326,10 @@ def boolean(parameter: bytes) -> bool:
 
 
 def block(parameter: bytes) -> bytes:
-    """Return the data of a definite or indefinite binary block (IEEE 488.2-1992, 7.7.6)."""
+    """Return the data of a binary block of definite length (IEEE 488.2-1992, 7.7.6)."""
     if not parameter.startswith(b"#") or not parameter[1:2].isdigit():
         raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
     digits = int(parameter[1:2])
-    if digits == 0:
-        return parameter[2:]
     number = parameter[2 : 2 + digits]
     if not number.isdigit() or len(parameter) != 2 + digits + int(number):
         raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
