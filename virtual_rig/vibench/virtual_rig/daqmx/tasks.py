@@ -327,11 +327,8 @@ class Task:
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
-        self.log = (
-            None
-            if self.logging is None
-            else TdmsLog(self.logging, self.inputs, self.rate_hz, self.rig.wall_s)
-        )
+        if self.logging is not None:
+            self.log = TdmsLog(self.logging, self.inputs, self.rate_hz, self.rig.wall_s)
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from .channel_output import (
     MODULATIONS,
-    NOISE,
     OPEN_AMPLITUDE_RANGE_VPP,
     OPEN_PEAK_V,
     BurstMode,
@@ -255,8 +254,7 @@ def _write_shape(generator: AFG1022, channel: int, parameters: Parameters) -> No
 
 def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
     none(parameters)
-    name = generator.settings(channel).shape
-    return b"PRN" if name == NOISE else name.encode("ascii")
+    return generator.settings(channel).shape.encode("ascii")
 
 
 def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:

@@ -70,7 +70,8 @@ class Status:
 
     def report(self, code: ErrorCode) -> None:
         """Queue an error and set its bit in the event register."""
-        self._events |= 1 << (6 - -int(code) // 100)  # -1xx command, -2xx execution, -4xx query error
+        hundred = -int(code) // 100
+        self._events |= 1 << (6 - hundred)  # bit 5: command, 4: execution, 3: device, 2: query error
         if len(self._errors) < QUEUE_LENGTH:
             self._errors.append(code)
         else:
