@@ -8,7 +8,6 @@ from nidaqmx._stubs import nidaqmx_pb2, nidaqmx_pb2_grpc
 from nidaqmx.constants import AcquisitionType, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqReadError, RpcError
-from nidaqmx.system import System
 from session_pb2 import Session
 
 from vibench.virtual_rig.daqmx.errors import Fault, ServerGone
@@ -133,15 +132,6 @@ def test_a_chassis_tells_its_trigger_terminal_once_it_is_reserved(daq):
     assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
 
 
-def test_resetting_a_device_stops_its_tasks_and_frees_it(daq, task):
-    task.start()
-    System.remote(daq.options).devices["Dev1"].reset_device()
-    assert not daq.world.conversions
-    rival = daq.task()
-    rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
-    rival.start()
-
-
 def test_a_world_that_cannot_begin_leaves_the_device_free(daq):
     daq.world.slowest_hz = 2000.0
     task = daq.task()
@@ -225,12 +215,3 @@ def test_a_number_that_is_no_member_of_its_enum_is_refused_by_name(daq, task, na
         getattr(nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel), name)(request)
     assert ("ni-error", str(DAQmxErrors.INVALID_ATTRIBUTE_VALUE.value)) in refused.value.trailing_metadata()
     assert "Requested Value: 77" in refused.value.details()
-
-
-def test_waveforms_that_are_none_are_refused(daq):
-    output = daq.task("play")
-    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
-    request = nidaqmx_pb2.WriteAnalogWaveformsRequest(task=Session(name="play"))
-    with pytest.raises(grpc.RpcError) as refused:
-        nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel).WriteAnalogWaveforms(request)
-    assert "number of waveforms" in refused.value.details()

@@ -27,7 +27,7 @@ from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem
 from .channels import OutputChannel
 from .data_calls import count_available, default_samples, newest
-from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
+from .devices import AnalogInputs, Device, Idle, Overloads
 from .errors import DaqmxRefusal, member, unsupported_value
 from .rig import QUESTION_S
 from .tasks import Task, TaskState
@@ -90,20 +90,10 @@ def not_supported(name: str, where: str) -> DaqmxRefusal:
     return DaqmxRefusal(DAQmxErrors.ATTR_NOT_SUPPORTED, f"Property: {name}\n{where}")
 
 
-def _inputs(device: Device) -> AnalogInputs:
-    if device.inputs is None:
-        raise not_supported("analogue input", f"Device: {device.name} ({device.product_type})")
-    return device.inputs
-
-
-def _outputs(device: Device) -> AnalogOutputs:
+def _output_range(device: Device) -> list[float]:
     if device.outputs is None:
         raise not_supported("analogue output", f"Device: {device.name} ({device.product_type})")
-    return device.outputs
-
-
-def _both_signs(ranges_v: tuple[float, ...]) -> list[float]:
-    return [limit for full_scale in ranges_v for limit in (-full_scale, full_scale)]
+    return [-device.outputs.range_v, device.outputs.range_v]
 
 
 def _start_terminal(task: Task) -> str:
@@ -152,12 +142,6 @@ def _total_generated(task: Task) -> int:
     return task.generation.generated
 
 
-def _space(task: Task) -> int:
-    if task.generation is not None:
-        return task.generation.space
-    return task.output_buffer.size - task.output_buffer.filled
-
-
 def _set_regeneration(task: Task, mode: int) -> None:
     task.require_stopped()
     task.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
@@ -189,13 +173,9 @@ DEVICE: Attributes = {
     "PRODUCT_CATEGORY": Attribute(lambda device: device.category),
     "SERIAL_NUM": Attribute(lambda device: device.serial),
     "IS_SIMULATED": Attribute(lambda _: True),
-    "CHASSIS_MODULE_DEV_NAMES": Attribute(lambda device: ", ".join(device.modules)),
     "AI_PHYSICAL_CHANS": Attribute(lambda device: ", ".join(device.input_names)),
-    "AI_VOLTAGE_RNGS": Attribute(lambda device: _both_signs(_inputs(device).ranges_v)),
-    "AI_MAX_SINGLE_CHAN_RATE": Attribute(lambda device: _inputs(device).rates.maximum_hz),
     "AO_PHYSICAL_CHANS": Attribute(lambda device: ", ".join(device.output_names)),
-    "AO_VOLTAGE_RNGS": Attribute(lambda device: _both_signs((_outputs(device).range_v,))),
-    "AO_MAX_RATE": Attribute(lambda device: _outputs(device).rates.maximum_hz),
+    "AO_VOLTAGE_RNGS": Attribute(_output_range),
 }
 TASK: Attributes = {
     "NAME": Attribute(lambda task: task.name),
@@ -223,7 +203,6 @@ READ: Attributes = {
 WRITE: Attributes = {
     "NUM_CHANS": Attribute(lambda task: len(task.outputs)),
     "REGEN_MODE": Attribute(lambda task: task.regeneration, _set_regeneration),
-    "SPACE_AVAIL": Attribute(_space),
     "TOTAL_SAMP_PER_CHAN_GENERATED": Attribute(_total_generated),
 }
 BUFFER: Attributes = {

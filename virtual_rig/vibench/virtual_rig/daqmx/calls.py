@@ -84,14 +84,6 @@ class DaqmxSystem:
             raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
         return device
 
-    def reset_device(self, name: str) -> None:
-        """Abort every task on a device, and on the modules in it."""
-        device = self.device(name)
-        touched = {device.name, *device.modules}
-        for task in self.tasks.values():
-            if any(used.name in touched for used in task.devices):
-                task.abort()
-
     def inputs(self, names: str) -> tuple[str, ...]:
         """Return the physical inputs in a list of names and ranges."""
         return self._of_side(names, lambda device: device.input_names)
@@ -285,7 +277,6 @@ CALLS: Mapping[str, Call] = {
     # The client has already closed the event stream; nothing else needs to be undone.
     "UnregisterEveryNSamplesEvent": _does(task_of),
     "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
-    "ResetDevice": _does(lambda system, request: system.reset_device(request.device_name)),
 }
 """The calls by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
 # fmt: on

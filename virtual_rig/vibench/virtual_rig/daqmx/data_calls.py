@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .acquisition import Acquisition, StartsItself, check_memory
 from .calls import Call, DaqmxSystem, Fields, deadline, pick, task_of
-from .errors import DaqmxRefusal, unsupported_value
+from .errors import DaqmxRefusal
 from .generation import Generation
 from .rig import QUESTION_S
 from .tasks import Task
@@ -255,7 +255,6 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
 
 _SECONDS_1904_TO_1970 = 2_082_844_800
 """NI's time stamps count from 1904."""
-_READ_BITS = {"I16": 16, "I32": 32}
 
 
 def _read_scaled(system: DaqmxSystem, request: Any) -> Fields:
@@ -300,19 +299,10 @@ def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
     return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
 
 
-def _binary_reader(bits: int) -> Call:
-    """Return the call that reads unscaled samples of this many bits."""
-
-    def read_binary(system: DaqmxSystem, request: Any) -> Fields:
-        task = task_of(system, request)
-        require_inputs(task)
-        if task.inputs[0].inputs.bits > bits:
-            detail = f"{task.inputs[0].inputs.bits}-bit samples need the 32-bit call\nTask Name: {task.name}"
-            raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
-        reading = _read_what_fits(task, request)
-        return _response(reading, _lay_out(_counts(task, reading), request).astype(np.int64))
-
-    return read_binary
+def _read_counts(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    reading = _read_what_fits(task, request)
+    return _response(reading, _lay_out(_counts(task, reading), request).astype(np.int64))
 
 
 def _write(system: DaqmxSystem, request: Any) -> Fields:
@@ -324,16 +314,6 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
     rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
     return {"samps_per_chan_written": write(task, rows, _start(request), deadline(request.timeout))}
-
-
-def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
-    require_outputs(task)
-    rows = [np.array(waveform.y_data) for waveform in request.waveforms]
-    if len({row.size for row in rows}) != 1:
-        raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
-    _check_size(task, sum(row.size for row in rows), rows[0].size)
-    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), deadline(request.timeout))}
 
 
 def _read_what_fits(task: Task, request: Any) -> Reading:
@@ -392,7 +372,6 @@ DATA_CALLS: Mapping[str, Call] = {
     "ReadAnalogF64": _read_scaled,
     "ReadAnalogWaveforms": _read_waveforms,
     "ReadRaw": _read_raw,
-    **{f"ReadBinary{kind}": _binary_reader(bits) for kind, bits in _READ_BITS.items()},
+    "ReadBinaryI32": _read_counts,
     "WriteAnalogF64": _write,
-    "WriteAnalogWaveforms": _write_waveforms,
 }

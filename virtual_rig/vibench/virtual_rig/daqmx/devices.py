@@ -124,7 +124,6 @@ class Device:
     inputs: AnalogInputs | None = None
     outputs: AnalogOutputs | None = None
     chassis: str = ""
-    modules: tuple[str, ...] = ()
     pfi_lines: int = 0
 
     @property
@@ -157,7 +156,7 @@ class Device:
 
 CDAQ1 = Device(
     name="cDAQ1", product_type="cDAQ-9174", serial=0x01D0C0DE,
-    category=ProductCategory.COMPACT_DAQ_CHASSIS, modules=("cDAQ1Mod1",), pfi_lines=2,
+    category=ProductCategory.COMPACT_DAQ_CHASSIS, pfi_lines=2,
 )  # fmt: skip
 
 NI_9234 = Device(
@@ -237,10 +236,10 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
             f"The simulated {product_type} cannot be called {name!r}: another device is; "
             "nothing was started, choose another name"
         )
-    return Catalogue(tuple(_rename(device, old.name, name) for device in devices))
 
+    def renamed(text: str) -> str:
+        return name if text == old.name else text
 
-def _rename(device: Device, old: str, new: str) -> Device:
-    modules = tuple(new if module == old else module for module in device.modules)
-    chassis = new if device.chassis == old else device.chassis
-    return replace(device, name=new if device.name == old else device.name, modules=modules, chassis=chassis)
+    return Catalogue(
+        tuple(replace(each, name=renamed(each.name), chassis=renamed(each.chassis)) for each in devices)
+    )
