@@ -119,9 +119,7 @@ class Watching:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ending.set()
         # A blocked terminal must not keep the command from ending.
         self._thread.join(timeout=2.0)

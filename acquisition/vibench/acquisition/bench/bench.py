@@ -11,7 +11,6 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from threading import Event as Alarm
-from types import TracebackType
 from typing import Any, Self
 
 from vibench.sim.operating_system.this import (
@@ -199,9 +198,7 @@ class RigPower:
             self._closing.enter_context(closing(BenchLock.of(self.rig)))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._virtual = None
         self._closing.close()
 
@@ -270,9 +267,7 @@ class Bench:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         _leave(self._closing, error)
 
 

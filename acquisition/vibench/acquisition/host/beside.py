@@ -8,7 +8,6 @@ from contextlib import suppress
 from multiprocessing import parent_process
 from multiprocessing.connection import wait
 from threading import Condition, Thread
-from types import TracebackType
 from typing import Self
 
 from ..stopping.stop import MEMORY_RESERVE
@@ -75,9 +74,7 @@ class ClosedOnLeaving(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
-from types import TracebackType
 from typing import Any, Protocol
 
 from .channel_output import ChannelSettings
@@ -413,9 +412,7 @@ class ScpiSocket:
     def __enter__(self) -> "ScpiSocket":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

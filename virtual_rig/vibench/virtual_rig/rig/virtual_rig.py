@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
@@ -152,9 +152,7 @@ class VirtualRig:
             self._running = _Running(daq, socket, controller, play, starting.pop_all())
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         running, self._running = self._running, None
         if running is not None:
             running.closing.close()
