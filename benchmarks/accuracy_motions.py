@@ -1,8 +1,8 @@
 """Cost and error of every level on known motions, interleaved, so that a busy machine slows all alike.
 
 The motions are one of each kind, named by how they are driven. Cost is processor time over simulated time;
-errors are against `vibench.sim.accuracy_benchmark.independent_solution`, which shares nothing with the
-engine. `accuracy_page.py` makes docs/accuracy.md from it. SI units.
+errors are against `independent_solution`, which shares nothing with the engine. `accuracy_page.py` makes
+docs/accuracy.md from it. SI units.
 """
 
 import math
@@ -17,9 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.integrate import solve_ivp
-
-from vibench.sim.accuracy_benchmark.independent_solution import (
+from independent_solution import (
     STATE_UNITS,
     Place,
     independent_state,
@@ -28,6 +26,8 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
     rates_at,
     state_error,
 )
+from scipy.integrate import solve_ivp
+
 from vibench.sim.exponents.lyapunov import lyapunov_exponent
 from vibench.sim.motion.integrate import integrate
 from vibench.sim.motion.poincare import flow_derivative, smallest_period, stroboscopic_section

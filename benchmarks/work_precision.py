@@ -23,10 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from accuracy_motions import MOTIONS, Regime, settled_state
-from scipy.integrate import solve_ivp
-
-from vibench.sim import Accuracy, PowerLaw
-from vibench.sim.accuracy_benchmark.independent_solution import (
+from independent_solution import (
     Place,
     independent_state,
     law_of,
@@ -34,6 +31,9 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
     rates_at,
     state_error,
 )
+from scipy.integrate import solve_ivp
+
+from vibench.sim import Accuracy, PowerLaw
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.specimen.state import Floats
 

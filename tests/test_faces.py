@@ -49,7 +49,6 @@ ONE_FILE_ROOMS = (
     "errors",
     "figure_choices",
     "tables",
-    "analogue",
     "command",
     "stop_files",
 )

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import RK45
 
 from vibench.sim import Harmonic, Specimen
-from vibench.sim.accuracy_benchmark.independent_solution import Place, law_of, numbers_of, rates
+from vibench.sim.accuracy_benchmark.equations import Place, law_of, numbers_of, rates
 
 from .responses import Reals
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.independent_solution import independent_state, state_error
 from vibench.cli.paper.textbook_methods import (
     ode45,
     runge_kutta,
@@ -13,7 +14,6 @@ from vibench.cli.paper.textbook_methods import (
     textbook_states,
 )
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
-from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
 
 DRIVE = Harmonic(130.0, 20e-6, 0.3)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from benchmarks.independent_solution import independent_state
 from tests.sim.as_written import as_written, distance, paper
 from vibench.sim import (
     Accuracy,
@@ -19,7 +20,6 @@ from vibench.sim import (
     Specimen,
     integrate,
 )
-from vibench.sim.accuracy_benchmark.independent_solution import independent_state
 from vibench.sim.specimen.stops import Stops
 
 DRIVE = Harmonic(130.0, 20e-6)

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from vibench.sim import Accuracy, Harmonic, Hertz, RigidStops, gong2025, integrate
-from vibench.sim.accuracy_benchmark.independent_solution import (
+from benchmarks.independent_solution import (
     Place,
     independent_state,
     law_of,
@@ -14,6 +13,7 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
     rates_at,
     state_error,
 )
+from vibench.sim import Accuracy, Harmonic, Hertz, RigidStops, gong2025, integrate
 
 STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])

@@ -12,8 +12,8 @@ from benchmarks.accuracy_motions import (
     measure_motion,
     settled_state,
 )
+from benchmarks.independent_solution import independent_state, state_error
 from vibench.sim import Accuracy, integrate
-from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 

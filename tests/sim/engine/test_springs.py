@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.independent_solution import STATE_UNITS, independent_state, state_error
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.accuracy_benchmark.independent_solution import STATE_UNITS, independent_state, state_error
 from vibench.sim.scene.followed_run import FollowedRun
 
 DRIVES = [Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6), Harmonic(311.0, 40e-6, 0.7)]

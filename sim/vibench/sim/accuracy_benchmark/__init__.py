@@ -1,8 +1,7 @@
 """What an error costs for one scene, by every method that can answer it, measured on this machine.
 
 `vibench.sim.accuracy_benchmark.curve` has the curve of error over time, and
-`vibench.sim.accuracy_benchmark.independent_solution` a solution that shares nothing with the engine: DOP853
-on the paper's equations as a textbook writes them.
+`vibench.sim.accuracy_benchmark.equations` the paper's equations as a textbook writes them.
 
 >>> from vibench.sim import Harmonic, Scene, Target, gong2025
 >>> from vibench.sim.accuracy_benchmark.curve import scene_curve

@@ -1,0 +1,91 @@
+"""The paper's equations as a textbook writes them, for general solvers and second opinions. SI units.
+
+Nothing here is shared with the engine: no modes, no other unknowns in contact, no polynomial in place of
+a sine.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from ..specimen.drive import Harmonic
+from ..specimen.no_contact import NoContact
+from ..specimen.power_law import PowerLaw
+from ..specimen.rigid_stops import RigidStops
+from ..specimen.specimen import Specimen
+from ..specimen.state import Floats
+
+
+class Place(IntEnum):
+    """Where m1 is, as far as its force depends on it."""
+
+    ON_LOWER = -1
+    FLIGHT = 0
+    ON_UPPER = 1
+    ANYWHERE = 2
+    """Wherever p says."""
+
+
+class Law(NamedTuple):
+    """A law as numbers: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d; powers of p at every p."""
+
+    lower: float
+    upper: float
+    """Clearances; infinite where there is no stop."""
+    stiffness: float = 0.0
+    exponent: float = 1.0
+    loss: float = 0.0
+    reference: float = 1.0
+    terms: tuple[tuple[int, float], ...] = ()
+    """Each power, and its force at the reference [N]."""
+    beside: float = 0.0
+    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
+
+
+def law_of(specimen: Specimen) -> Law:
+    """Turn a specimen's contact into numbers."""
+    lower, upper = specimen.gaps_m
+    match specimen.contact:
+        case NoContact():
+            return Law(np.inf, np.inf)
+        case PowerLaw(reference=reference, terms=terms):
+            return Law(np.inf, np.inf, reference=reference, terms=terms)
+        case RigidStops():
+            msg = "Rigid stops push with no finite force: give a law that yields, such as hertz."
+            raise ValueError(msg)
+        case law:
+            return Law(lower, upper, *law.stops.term, law.stops.loss, beside=law.stops.spring_beside)
+
+
+def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:
+    """Masses, stiffnesses, dampings; amplitude, angular frequency and phase of the drive, shape (12,)."""
+    of_drive = (drive.amplitude_m, 2.0 * np.pi * drive.frequency_hz, drive.phase_rad)
+    return np.array([*specimen.masses, *specimen.stiffnesses, *specimen.dampings, *of_drive])
+
+
+def _stop_force(depth: Floats, rate: Floats, law: Law) -> Floats:
+    return (law.stiffness * depth**law.exponent + law.beside * depth) * (1.0 + law.loss * rate)
+
+
+def rates(time_s: float | Floats, state: Floats, place: Place, law: Law, numbers: Floats) -> Floats:
+    """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none.
+
+    ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
+    """
+    m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers
+    x, y, z, vx, vy, vz = state
+    angle = omega * time_s + phase
+    base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
+    p, rate = y - z, vy - vz
+    inner = k1 * p + c1 * rate
+    # A step that an implicit method only tries may lead beyond all numbers.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if place is not Place.FLIGHT and law.stiffness > 0.0:
+            inner = inner + _stop_force(np.maximum(p - law.upper, 0.0), rate, law)
+            inner = inner - _stop_force(np.maximum(-p - law.lower, 0.0), -rate, law)
+        for power, force in law.terms:
+            inner = inner + force * (p / law.reference) ** power
+        outer = k2 * (z - x) + c2 * (vz - vx)
+        ahead = (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0
+        return np.array([vx, vy, vz, ahead, -inner / m1, (inner - outer) / m2])
