@@ -27,10 +27,11 @@ from independent_solution import (
     state_error,
 )
 from scipy.integrate import solve_ivp
+from stroboscopic_section import stroboscopic_section
 
 from vibench.sim.exponents.lyapunov import lyapunov_exponent
 from vibench.sim.motion.integrate import integrate
-from vibench.sim.motion.poincare import flow_derivative, smallest_period, stroboscopic_section
+from vibench.sim.motion.poincare import flow_derivative, smallest_period
 from vibench.sim.motion.response import steady_response
 from vibench.sim.scene.prediction import Ensemble, FoundMotion, MotionKind, ScenePrediction
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Scene

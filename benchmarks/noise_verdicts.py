@@ -17,13 +17,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from stroboscopic_section import stroboscopic_section
 
 import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.analysis import motion_verdict
 from vibench.analysis.chaos.period import Points
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.motion.poincare import stroboscopic_section
 
 DRIVE_HZ = 260.0
 NOISE = 1e-5

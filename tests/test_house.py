@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_360,
+    "acquisition": 28_340,
     "analysis": 32_420,
-    "cli": 5_115,
+    "cli": 5_095,
     "extensions": 2_720,
     "gui": 12_440,
     "native": 6_625,
-    "sim": 21_130,
+    "sim": 20_930,
     "studies": 3_200,
-    "virtual_rig": 8_380,
+    "virtual_rig": 7_790,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

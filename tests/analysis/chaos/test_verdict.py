@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from benchmarks.noise_verdicts import noise_points, regular_points
+from benchmarks.stroboscopic_section import stroboscopic_section
 from vibench.analysis import AnalysisError, motion_verdict
 from vibench.analysis.chaos.period import Points, shortest_period
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
-from vibench.sim.motion.poincare import stroboscopic_section
 
 DRIVE_HZ = 260.0
 QUIET = np.array([1e-5, 1e-5])

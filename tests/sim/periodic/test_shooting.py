@@ -3,8 +3,9 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.stroboscopic_section import stroboscopic_section
 from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate, periodic_orbit
-from vibench.sim.motion.poincare import smallest_period, stroboscopic_section
+from vibench.sim.motion.poincare import smallest_period
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap, ShootingEnd
 from vibench.sim.specimen.specimen import state_scales
 

@@ -1,4 +1,4 @@
-"""The stroboscopic map (one state per drive period), and the period of a motion. SI units."""
+"""The period of a motion from one state per drive period, and the derivative of its flow. SI units."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,35 +9,6 @@ from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
-from .integrate import integrate
-
-
-def stroboscopic_section(
-    specimen: Specimen,
-    drive: Harmonic,
-    periods: int,
-    accuracy: Accuracy = Accuracy.STANDARD,
-    initial_state: ArrayLike | None = None,
-) -> Floats:
-    """Integrate from time zero and return the state after every drive period, shape (periods, 6).
-
-    Raises ValueError when ``periods`` is below 1, or the run did not reach its end.
-    """
-    if periods < 1:
-        msg = f"A section of {periods} periods is not allowed: ask for 1 or more."
-        raise ValueError(msg)
-    run = integrate(
-        specimen,
-        drive,
-        periods / drive.frequency_hz,
-        accuracy,
-        initial_state,
-        sample_rate_hz=drive.frequency_hz,
-    )
-    if run.outcome is not Outcome.REACHED_END:
-        msg = f"The motion at {drive.frequency_hz} Hz and {drive.amplitude_m} m was lost: {run.outcome.text}."
-        raise ValueError(msg)
-    return run.states[1 : periods + 1]
 
 
 def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, most: int = 32) -> int | None:

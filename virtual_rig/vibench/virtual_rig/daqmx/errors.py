@@ -51,8 +51,6 @@ def unsupported_value(property_name: str, requested: object, allowed: str) -> Da
     )
 
 
-SERVER_GONE = "server gone"
-
 
 @dataclass(frozen=True, eq=False)
 class Fault:
