@@ -2,9 +2,11 @@
 
     python benchmarks/resonance_coverage.py --count 20 --seed 1
     python benchmarks/resonance_coverage.py --count 20 --seed 1 --shard 1/10 --save part1.json
+    python benchmarks/resonance_coverage.py --count 1 --seed 1 --scenes random --random 120
 
 Each scene is one mode with a damping ratio, a window and sensor noise, two or three modes close to each
-other, or the modes of the paper's specimen. A row gives how many of its modes were found, and in how many
+other, or the modes of the paper's specimen. `--random` adds scenes of two or three close modes drawn at
+random. A row gives how many of its modes were found, and in how many
 k = 2 holds frequency, damping and peak. A mode that is reported, explained and more than five standard
 deviations off is counted as wrong.
 """
@@ -12,7 +14,7 @@ deviations off is counted as wrong.
 import argparse
 import json
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +82,22 @@ def scenes() -> Iterator[tuple[str, Scene]]:
         yield f"{window:15} paper {damping_s:g} s noise {noise:g}", (window, noise, 1.0, modes)
 
 
+def random_scene(rng: np.random.Generator) -> Scene:
+    """Draw two or three modes, 0.25 to 3 half-power bandwidths apart, any window, noise and segment."""
+    natural_hz, damping = float(rng.uniform(150.0, 300.0)), float(10 ** rng.uniform(-2.3, -1.5))
+    apart_hz = float(rng.uniform(0.25, 3.0)) * 2 * damping * natural_hz
+    modes = [
+        (
+            natural_hz + apart_hz * place,
+            damping * float(rng.uniform(0.8, 1.25)),
+            float(rng.choice([-1.0, 1.0], p=[0.3, 0.7]) * rng.uniform(0.3, 1.2)) if place else 1.0,
+        )
+        for place in range(int(rng.integers(2, 4)))
+    ]
+    window, noise = str(rng.choice(list(WINDOWS))), float(10 ** rng.uniform(-3.0, -1.3))
+    return window, noise, float(rng.choice([1.0, 2.0, 4.0])), modes
+
+
 def scores(window: str, noise: float, segment_s: float, modes: list[Mode], rng: np.random.Generator) -> dict:
     """Measure once: errors over standard deviations of each mode that was found."""
     samples = int(SECONDS * RATE_HZ)
@@ -115,6 +133,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=20, help="measurements of each scene")
     parser.add_argument("--scenes", default="", help="only scenes whose names hold this text")
+    parser.add_argument("--random", type=int, default=0, help="scenes of close modes drawn at random")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
         "--shard", default="1/1", help="which part of the measurements: 3/10 is the third of ten"
@@ -125,7 +144,11 @@ def main() -> None:
     args = parser.parse_args()
     part, parts = map(int, args.shard.split("/"))
     kept = json.loads(args.save.read_text()) if args.save and args.save.exists() else {}
-    for number, (name, scene) in enumerate(scenes()):
+    drawn = (
+        (f"random {number}", random_scene(np.random.default_rng((args.seed, number))))
+        for number in range(args.random)
+    )
+    for number, (name, scene) in enumerate(chain(scenes(), drawn)):
         if args.scenes not in name:
             continue
         row = kept.setdefault(name, {})

@@ -47,6 +47,8 @@ class Resonance:
     lines_used: int
     is_resolved: bool
     """Whether the lines are fine enough for this bandwidth."""
+    overlap: float
+    """Factor by which a neighbour that overlaps widens the spread of the damping; 1 without one."""
 
     @property
     def is_explained(self) -> bool:
@@ -55,7 +57,9 @@ class Resonance:
 
     @property
     def remark(self) -> str:
-        """Sentence about a fit that does not describe its lines; empty where it does."""
+        """Sentence about a fit that does not describe its lines, or of modes that overlap; else empty."""
+        if self.is_explained and self.overlap > 1.0:
+            return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds allow for one between them"
         if self.is_explained:
             return ""
         return (
@@ -233,6 +237,8 @@ _MOST_STEPS = 40
 _STEADY_AVERAGES = 49.0
 """Averages that scatter steadied by neighbouring lines is worth."""
 _LEAST_LINES_ABOUT = 8
+_OVERLAP = 1.5
+"""Half-power bandwidths between two modes up to which their bounds allow for one more between them."""
 _EDGE = 1e-3
 """Part of its reach within which a fit ends at a bound: it has found no minimum."""
 
@@ -400,6 +406,15 @@ def modal_fit(
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom
     covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+    alone = np.diag(covariance)
+    hidden = _poles_between(poles)
+    if hidden.size:
+        # Lines that two overlapping modes describe may also be of three, whose dampings differ by far more.
+        columns = np.hstack((follows, lines.independent(lines.modes(hidden))))
+        curvature = np.asarray(columns.T @ columns)
+        if _condition(curvature) > _WORST_CONDITION:
+            return None
+        covariance = np.asarray(np.linalg.inv(curvature)[: alone.size, : alone.size])
 
     def curve(frequency_hz: Reals, poles: Reals) -> Complexes:
         return np.hstack((mode_shapes(frequency_hz, poles), background(frequency_hz)))
@@ -440,9 +455,20 @@ def modal_fit(
             chi_square_limit=chi_square_limit(max(round(beside), 1)),
             lines_used=lines.frequency_hz.size,
             is_resolved=2 * half_hz > RESOLVED_LINES * band.resolution_hz,
+            overlap=float(np.sqrt(covariance[2 * mode + 1, 2 * mode + 1] / alone[2 * mode + 1])),
         )
 
     return ModalFit(tuple(resonance(mode) for mode in range(poles.size // 2)), chi_square, freedom)
+
+
+def _poles_between(poles: Reals) -> Reals:
+    """Return the poles half way between two modes that overlap; three that overlap are taken to be all."""
+    modes = poles.reshape(-1, 2)
+    modes = modes[np.argsort(modes[:, 0])]
+    mean_bandwidth = np.exp(modes[:-1, 1]) + np.exp(modes[1:, 1])
+    overlaps = np.pad(np.diff(modes[:, 0]) < _OVERLAP * mean_bandwidth, 1)
+    are_two = overlaps[1:-1] & ~overlaps[:-2] & ~overlaps[2:]
+    return np.asarray((modes[:-1] + modes[1:])[are_two] / 2)
 
 
 def _condition(curvature: Reals) -> float:

@@ -217,11 +217,12 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
     if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
         return False
-    if found.sd_damping_ratio > _LARGEST_RELATIVE_SD_DAMPING * damping:
+    relative_sd = found.sd_damping_ratio / found.overlap / damping
+    if relative_sd > _LARGEST_RELATIVE_SD_DAMPING:
         return False
     if found.half_power_bandwidth_hz < lines.narrowest_hz:
         return False
-    known = min(lines.relative_sd(natural_hz), found.sd_damping_ratio / damping)
+    known = min(lines.relative_sd(natural_hz), relative_sd)
     return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
 
 
