@@ -314,7 +314,7 @@ class Lines:
             over = damping * natural / (1j * pole.imag)
             (first, one), (second, other) = both
             columns += [natural * over * (one - other), over * (first * one - second * other)]
-        return np.stack(columns, axis=1)
+        return np.reshape(columns, (-1, self.frequency_hz.size)).T
 
 
 def mode_shapes(frequency_hz: Reals, poles: Reals) -> Complexes:
@@ -327,7 +327,7 @@ def mode_shapes(frequency_hz: Reals, poles: Reals) -> Complexes:
         ratio, damping = frequency_hz / np.exp(log_frequency), np.exp(log_damping)
         mode = 2 * damping / (1 - ratio**2 + 2j * damping * ratio)
         columns += [mode, 1j * ratio * mode]
-    return np.stack(columns, axis=1)
+    return np.reshape(columns, (-1, frequency_hz.size)).T
 
 
 @dataclass(frozen=True)
@@ -405,16 +405,14 @@ def modal_fit(
         return None
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom
-    covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
-    alone = np.diag(covariance)
-    hidden = _poles_between(poles)
-    if hidden.size:
-        # Lines that two overlapping modes describe may also be of three, whose dampings differ by far more.
-        columns = np.hstack((follows, lines.independent(lines.modes(hidden))))
-        curvature = np.asarray(columns.T @ columns)
-        if _condition(curvature) > _WORST_CONDITION:
-            return None
-        covariance = np.asarray(np.linalg.inv(curvature)[: alone.size, : alone.size])
+    alone = np.diag(np.linalg.inv(curvature))
+    hidden = lines.modes(_poles_between(poles))
+    # Lines that two overlapping modes describe may also be of three, whose dampings differ by far more.
+    columns = np.hstack((follows, lines.independent(hidden)))
+    curvature = np.asarray(columns.T @ columns)
+    if _condition(curvature) > _WORST_CONDITION:
+        return None
+    covariance = np.asarray(np.linalg.inv(curvature)[: alone.size, : alone.size])
 
     def curve(frequency_hz: Reals, poles: Reals) -> Complexes:
         return np.hstack((mode_shapes(frequency_hz, poles), background(frequency_hz)))
