@@ -103,6 +103,8 @@ def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told
         ("began = 2026-01-01\n", "began = 2026-01-01: give a date, time and time zone, such as 2026-"),
         ("began = 2026-01-01T00:00:00\n", "began = 2026-01-01T00:00:00: give a date, time and time zone"),
         ('began = "yesterday"\n', "began = 'yesterday': give a date, time and time zone"),
+        ("began = 1\n", "began = 1: give a date, time and time zone"),
+        ('began = "-1.5"\n', "began = '-1.5': give a date, time and time zone"),
     ],
 )
 def test_what_a_value_should_be_is_said_without_a_word_of_python(tmp_path, text, told):

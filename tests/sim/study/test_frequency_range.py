@@ -45,7 +45,7 @@ def test_what_is_no_range_is_left_to_its_validator():
     assert expand_ranges([1.0, "two"]) == [1.0, "two"]
 
 
-@pytest.mark.parametrize("start", ["true", None, "20"])
+@pytest.mark.parametrize("start", ["true", None, "20", True])
 def test_a_range_takes_three_numbers(start):
     with pytest.raises(ValueError, match="give three numbers"):
         expand_ranges({"start": start, "stop": 2.0, "step": 1.0})

@@ -1,5 +1,6 @@
 """Base class of every model that a TOML or JSON file describes."""
 
+import re
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
@@ -12,12 +13,21 @@ def _number(given: object) -> object:
     return given
 
 
+def _time(given: object) -> object:
+    if isinstance(given, int | float) or (isinstance(given, str) and not re.match(r"\d{4}-\d", given)):
+        raise PydanticCustomError("datetime_type", "give a date, time and time zone")
+    return given
+
+
 def _with_numbers_only(schema: Any) -> Any:
     """Return a core schema that reads only numbers as numbers and only booleans as booleans."""
     match schema:
         case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
             # pydantic's own strict mode would also refuse 1e3 for an integer, and numpy's numbers.
             return core_schema.no_info_before_validator_function(_number, {**schema})
+        case {"type": "datetime"}:
+            # pydantic reads 1 and "1" as seconds since 1970.
+            return core_schema.no_info_before_validator_function(_time, {**schema})
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:

@@ -60,14 +60,10 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 def expand_ranges(given: object) -> object:
     """Replace tables with start, stop and step by their values; anything else is left to its validator."""
     match given:
-        case {
-            "start": float() | int() as start,
-            "stop": float() | int() as stop,
-            "step": float() | int() as step,
-            **rest,
-        } if not rest:
-            return frequency_range(_number(start), _number(stop), _number(step))
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
+            # Not isinstance: true is an int too.
+            if {type(start), type(stop), type(step)} <= {float, int}:
+                return frequency_range(_number(start), _number(stop), _number(step))
             raise ValueError(
                 f"a range from {start!r} to {stop!r} in steps of {step!r} is not allowed: give three numbers"
             )
