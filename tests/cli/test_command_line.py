@@ -210,7 +210,7 @@ def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stan
     vibench_here, tmp_path, words
 ):
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
-    assert result.returncode == 2
+    assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
     assert f"{words[-1].removeprefix('--gap=')!r} is no number; give one in SI units" in said
 
@@ -229,7 +229,7 @@ def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(
     vibench_here, tmp_path, words, said
 ):
     result = vibench_here(*words, cwd=tmp_path)
-    assert result.returncode == 2
+    assert result.returncode == 1
     assert said in " ".join(result.stderr.replace("│", " ").split())
 
 
@@ -247,7 +247,7 @@ def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(
 def test_nothing_is_no_path_and_no_name(vibench_here, tmp_path, words, place):
     """An empty variable of the shell filled the folder that the user stood in."""
     result = vibench_here(*words, cwd=tmp_path)
-    assert result.returncode == 2
+    assert result.returncode == 1
     assert f"{place} was given as '', with nothing in it" in " ".join(result.stderr.replace("│", " ").split())
     assert list(tmp_path.iterdir()) == []
 

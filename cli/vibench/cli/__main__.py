@@ -37,7 +37,7 @@ from vibench.stop_files import SWITCH_OFF
 
 from . import environment  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
-from .options import SectionedCommand, SectionedGroup, with_options
+from .options import SectionedCommand, SectionedGroup, with_options, words_of
 from .output import errors
 
 
@@ -118,19 +118,21 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     """Refuse empty arguments, and add the given and the allowed value to usage errors."""
-    words = ["", *(part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each]))]
+    words = ["", *words_of(args)]
     empty = next((before for before, word in pairwise(words) if not word), None)
-    if empty is not None:
-        place = empty if empty.startswith("--") else "an argument"
-        raise typer.BadParameter(
-            f"{place} was given as '', with nothing in it; give a value, or leave it out. A variable of the "
-            "shell that is not set leaves nothing there."
-        )
     try:
+        if empty is not None:
+            place = empty if empty.startswith("--") else "an argument"
+            raise typer.BadParameter(
+                f"{place} was given as '', with nothing in it; give a value, or leave it out. A variable of "
+                "the shell that is not set leaves nothing there."
+            )
         yield
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
+        if type(error) is typer.BadParameter:  # a missing option is one too
+            error.exit_code = ExitCode.FAILED
         if args:  # without arguments, the message is the help
             error.message = printable(error.message)
         raise
@@ -150,8 +152,10 @@ def _add_given_value(error: typer.BadParameter, words: Sequence[str]) -> None:
 
 
 def _is_number(text: str) -> bool:
+    from vibench.sim import number_of
+
     try:
-        float(text)
+        number_of(text)
     except ValueError:
         return False
     return True

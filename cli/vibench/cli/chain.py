@@ -92,7 +92,7 @@ def chain(
 
 
 def _lengths(text: str) -> tuple[int, ...]:
-    parts = text.split(",")
+    parts = text.split(",") if text.isascii() else [""]
     if not all(part.strip().isdecimal() and 1 <= int(part) <= MOST_CELLS for part in parts):
         raise InvalidRequest(
             f"--cells was given as {text!r}; give a whole number from 1 to {MOST_CELLS}, "

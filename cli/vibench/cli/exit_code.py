@@ -9,8 +9,8 @@ class ExitCode(IntEnum):
     DONE = 0
     """The command did everything that was requested."""
     FAILED = 1
-    """An error, or a part of the request failed; standard error has a sentence about it."""
+    """An error, a value that is not allowed, or a failed part; standard error has a sentence about it."""
     MISUSED = 2
-    """The command line is invalid."""
+    """A command or an option is unknown, or one is missing."""
     STOPPED = 3
     """The command was stopped without a failure; ``--resume`` continues."""

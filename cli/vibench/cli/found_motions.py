@@ -56,9 +56,13 @@ def forgetting_text(points: Sequence[ScenePrediction]) -> str:
         return ""
     ensembles = [point.ensemble for point in lost if point.ensemble is not None]
     starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
+    where = f"At {len(lost)} of {len(points)} points"
+    said = f"{where} the motion depends sensitively on the start, or did not settle."
+    if not ensembles:
+        averaged = sum(point.target.starts for point in lost if point.target is not None)
+        return f"{said} There the answer is a mean over starts, {averaged} in all." if averaged else said
     return (
-        f"At {len(lost)} of {len(points)} points the motion depends sensitively on the start, or did not "
-        f"settle. There {starts} starts were simulated for {followed_s:.0f} s in all; "
+        f"{said} There {starts} starts were simulated for {followed_s:.0f} s in all; "
         f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
     )
 

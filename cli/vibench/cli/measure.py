@@ -1,6 +1,6 @@
 """`vibench measure`: run a campaign, with one recording per measurement."""
 
-import re
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -43,6 +43,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
+from vibench.sim import number_of
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
@@ -123,11 +124,13 @@ def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | Non
 
 def duration_s(text: str) -> float:
     """Parse a time such as ``30min``, ``1.5 h`` or ``90 s`` [s]."""
-    found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*(s|min|h)\s*", text, re.ASCII)
-    seconds = float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2]] if found else 0.0
-    if not 0.0 < seconds < float("inf"):
-        raise typer.BadParameter(
-            f"{text!r} is not a time above zero; give a number with s, min or h, such as 30min"
+    try:
+        seconds = number_of(text, "s", "min", "h")
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds < math.inf:
+        raise vibench.analysis.InvalidRequest(
+            f"--within was given as {text!r}; give a time above zero with s, min or h, such as 30min"
         )
     return seconds
 

@@ -7,11 +7,12 @@ itself.
 
 import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from enum import Enum
 from functools import wraps
+from itertools import pairwise
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar, Union, get_args, get_origin
 
@@ -82,7 +83,8 @@ def validated(model: type[Request], given: Mapping[str, object]) -> Request:
         allowed = _ALLOWED.get(fault["type"], "").format(**fault.get("ctx", {}))
         said = allowed or fault["msg"].removeprefix("Value error, ")
         field = str(fault["loc"][0]) if fault["loc"] else ""
-        value = given.get(field) if fault["input"] is None else fault["input"]
+        typed = given.get(field)
+        value = typed if fault["input"] is None or isinstance(typed, str) else fault["input"]
         place = f"--{option_name(field)} was given as {value!r}: " if field else ""
         raise InvalidRequest(place + said) from error
 
@@ -187,11 +189,30 @@ def _parameter(model: "type[BaseModel]", name: str, panel: str | None) -> inspec
     )
 
 
+def words_of(args: Sequence[str]) -> list[str]:
+    """Return arguments with ``--name=value`` split in two."""
+    return [part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each])]
+
+
 class SectionedCommand(TyperCommand):
     """Prints its help as plain text, with separate sections for options with a heading.
 
     rich, which typer would use for its boxes, takes 75 ms to load.
     """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; refuse what only Python reads as a number, such as 1_0."""
+        kinds = getattr(self.callback, "__annotations__", {})
+        numeric = {
+            name: each
+            for each in self.get_params(ctx)
+            if isinstance(each, TyperOption) and _plain(kinds.get(each.name)) in (float, int)
+            for name in each.opts
+        }
+        for name, word in pairwise(words_of(args)):
+            if name in numeric and not (word.isascii() and "_" not in word):
+                raise typer.BadParameter("it should be a valid number", ctx, numeric[name])
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write sections for arguments, options and every other heading."""

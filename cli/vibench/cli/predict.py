@@ -21,6 +21,7 @@ from vibench.sim import (
     Scene,
     ScenePlan,
     ScenePrediction,
+    number_of,
     solve_scene,
 )
 from vibench.sim.background import Progress
@@ -74,8 +75,8 @@ def predict(
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, which it needs; give both")
-    given = {"duration_s": duration and _duration(duration), "budget_s": budget and _budget(budget)}
-    given |= {"error": error, "time_s": time_limit}
+    given = {"error": error, "time_s": time_limit, "budget_s": budget and _seconds("budget", budget)}
+    given["duration_s"] = duration if duration in (None, AUTO) else _seconds("duration", duration)
     typed = {name: value for name, value in given.items() if value is not None}
     _refuse_beside_target(typed.keys() | options.typed.keys())
     request = options.request(
@@ -166,20 +167,13 @@ def _observables(text: str) -> tuple[Observable, ...]:
     return tuple(Observable(name) for name in names)
 
 
-def _duration(text: str) -> float | str:
-    if text == AUTO:
-        return AUTO
+def _seconds(name: str, text: str) -> float:
     try:
-        return float(text)
+        return number_of(text, "ms", "s", "min", "h")
     except ValueError as error:
-        raise InvalidRequest(f"a duration of {text!r} was given; give seconds, or auto") from error
-
-
-def _budget(text: str) -> float:
-    try:
-        return float(text.removesuffix("s"))
-    except ValueError as error:
-        raise InvalidRequest(f"a budget of {text!r} was given; give seconds, as in 1s or 0.5") from error
+        other = f", or {AUTO}" if name == "duration" else ""
+        allowed = f"give seconds, as in 1s or 0.5{other}"
+        raise InvalidRequest(f"--{name} was given as {text!r}; {allowed}") from error
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
@@ -192,11 +186,12 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
     for _, run in groupby(range(len(plans)), lambda number: plans[number].alike):
         alike = list(run)
         measure_cost(scenes[alike[len(alike) // 2]])
-        passages.append(_passage([(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]))
+        each = [(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]
+        passages.append(_passage(each, has_target=study.target is not None))
     return "\n".join(filter(None, [*passages, forgetting_text(points)]))
 
 
-def _passage(points: Sequence[tuple[float, ScenePlan, float]]) -> str:
+def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
     """Return a paragraph on adjacent points solved the same way, for the point nearest to its stops.
 
     Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes a cost paid once per
@@ -204,7 +199,9 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]]) -> str:
     """
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
-    said = f"{' '.join(plan.sentences)} {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
+    said = " ".join(plan.sentences)
+    if not has_target:  # its time is in the answer
+        said += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
         said += f" {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import Parameter
+from vibench.sim import Parameter, number_of
 from vibench.sim.study import frequency_range
 
 _EXAMPLES = {
@@ -59,10 +59,7 @@ def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
 
 
 def _number(part: str) -> float:
-    try:
-        number = float(part)
-    except ValueError as error:
-        raise ValueError(f"{part!r} is no number") from error
+    number = number_of(part)
     if not math.isfinite(number):
         raise ValueError(f"{part!r} is not finite")
     return number

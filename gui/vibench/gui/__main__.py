@@ -17,7 +17,7 @@ from .window.open_window import display_trouble
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QLabel
 
-NO_WINDOW = 2
+NO_WINDOW = 1
 """Exit code where no window can be shown."""
 
 

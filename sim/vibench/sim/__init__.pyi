@@ -95,7 +95,11 @@ from .specimen.drive import (
     LogarithmicSweep as LogarithmicSweep,
     Sampled as Sampled,
 )
-from .specimen.frozen_model import FrozenModel as FrozenModel
+from .specimen.frozen_model import (
+    FrozenModel as FrozenModel,
+    number_of as number_of,
+    number_with as number_with,
+)
 from .specimen.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
 from .specimen.hunt_crossley import HuntCrossley as HuntCrossley
 from .specimen.linear_gap import LinearGap as LinearGap

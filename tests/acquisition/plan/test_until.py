@@ -67,3 +67,12 @@ def test_a_plan_of_before_has_no_until():
         Measurement.model_validate({"name": "a", "excitation": {"kind": "dwell", **KINDS["dwell"]}}).until
         is None
     )
+
+
+@pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
+def test_a_first_look_after_the_end_is_refused(kind, most_s):
+    """Steps of less than the usual 2 s, which plans have that do not name it, are analysed at their end."""
+    name = sorted(ALLOWED[kind])[0]
+    assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s
+    with pytest.raises(ValidationError, match=r"until\.shortest_s of .* is longer than the"):
+        plan(kind, {name: "1 %", "shortest_s": 1.01 * most_s})

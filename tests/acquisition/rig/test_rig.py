@@ -43,7 +43,7 @@ def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
         ("delay_s = 8e-6", "delay_s = -1.0", r"vibrometer\.delay_s = -1\.0: .*greater than or equal to 0"),
         ("delay_s = 8e-6", "delay_s = nan", r"vibrometer\.delay_s = nan: .*finite"),
         ('resource = "USB0', 'resource = "COM3', r"generator\.resource = 'COM3.*match pattern"),
-        ('physical = "ai1"', 'physical = "ai0"', r"daq = .*physical ai0 is given twice"),
+        ('physical = "ai1"', 'physical = "ai0"', r"daq: physical ai0 is given twice"),
         ("calibrated = 2026-02-10", "calibrated = 2026-02-30", r"not valid TOML.*line"),
         ("[specimen]", "[specimen", r"not valid TOML"),
     ],

@@ -273,3 +273,12 @@ def test_a_diagram_with_an_error_keeps_states_once_a_drive_period():
 def test_what_a_target_of_a_map_decides_is_not_given_beside_it(given, said):
     with pytest.raises(ValidationError, match=f"(?i){said}"):
         Map(**{"frequency_hz": Range(start=120, stop=140, points=3), "error": 0.01, **given})
+
+
+@pytest.mark.parametrize("target", [{"error": 0.01}, {"time_s": 3.0}])
+def test_an_estimate_of_a_map_with_a_target_comes_from_a_pilot(target):
+    plan = Map(frequency_hz=Range(start=250, stop=270, points=9), amplitude_m=50e-6, **target)
+    told = estimate_map(plan, 1)
+    assert told.work_s > 9 * (0.5 if "error" in target else 2.9)
+    assert told.work_s <= told.longest_work_s
+    assert "as a few of them took in a pilot" in told.sentence

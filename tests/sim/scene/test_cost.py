@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene, solve_scene
-from vibench.sim.scene.cost import FEWEST, CostLedger, learn_cost, measure_cost
+from vibench.sim import Harmonic, Observable, Scene, Target, gong2025, plan_scene, solve_scene
+from vibench.sim.scene.cost import FEWEST, CostLedger, learn_cost, measure_cost, pilot_cost_s
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration
 
 SCENES = 12
@@ -79,3 +79,39 @@ def test_what_a_larger_budget_takes_is_learnt_apart(ledger):
     assert plan_scene(patient).cost_s == pytest.approx(4.0)
     # Of a budget that was never asked for what all the others took is known.
     assert 0.1 < plan_scene(replace(patient, budget_s=3.0)).cost_s < 4.0
+
+
+def test_a_scene_with_a_target_and_a_long_one_are_not_run_for_their_plan(ledger):
+    """A pilot of `--time 5s` took five more seconds."""
+    drive = Harmonic(260.0, 5e-6)
+    for scene in (
+        Scene(gong2025(), drive, target=Target(time_s=20.0)),
+        Scene(gong2025(), drive, duration=FixedDuration(1e6, 1.0)),
+    ):
+        begun_s = time.thread_time()
+        measure_cost(scene)
+        assert time.thread_time() - begun_s < 1.0
+        assert ledger.runs_of(plan_scene(scene).kind) == 0
+
+
+def test_a_pilot_knows_what_a_plan_does_not():
+    """The same map over 50 to 600 Hz was planned as 1.8 s, and took 21."""
+    calm, chaotic, timed = (
+        lambda _, drive=drive, target=target: Scene(gong2025(), drive, target=target)
+        for drive, target in (
+            (Harmonic(130.0, 20e-6), Target(error=0.01)),
+            (Harmonic(260.0, 50e-6), Target(error=0.01)),
+            (Harmonic(260.0, 50e-6), Target(time_s=20.0)),
+        )
+    )
+    begun_s = time.monotonic()
+    assert pilot_cost_s(calm, 100) < 0.5 < pilot_cost_s(chaotic, 100) < 60.0
+    assert pilot_cost_s(timed, 100) == 20.0
+    assert time.monotonic() - begun_s < 3.0 * 2.0
+
+
+def test_the_pilot_of_scenes_that_are_not_allowed_costs_nothing():
+    def refused(_):
+        raise ValueError("not allowed")
+
+    assert pilot_cost_s(refused, 3) == 0.0

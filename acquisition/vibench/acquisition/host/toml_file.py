@@ -198,7 +198,12 @@ def _complaint(detail: Any) -> str:
     reason = shortened(fault_in_words(detail))
     if not detail["loc"]:
         return reason
-    return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
+    match detail["input"]:
+        case dict() | [dict(), *_]:  # it would be cut off, and the reason says what is wrong in it
+            given = ""
+        case value:
+            given = f" = {_shown(value)}"
+    return f"{_key(detail)}{given}: {reason[0].lower()}{reason[1:]}"
 
 
 def _shown(value: object) -> str:

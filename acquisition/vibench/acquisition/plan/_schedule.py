@@ -18,7 +18,7 @@ from ..host.toml_file import FrozenModel
 from ..instruments import Sweep
 from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, generator_driver
-from ._until import Until
+from ._until import SHORTEST_S, Until
 
 # The plan of one measurement: excitation, ramps, limits during the run. A point: one recording of a campaign,
 # and its chain of points.
@@ -109,6 +109,12 @@ class Measurement(FrozenModel):
             known = f"it can be {' or '.join(allowed)}" if allowed else "leave until out"
             raise ValueError(
                 f"until names {unknown[0]}, which {self.excitation.kind} does not wait for; {known}"
+            )
+        longest_s = max(each.record_s for each in self.excitation.steps())
+        if self.excitation.period_points is None and self.until.shortest_s > max(longest_s, SHORTEST_S):
+            raise ValueError(
+                f"until.shortest_s of {self.until.shortest_s:g} s is longer than the {longest_s:g} s of the "
+                "recording; give a shorter one, or record for longer"
             )
         return self
 

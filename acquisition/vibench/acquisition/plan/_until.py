@@ -1,30 +1,22 @@
 """Recording until a result is known well enough: targets, and times of the analyses."""
 
-import re
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, model_validator
+
+from vibench.sim import number_with
 
 from ..host.toml_file import FrozenModel
 
 FEWEST_REALISATIONS = 4
 """Number of realisations before the first analysis: fewer have too little scatter for a bound."""
+SHORTEST_S = 2.0
+"""Usual time before the first analysis [s]; a plan may be shorter, and is then analysed at its end."""
 LOOK_FACTOR = 2.0**0.5
 """Ratio of recorded times between one analysis and the next."""
 
 
-def _share(given: object) -> object:
-    if not isinstance(given, str):
-        return given
-    found = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*%\s*", given, re.ASCII)
-    if found is None:
-        raise ValueError('give a share of the value, like "0.5 %" or 0.005')
-    return 0.01 * float(found[1])
-
-
-Wish = Annotated[
-    float, Field(gt=0, lt=1), BeforeValidator(_share, json_schema_input_type=PositiveFloat | str)
-]
+Wish = Annotated[float, Field(gt=0, lt=1), number_with("%")]
 """Half width of the 95 % interval over the value."""
 
 
@@ -43,8 +35,9 @@ class Until(FrozenModel):
     """Bound of Response I of a dwell or of each step: ``"1 %"``."""
     response_ii: Wish | None = None
     """Bound of Response II of a dwell or of each step: ``"1 %"``."""
-    shortest_s: PositiveFloat = 2.0
-    """Recorded time before the first analysis, of a dwell, a step or streamed noise [s]."""
+    shortest_s: PositiveFloat = SHORTEST_S
+    """Recorded time before the first analysis, of a dwell, a step or streamed noise [s]: at most its planned
+    time."""
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":

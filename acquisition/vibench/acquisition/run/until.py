@@ -111,7 +111,7 @@ class UntilWatch(ClosedOnLeaving):
     def _pieces(self, phase: Phase) -> Iterator[Phase]:
         self._end()
         self._longest_s = phase.duration_s
-        self._begin(self._until.shortest_s)
+        self._begin(min(self._until.shortest_s, phase.duration_s))
         left_s = phase.duration_s
         while left_s > 1e-9 and not self._is_reached:  # 1e-9: rounding leaves no piece
             piece_s = min(PIECE_S, left_s)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
-from ..scene.cost import expected_cost_s, longest_cost_s
+from ..scene.cost import expected_cost_s, longest_cost_s, pilot_cost_s
 from ..scene.prediction import MotionKind
+from ..scene.refinement import LONGEST_S
 from ..scene.scene import Given, Scene
 from ..scene.solve import InBatches, Question, Solved, settle_scene, solve_scene
 from ..specimen.outcome import Outcome
@@ -224,6 +225,8 @@ class MapEstimate:
     file_bytes: int
     followed: str
     """How motions are followed, as `map_solver` chooses."""
+    known_from: str
+    """What the times are known from."""
 
     @property
     def all_s(self) -> float:
@@ -254,7 +257,7 @@ class MapEstimate:
         """Say it to a person."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
-            f"planned as {self.work_s:.2g} s of one core, as such points took here lately. With "
+            f"planned as {self.work_s:.2g} s of one core, as {self.known_from}. With "
             f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, everything after "
             f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats; "
             f"more than {self.most_useful_workers} workers would wait. The file takes "
@@ -273,23 +276,31 @@ class MapEstimate:
 
 
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
-    """Return what a map will take of ``workers`` threads, by what such points took here lately; none is run.
+    """Return what a map will take of ``workers`` threads, by what such points took here lately.
 
-    How many points refinement will ask for, and how many motions repeat, is not known before: the estimate
-    says the least and the most.
+    None is run, except a pilot of about a second where points have a target. How many points refinement will
+    ask for, and how many motions repeat, is not known before: the estimate says the least and the most.
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)
-    first = points.wanted_first
+    first, count = points.wanted_first, plan.grid.size
+    if plan.target is None:
+        work_s, first_s = float(points.planned_s.sum()), float(points.planned_s[first].sum())
+        longest_s = float(points.longest_s.sum())
+    else:
+        each_s = pilot_cost_s(lambda number: plan.scene(plan.grid.place(number)), count)
+        work_s, first_s = count * each_s, len(first) * each_s
+        longest_s = count * (LONGEST_S if plan.target.time_s is None else plan.target.time_s)
     return MapEstimate(
-        points=plan.grid.size,
+        points=count,
         coarse_points=len(first),
-        work_s=float(points.planned_s.sum()),
-        longest_work_s=float(points.longest_s.sum()),
-        coarse_work_s=float(points.planned_s[first].sum()),
+        work_s=work_s,
+        longest_work_s=longest_s,
+        coarse_work_s=first_s,
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
-        file_bytes=plan.grid.size * row_bytes,
+        file_bytes=count * row_bytes,
         followed="eight at a time, in lanes"
         if isinstance(map_solver(plan), InBatches)
         else "one after the other",
+        known_from="such points took here lately" if plan.target is None else "a few of them took in a pilot",
     )

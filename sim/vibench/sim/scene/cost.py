@@ -12,14 +12,18 @@ import platform
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Self
 
+import numpy as np
+
 from ..engine.library import physics_digest
 from ..operating_system.this import replace_file, state_folder, state_place
 from .plan import ScenePlan, plan_scene
+from .refinement import LONGEST_S, refined
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
@@ -196,6 +200,12 @@ MEASURED_S = 0.5
 DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 """Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
 
+PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
+"""Scenes with a target that are tried at most, their time together [s], and the share of the rest of it that
+the next one may use."""
+UNDECIDED = 3.0
+"""Time of a scene over that in which nothing was found out about it, at least."""
+
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
     InBatches(Question.MOTION): "settled in lanes",
@@ -234,6 +244,40 @@ def _expected_cost(plan: ScenePlan, solver: Solver, planned_s: float) -> Expecte
     return own if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s)
 
 
+def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
+    """Return the mean time of ``count`` scenes with a target, from a pilot of some of them [s].
+
+    Whether a motion forgets its start decides the time, and no plan knows that. Scenes that are not allowed
+    cost nothing.
+    """
+    ends_s, costs = time.monotonic() + PILOT_S, list[float]()
+    for number in np.random.default_rng(count).permutation(count)[:PILOTS]:
+        left_s = ends_s - time.monotonic()
+        if left_s < (1.0 - PILOT_SHARE) ** PILOTS * PILOT_S:
+            break
+        try:
+            costs.append(_target_cost_s(scene(int(number)), PILOT_SHARE * left_s))
+        except ValueError:
+            costs.append(0.0)
+    return math.fsum(costs) / len(costs)
+
+
+def _target_cost_s(scene: Scene, most_s: float) -> float:
+    """Try one scene for a moment, and say how long it takes as far as it can be known [s]."""
+    assert scene.target is not None
+    limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
+    tried_s, began_s = min(most_s, limit_s), time.monotonic()
+    report = refined(replace(scene, target=replace(scene.target, time_s=tried_s))).target
+    assert report is not None
+    taken_s = time.monotonic() - began_s
+    if taken_s < tried_s or (report.is_met and scene.target.error is not None):
+        return taken_s
+    if report.needed_s is not None:
+        return min(limit_s, report.needed_s[0])
+    # Without a requested error all that the time allows is done.
+    return limit_s if scene.target.error is None else min(limit_s, UNDECIDED * taken_s)
+
+
 def _kind(plan: ScenePlan, solver: Solver) -> str:
     return f"{LEARNT_AS[solver]}/{plan.kind}" if solver in LEARNT_AS else plan.kind
 
@@ -241,9 +285,12 @@ def _kind(plan: ScenePlan, solver: Solver) -> str:
 def measure_cost(scene: Scene) -> None:
     """Run a few scenes like one that has been run, if what such scenes take on this machine is not known yet.
 
-    It takes less than a second, unless one such scene takes longer.
+    It takes about a second: nothing is run that is planned to take longer, or has a target.
     """
-    kind, spent_s = plan_scene(scene).kind, 0.0
+    plan, spent_s = plan_scene(scene), 0.0
+    kind = plan.kind
+    if scene.target is not None or plan.cost_s > MEASURED_S:
+        return
     for part in DETUNED:
         if cost_ledger().runs_of(kind) >= FEWEST or spent_s > MEASURED_S:
             return

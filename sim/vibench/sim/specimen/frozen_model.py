@@ -3,8 +3,33 @@
 import re
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+_NUMBER = re.compile(
+    r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?inf|nan)\s*(%|[a-z]*)\s*", re.ASCII | re.IGNORECASE
+)
+_SCALES = {"": 1.0, "%": 0.01, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def number_of(text: str, *units: str) -> float:
+    """Return the number in a text, alone or with one of these units, in SI units.
+
+    Python's `float` also reads ``1_0`` and digits of other scripts, which are slips here. Raises ValueError.
+    """
+    found = _NUMBER.fullmatch(text)
+    if found is None or found[2] not in ("", *units):
+        allowed = f", alone or with {' or '.join(units)}" if units else ""
+        raise ValueError(f"{text!r} is no number{allowed}")
+    return float(found[1]) * _SCALES[found[2]]
+
+
+def number_with(*units: str) -> BeforeValidator:
+    """Read numbers, and texts of a number, alone or with one of these units."""
+    return BeforeValidator(
+        lambda given: number_of(given, *units) if isinstance(given, str) else given,
+        json_schema_input_type=float | str,
+    )
 
 
 def _number(given: object) -> object:

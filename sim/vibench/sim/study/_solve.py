@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..background import Cancelled, Observer
-from ..scene.cost import expected_cost_s
+from ..scene.cost import expected_cost_s, pilot_cost_s
 from ..scene.scene import Given, Rest, Scene
 from ..scene.solve import Solved, solve_scene
 from ..specimen.outcome import Outcome
@@ -159,7 +159,7 @@ class Expansion:
         """
         before = self._predecessor(number, arrays)
         if before == NOBODY:
-            return self._unchained(number)
+            return self.unchained(number)
         state = tuple(float(value) for value in arrays[FINAL_STATE][before])
         x, y, z, vx, vy, vz = state
         name = continued_from(self._study.frequencies_hz[self.grid.place(before)[-1]])
@@ -194,7 +194,7 @@ class Expansion:
         """Phase at which the predecessor's drive stopped: the base goes on from where it is."""
         return end_phase(self._study.frequencies_hz[self.grid.place(before)[-1]], before, arrays)
 
-    def _unchained(self, number: int) -> Scene:
+    def unchained(self, number: int) -> Scene:
         """Make the scene of a point that continues no other."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
@@ -207,20 +207,25 @@ class Expansion:
     def _planned(self, number: int) -> float:
         """Planned time of a point; none when its scene is not allowed, which its answer will say."""
         try:
-            return expected_cost_s(self._unchained(number), self._solver)
+            return expected_cost_s(self.unchained(number), self._solver)
         except ValueError:
             return 0.0
 
 
 def planned_work_s(study: Study) -> float:
-    """Time that all points of a study together are planned to take on one core [s]; none is run.
+    """Time that all points of a study together are planned to take on one core [s].
+
+    None is run, except a pilot of about a second where points have a target.
 
     >>> from vibench.sim.study import Study
     >>> study = Study(frequencies_hz=(200.0, 260.0), amplitudes_m=(1e-6,))
     >>> 0.0 < planned_work_s(study) < 60.0
     True
     """
-    return float(Expansion(study).planned_s.sum())
+    points = Expansion(study)
+    if study.target is not None:
+        return points.grid.size * pilot_cost_s(points.unchained, points.grid.size)
+    return float(points.planned_s.sum())
 
 
 class ExistingStudy(StrEnum):

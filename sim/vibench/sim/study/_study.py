@@ -21,7 +21,7 @@ from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
-from ..specimen.frozen_model import FrozenModel
+from ..specimen.frozen_model import FrozenModel, number_with
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
@@ -140,33 +140,9 @@ Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValida
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
-_PER = {"%": 0.01, "min": 60.0, "h": 3600.0, "ms": 1e-3, "s": 1.0}
-"""Units of an error and of a time, longest word first where one ends another."""
-
-
-def _with_unit(*units: str) -> BeforeValidator:
-    """Read a number, or a text of a number with one of these units."""
-
-    def read(given: object) -> object:
-        if not isinstance(given, str):
-            return given
-        for unit in units:
-            number = given.strip().removesuffix(unit)
-            if number != given.strip():
-                break
-        else:
-            unit, number = "", given
-        try:
-            return float(number) * _PER.get(unit, 1.0)
-        except ValueError as error:
-            raise ValueError(f"give a number, or one with {' or '.join(units)}") from error
-
-    return BeforeValidator(read, json_schema_input_type=float | str)
-
-
-TargetError = Annotated[float, Field(gt=0.0, le=1.0), _with_unit("%")]
+TargetError = Annotated[float, Field(gt=0.0, le=1.0), number_with("%")]
 """Relative: 0.01, or "1 %"."""
-TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), _with_unit("ms", "min", "h", "s")]
+TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), number_with("ms", "s", "min", "h")]
 """In seconds, or "200 ms", "2 s", "5 min"."""
 StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""

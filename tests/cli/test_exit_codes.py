@@ -1,0 +1,83 @@
+"""Exit codes: one rule for all commands, as docs/installation.md states it."""
+
+import pytest
+
+SCENE = ("--amplitude", "5e-6", "--frequency", "260")
+NOT_ALLOWED = [
+    ("predict", "--amplitude", "abc", "--frequency", "260"),
+    ("predict", "--amplitude=-1", "--frequency", "260"),
+    ("predict", "--amplitude", "5e-6", "--frequency", "abc"),
+    ("predict", *SCENE, "--error", "200%"),
+    ("predict", *SCENE, "--workers", "0"),
+    ("predict", *SCENE, "--accuracy", "exact"),
+    ("predict", *SCENE, "--out", ""),
+    ("tradeoff", "--amplitude", "abc", "--frequency", "260"),
+    ("tradeoff", "--amplitude=-1", "--frequency", "260"),
+    ("chain", "--cells", "none"),
+    ("chain", *SCENE, "--time", "0s"),
+    ("branches", "--amplitude", "abc", "--frequency", "260:270"),
+    ("branches", "--amplitude", "5e-6", "--frequency", "260:270", "--starts", "abc"),
+    ("spectrum", "--amplitude", "5e-6", "--frequency", "abc"),
+    ("map", "map", "--out", "a", "--kicks", "-1"),
+    ("study", "paper", "--out", "a.h5", "--workers", "0"),
+    ("measure", "quick", "--out", "a", "--within", "soon"),
+    ("measure", "quick", "--out", "a", "--after-failure", "laugh"),
+    ("figure", "99", "--out", "a"),
+    ("analyse", "nothing.h5"),
+    ("analyse", "nothing.h5", "--draws", "abc"),
+    ("stop", "--level", "loud"),
+]
+NOT_UNDERSTOOD = [
+    ("unknown",),
+    ("predict", "--unknown"),
+    ("predict",),
+    ("predict", "--amplitude"),
+    ("measure", "quick"),
+    ("study", "paper"),
+]
+NO_NUMBERS = [
+    ("predict", *SCENE, "--error", "1_0%"),
+    ("predict", *SCENE, "--time", "1_0s"),
+    ("predict", *SCENE, "--duration", "1_0"),
+    ("predict", *SCENE, "--budget", "1_0"),
+    ("predict", *SCENE, "--window=1_0"),
+    ("predict", *SCENE, "--workers", "1_0"),
+    ("predict", "--amplitude", "5_0e-6", "--frequency", "260"),
+    ("predict", "--amplitude", "5e-6", "--frequency", "1_0"),
+    ("predict", "--amplitude", "5e-6", "--frequency", "２60"),
+    ("chain", "--cells", "٣"),
+    ("chain", "--amplitude", "1_0e-6", "--frequency", "260"),
+    ("branches", "--amplitude", "1_0e-6", "--frequency", "260:270"),
+    ("tradeoff", "--amplitude", "5_0e-6", "--frequency", "260"),
+    ("map", "map", "--out", "a", "--kicks", "1_0"),
+    ("measure", "quick", "--out", "a", "--within", "1_0h"),
+]
+
+
+def shown(words):
+    return " ".join(words)
+
+
+@pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=shown)
+def test_a_value_that_is_not_allowed_ends_with_1_in_every_command(vibench_here, tmp_path, words):
+    ran = vibench_here(*words, cwd=tmp_path)
+    assert ran.returncode == 1, ran.stderr
+    assert "rror: " in ran.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", NOT_UNDERSTOOD, ids=shown)
+def test_a_command_line_that_is_not_understood_ends_with_2_in_every_command(vibench_here, tmp_path, words):
+    assert vibench_here(*words, cwd=tmp_path).returncode == 2
+
+
+def test_an_answer_that_misses_the_requested_error_says_so_and_is_an_answer(vibench_here, tmp_path):
+    ran = vibench_here("predict", *SCENE, "--error", "1e-6", "--time", "0.2s", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert "needs about" in ran.stdout
+
+
+@pytest.mark.parametrize("time", ["1e9h", "1e300h"])
+def test_a_long_time_for_a_campaign_is_a_time(vibench_here, tmp_path, time):
+    ran = vibench_here("measure", "quick", "--out", "a", "--estimate", "--within", time, cwd=tmp_path)
+    assert "add until to a measurement" in ran.stderr
