@@ -178,14 +178,13 @@ def _seconds(name: str, text: str) -> float:
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
     """Return how the points are solved, in one paragraph per group of points solved the same way."""
-    from vibench.sim import measure_cost, plan_scene
+    from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
     plans = [plan_scene(scene) for scene in scenes]
     passages = []
     for _, run in groupby(range(len(plans)), lambda number: plans[number].alike):
         alike = list(run)
-        measure_cost(scenes[alike[len(alike) // 2]])
         each = [(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]
         passages.append(_passage(each, has_target=study.target is not None))
     return "\n".join(filter(None, [*passages, forgetting_text(points)]))

@@ -58,7 +58,6 @@ from .periodic.shooting import (
     ShootingEnd as ShootingEnd,
     periodic_orbit as periodic_orbit,
 )
-from .scene.cost import measure_cost as measure_cost
 from .scene.plan import ScenePlan as ScenePlan, plan_scene as plan_scene
 from .scene.prediction import (
     Ensemble as Ensemble,

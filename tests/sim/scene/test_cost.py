@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, Target, gong2025, plan_scene, solve_scene
-from vibench.sim.scene.cost import FEWEST, CostLedger, learn_cost, measure_cost, pilot_cost_s
+from vibench.sim.scene.cost import FEWEST, CostLedger, learn_cost, pilot_cost_s
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration
 
 SCENES = 12
@@ -44,11 +44,10 @@ def test_scenes_take_what_was_said_within_the_factor_that_was_said(ledger, conta
         )
         for _ in range(SCENES)
     ]
-    solve_scene(scenes[0])
-    begun_s = time.thread_time()
-    measure_cost(scenes[0])
-    assert time.thread_time() - begun_s < 3.0
-    assert ledger.runs_of(plan_scene(scenes[0]).kind) >= FEWEST or time.thread_time() - begun_s > 0.5
+    for scene in scenes[:FEWEST]:
+        begun_s = time.thread_time()
+        solve_scene(scene)
+        learn_cost(scene, time.thread_time() - begun_s)
     held = []
     for scene in scenes:
         cost = plan_scene(scene).cost
@@ -79,19 +78,6 @@ def test_what_a_larger_budget_takes_is_learnt_apart(ledger):
     assert plan_scene(patient).cost_s == pytest.approx(4.0)
     # Of a budget that was never asked for what all the others took is known.
     assert 0.1 < plan_scene(replace(patient, budget_s=3.0)).cost_s < 4.0
-
-
-def test_a_scene_with_a_target_and_a_long_one_are_not_run_for_their_plan(ledger):
-    """A pilot of `--time 5s` took five more seconds."""
-    drive = Harmonic(260.0, 5e-6)
-    for scene in (
-        Scene(gong2025(), drive, target=Target(time_s=20.0)),
-        Scene(gong2025(), drive, duration=FixedDuration(1e6, 1.0)),
-    ):
-        begun_s = time.thread_time()
-        measure_cost(scene)
-        assert time.thread_time() - begun_s < 1.0
-        assert ledger.runs_of(plan_scene(scene).kind) == 0
 
 
 def test_a_pilot_knows_what_a_plan_does_not():

@@ -1,4 +1,4 @@
-"""What runs of a scene's kind take on this machine: learnt from each, or measured where none was made.
+"""What runs of a scene's kind take on this machine: learnt from each, or tried where a scene has a target.
 
 A ledger keeps, for every kind of run, what runs took over what was planned: its mean, and its scatter.
 """
@@ -109,11 +109,6 @@ class CostLedger:
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
         return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
-    def runs_of(self, kind: str) -> int:
-        """How many runs of just this kind were learnt from."""
-        with self._lock:
-            return self._kinds.get(kind, _Kind()).runs
-
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
         """Note what a run took in a process that was prepared for its kind."""
         if not (planned_s > 0.0 and taken_s > 0.0):
@@ -195,11 +190,6 @@ def cost_ledger() -> CostLedger:
     return ledger
 
 
-MEASURED_S = 0.5
-"""Processor time after which no further run is made to measure a cost [s]."""
-DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
-"""Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
-
 PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
 """Scenes with a target that are tried at most, their time together [s], and the share of the rest of it that
 the next one may use."""
@@ -280,24 +270,3 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
 
 def _kind(plan: ScenePlan, solver: Solver) -> str:
     return f"{LEARNT_AS[solver]}/{plan.kind}" if solver in LEARNT_AS else plan.kind
-
-
-def measure_cost(scene: Scene) -> None:
-    """Run a few scenes like one that has been run, if what such scenes take on this machine is not known yet.
-
-    It takes about a second: nothing is run that is planned to take longer, or has a target.
-    """
-    plan, spent_s = plan_scene(scene), 0.0
-    kind = plan.kind
-    if scene.target is not None or plan.cost_s > MEASURED_S:
-        return
-    for part in DETUNED:
-        if cost_ledger().runs_of(kind) >= FEWEST or spent_s > MEASURED_S:
-            return
-        drive = replace(scene.drive, frequency_hz=part * scene.drive.frequency_hz)
-        neighbour = replace(scene, drive=drive)
-        begun_s = time.thread_time()
-        solve_scene(neighbour)
-        taken_s = time.thread_time() - begun_s
-        learn_cost(neighbour, taken_s)
-        spent_s += taken_s
