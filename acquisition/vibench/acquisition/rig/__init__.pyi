@@ -1,11 +1,9 @@
 from ._configuration import (
     HIGH_Z as HIGH_Z,
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
-    RESPONSE_ROLES as RESPONSE_ROLES,
     TOKEN_KEY as TOKEN_KEY,
     TOKEN_VARIABLE as TOKEN_VARIABLE,
     USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
-    AccelerometerConfig as AccelerometerConfig,
     ChannelConfig as ChannelConfig,
     ControllerConfig as ControllerConfig,
     DaqConfig as DaqConfig,
@@ -14,16 +12,10 @@ from ._configuration import (
     OutputConfig as OutputConfig,
     OutputUse as OutputUse,
     Rig as Rig,
-    Role as Role,
-    SensorConfig as SensorConfig,
-    StatedUncertainty as StatedUncertainty,
-    TransducerConfig as TransducerConfig,
-    VibrometerConfig as VibrometerConfig,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
     given_token as given_token,
     highest_carried_hz as highest_carried_hz,
-    volts_per_unit as volts_per_unit,
 )
 from ._knobs import (
     CalibrationRule as CalibrationRule,
@@ -58,4 +50,14 @@ from ._model import (
     shaker_of as shaker_of,
     specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
+)
+from ._sensors import (
+    RESPONSE_ROLES as RESPONSE_ROLES,
+    AccelerometerConfig as AccelerometerConfig,
+    Role as Role,
+    SensorConfig as SensorConfig,
+    StatedUncertainty as StatedUncertainty,
+    TransducerConfig as TransducerConfig,
+    VibrometerConfig as VibrometerConfig,
+    volts_per_unit as volts_per_unit,
 )

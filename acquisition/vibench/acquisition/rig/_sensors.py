@@ -1,0 +1,228 @@
+"""Sensors as data sheets and certificates describe them, and the channels that they show."""
+
+import re
+from datetime import date
+from enum import StrEnum
+from itertools import product
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat
+
+from ..host.toml_file import FrozenModel
+
+_VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
+_STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
+"""By definition (NIST SP 811)."""
+_UNITS = {
+    "m s-2": {"m/s2": 1.0, "m s-2": 1.0, "ms-2": 1.0, "g": _STANDARD_GRAVITY, "gn": _STANDARD_GRAVITY},
+    "m s-1": {"m/s": 1.0, "m s-1": 1.0, "mm/s": 1e-3, "mm s-1": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
+    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+}
+"""Units of data sheets in SI units, by the unit of the recorded quantity."""
+_EXAMPLES = {
+    "m s-2": "'100 mV/g' or '10 mV/(m/s2)'",
+    "m s-1": "'250 mm/s/V' or '4 V/(m/s)'",
+    "N": "'11.2 mV/N'",
+    "m": "'80 um/V' or '12.5 mV/um'",
+}
+_SMALLEST = 1e-12
+"""Of a number in front of a unit; what lies beyond, or beyond its inverse, is a slip."""
+_NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
+
+
+def volts_per_unit(text: str, unit: str) -> float:
+    """Read a sensitivity with its unit, as data sheets print it [V per ``unit``].
+
+    ``text`` is ``"100 mV/g"`` or ``"250 mm/s/V"``; ``unit`` is the recorded unit, such as ``"m s-2"``.
+
+    Raises ValueError when the text has no number above 0 or another unit, or can be read in two ways.
+    """
+    words = " ".join(text.split())
+    number = _NUMBER.match(words)
+    digits = "" if number is None else number[0]
+    spelled = _plain(words[len(digits) :])
+    is_usable = digits and _SMALLEST <= float(digits) <= 1.0 / _SMALLEST
+    for (volt, volts), (name, units) in product(_VOLTS.items(), _UNITS.get(unit, {unit: 1.0}).items()):
+        if spelled == f"{volt}/{name}" and re.search("[/ ]", name):
+            raise ValueError(f"{text!r} can be read in two ways; write '{digits} {volt}/({name})'")
+        if spelled in {f"{volt}/({name})", f"{volt}/{name}"} and is_usable:
+            return float(digits) * volts / units
+        if spelled in {f"({name})/{volt}", f"{name}/{volt}"} and is_usable:
+            return volts / (float(digits) * units)
+    example = _EXAMPLES.get(unit, f"'50 mV/({unit})'")
+    if re.search(r"\b[pn]C\b", spelled):
+        raise ValueError(
+            f"{text!r} is a charge, and the converter measures volts; give the sensitivity of the sensor "
+            f"with its charge amplifier, such as {example}"
+        )
+    raise ValueError(
+        f"{text!r} is not a sensitivity for {unit!r}; give a number above 0 with a unit, such as {example}"
+    )
+
+
+def _plain(unit: str) -> str:
+    """Write a unit with one spelling of powers, products and spaces."""
+    letters = unit.translate(_SIGNS).replace("**", "").replace("^", "").replace("*", " ")
+    return re.sub(r"\s*([/()])\s*", r"\1", letters).strip()
+
+
+class Sourced(FrozenModel):
+    """A figure with the place it comes from, so that nobody mistakes a memory for a data sheet."""
+
+    value: PositiveFloat
+    source: str = Field(min_length=1)
+
+
+class StatedUncertainty(FrozenModel):
+    """Relative uncertainty of a sensitivity, as a certificate or a data sheet states it."""
+
+    relative: float = Field(gt=0.0, lt=1.0)
+    """Expanded uncertainty over the value: 0.01 for 1 %."""
+    coverage_factor: PositiveFloat = 2.0
+    """Expanded over standard uncertainty: 2 on most certificates, 1.73 for bounds of a rectangle."""
+    source: str = Field(min_length=1)
+    """Certificate with its number, or data sheet."""
+
+
+def _acceleration_sensitivity(given: object) -> object:
+    return volts_per_unit(given, "m s-2") if isinstance(given, str) else given
+
+
+def _velocity_range(given: object) -> object:
+    return 1e3 / volts_per_unit(given, "m s-1") if isinstance(given, str) else given
+
+
+class SensorConfig(FrozenModel):
+    """A sensor, as its data sheet and certificate describe it."""
+
+    model: str
+    serial: str = ""
+    full_scale_v: PositiveFloat
+    """Largest output, peak [V]."""
+    bandwidth_hz: PositiveFloat | None = None
+    """Upper -3 dB frequency, first order [Hz]; absent: far above what is measured."""
+    resonance_hz: PositiveFloat | None = None
+    """Mounted resonance [Hz]; absent likewise."""
+    delay_s: NonNegativeFloat = 0.0
+    """Signal delay of its electronics, bandwidth included [s]; the analysis takes it out of the phase."""
+    iepe: Literal["yes", "no"] = "no"
+    """Whether the input feeds it a current."""
+    calibrated: date
+    uncertainty: StatedUncertainty | None = None
+    """Uncertainty of the calibration; absent: not stated, and every result says so."""
+    alignment_deg: Sourced | None = None
+    """Largest angle between sensitive axis, or beam, and motion [degree]."""
+    noise_per_rthz: Sourced | None = None
+    """Density of its noise [SI unit per root hertz]; absent: not stated."""
+
+    @property
+    def name(self) -> str:
+        """Name in results."""
+        return self.model
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return SI units of the motion per volt; ``unit`` is that of the channel."""
+        raise NotImplementedError(unit)
+
+
+class TransducerConfig(SensorConfig):
+    """Any sensor of a channel: a table ``[sensors.m0_acceleration]``."""
+
+    sensitivity: str
+    """With the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return SI units per volt; raises ValueError when the sensitivity is not one for this unit."""
+        return 1 / volts_per_unit(self.sensitivity, unit)
+
+
+class VibrometerConfig(SensorConfig):
+    """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
+
+    decoder: str
+    range_mm_per_s_per_v: Annotated[
+        PositiveFloat, BeforeValidator(_velocity_range, json_schema_input_type=PositiveFloat | str)
+    ]
+    """Decoder range [mm/s per volt], or text with another unit: ``"4 V/(m/s)"``."""
+    bandwidth_hz: PositiveFloat
+    tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
+    delay_s: NonNegativeFloat
+    """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
+
+    @property
+    def name(self) -> str:
+        """Name in results, with that of the decoder."""
+        return f"{self.model} {self.decoder}"
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return the range [m/s per volt]."""
+        del unit
+        return self.range_mm_per_s_per_v * 1e-3
+
+
+class AccelerometerConfig(SensorConfig):
+    """The accelerometer on the base."""
+
+    sensitivity_v_per_m_per_s2: Annotated[
+        PositiveFloat, BeforeValidator(_acceleration_sensitivity, json_schema_input_type=PositiveFloat | str)
+    ]
+    """Sensitivity [V per m/s2], or text with the unit of the data sheet: ``"100 mV/g"``."""
+    resonance_hz: PositiveFloat
+    iepe: Literal["yes", "no"]
+
+    def units_per_volt(self, unit: str) -> float:
+        """Return the inverse of the sensitivity [m/s2 per volt]."""
+        del unit
+        return 1 / self.sensitivity_v_per_m_per_s2
+
+
+class Role(StrEnum):
+    """What a channel records; the name of its dataset: a place on the rig, and a quantity.
+
+    ``base_force`` is the force by which the shaker's table moves what stands on it.
+    """
+
+    DRIVE_VOLTAGE = "drive_voltage"
+    AMPLIFIER_VOLTAGE = "amplifier_voltage"
+    BASE_FORCE = "base_force"
+    BASE_ACCELERATION = "base_acceleration"
+    BASE_VELOCITY = "base_velocity"
+    BASE_DISPLACEMENT = "base_displacement"
+    M0_ACCELERATION = "m0_acceleration"
+    M0_VELOCITY = "m0_velocity"
+    M0_DISPLACEMENT = "m0_displacement"
+    M1_ACCELERATION = "m1_acceleration"
+    M1_VELOCITY = "m1_velocity"
+    M1_DISPLACEMENT = "m1_displacement"
+    M2_ACCELERATION = "m2_acceleration"
+    M2_VELOCITY = "m2_velocity"
+    M2_DISPLACEMENT = "m2_displacement"
+
+    @property
+    def place(self) -> str:
+        """``"base"``, ``"m0"``."""
+        return self.value.partition("_")[0]
+
+    @property
+    def quantity(self) -> str:
+        """``"voltage"``, ``"acceleration"``."""
+        return self.value.partition("_")[2]
+
+    @property
+    def unit(self) -> str:
+        """UDUNITS text: ``"m s-2"``."""
+        return UNIT_OF_QUANTITY[self.quantity]
+
+
+UNIT_OF_QUANTITY = {
+    "voltage": "V",
+    "force": "N",
+    "acceleration": "m s-2",
+    "velocity": "m s-1",
+    "displacement": "m",
+}
+"""UDUNITS text, by the quantity of a channel."""
+RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
+"""Channels that show the motion of m0; the first that is there is used."""
