@@ -59,5 +59,6 @@ from ._sensors import (
     StatedUncertainty as StatedUncertainty,
     TransducerConfig as TransducerConfig,
     VibrometerConfig as VibrometerConfig,
+    sensor_table as sensor_table,
     volts_per_unit as volts_per_unit,
 )

@@ -1,4 +1,4 @@
-"""What a hardware configuration describes: the chain from generator to converter, its limits, its knobs."""
+"""Hardware configuration: the chain from generator to converter, with its limits and manual settings."""
 
 import os
 from datetime import date
@@ -28,43 +28,44 @@ from ._sensors import (
     StatedUncertainty,
     TransducerConfig,
     VibrometerConfig,
+    sensor_table,
 )
 
 TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
-"""Where a gRPC call carries it."""
+"""Metadata key of the token in a gRPC call."""
 TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
-"""Where our own programs find it: the environment, never a command line that others can read."""
+"""Environment variable of the token; other users can read a command line."""
 
 
 def given_token() -> str:
-    """Token from the environment; empty where none is needed."""
+    """Return the token from the environment; empty if none is needed."""
     return os.environ.get(TOKEN_VARIABLE, "")
 
 
 USUAL_GRID_RATE_HZ = 102_400.0
-"""Steps per second on which the analogue world is computed, unless the configuration says otherwise."""
+"""Default steps per second of the simulated analogue world."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Coarser, the base would move by 0.8 % less than it should at `WATCHED_HZ`: see `level_error`."""
+"""On a coarser grid, the base would move by 0.8 % too little at `WATCHED_HZ`: see `level_error`."""
 WATCHED_HZ = 500.0
 """The highest resonance of the specimen, and the top of the paper's sines."""
 _MEASURED = 0.55
-"""Of `level_error`: against 409.6 thousand steps a second, at 60 Hz to 1 kHz."""
+"""Factor of `level_error`, measured against 409.6 thousand steps a second, at 60 Hz to 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
-"""Largest level error of a plan that is played on a coarser grid than the usual one."""
+"""Largest level error of a plan on a coarser grid than the default."""
 STEPS_PER_SAMPLE = 2
-"""The least on a coarser grid than the usual one: room for the transition band of the converter's filter."""
+"""Fewest on a coarser grid than the default: room for the transition band of the converter's filter."""
 
 
 class VirtualConfig(FrozenModel):
-    """How the simulated rig behaves where a real one just is."""
+    """Properties that only a simulated rig needs."""
 
     seed: int = Field(ge=0)
     pace: Literal["free", "wall"] = "free"
-    """``"free"``: as fast as it goes. ``"wall"``: ``speed`` times the clock on the wall."""
+    """``"free"``: as fast as possible. ``"wall"``: ``speed`` times real time."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
-    """Steps per second that are computed: 12.8 to 102.4 kHz, and at least twice the sample rate. A coarser
-    grid is faster; see docs/decisions/0006-virtual-rig.md for what it costs."""
+    """Computed steps per second: 12.8 to 102.4 kHz, and at least twice the sample rate. A coarser grid is
+    faster and less exact (docs/decisions/0006-virtual-rig.md)."""
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
     generator_noise_v: NonNegativeFloat
@@ -76,9 +77,9 @@ class VirtualConfig(FrozenModel):
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
     faults: str | None = None
-    """Path of a script of faults to play, from this file's folder on; see docs/campaigns.md."""
+    """Path of a script of faults, relative to this file's folder; see docs/campaigns.md."""
     converter_noise_v: NonNegativeFloat
-    """rms of each input at whatever rate it converts [V]."""
+    """rms of each input, at any sample rate [V]."""
 
     @field_validator("grid_rate_hz")
     @classmethod
@@ -94,96 +95,96 @@ class VirtualConfig(FrozenModel):
 
 
 def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
-    """By what part the base moves too little in a sine, at most.
+    """Return the largest relative error by which the base moves too little in a sine.
 
     The drive is averaged over a step and held, (pi f h)^2 / 3; the rest is the specimen's force on the
-    table, which is extrapolated over the step. How the specimen answers to the base is exact.
+    table, which is extrapolated over the step. The specimen's response to the base is exact.
     """
     return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Return the frequency up to which levels are right on a grid; None on the usual one, which takes all."""
+    """Return the highest frequency with correct levels on a grid; None for no limit, on the default grid."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
-    """Return the fastest rate that a converter can have on a grid; None on the usual one, which takes all."""
+    """Return a converter's fastest rate on a grid; None for no limit, on the default grid."""
     return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
 
 
 class OutputUse(StrEnum):
-    """What an analogue output plays, beside a function generator that plays the rest."""
+    """Excitations that an analogue output plays; the function generator plays the others."""
 
     STREAMS = "streams"
-    """Only what never repeats, which no generator can hold."""
+    """Only signals that never repeat, which do not fit into a generator."""
     TONES_AND_STREAMS = "tones_and_streams"
-    """Sines too: dwells, steps and sweeps, for a bench on which the output stays plugged in."""
+    """Sines too: dwells, steps and sweeps, for a bench with a permanently connected output."""
 
 
 class OutputConfig(FrozenModel):
-    """An analogue output that drives the amplifier with what a function generator cannot hold.
+    """An analogue output that plays into the amplifier signals too long for a function generator.
 
-    It plays the voltage that the generator's terminal would have at the same setting, so that
-    ``amplitude_vpp`` means the same the player. Plug one of the two into the amplifier at a time: even
-    at zero volts, an output of 50 ohm beside it would halve what the generator gives. The check at low
-    level before every run finds the wrong one plugged in.
+    It plays the voltage of the generator's terminal at the same setting, so ``amplitude_vpp`` means the
+    same for both. Connect only one of the two to the amplifier: even at zero volts, an output of 50 ohm
+    in parallel would halve the generator's voltage. The check at low level before every run finds a wrong
+    connection.
     """
 
     physical: str = Field(pattern=r"^ao\d+$")
     """Name on the device: ``"ao0"``."""
     plays: OutputUse = OutputUse.STREAMS
     device: str | None = None
-    """The module of the output in the driver, when it is not the converter's own; both must be able
-    to share a start trigger, as modules of one chassis are."""
+    """The output's module in the driver, if it is not the converter's; both must be able to share a start
+    trigger, as modules of one chassis can."""
     limit_v: PositiveFloat = Field(le=10.0)
-    """Largest voltage that this bench allows, plus and minus [V]."""
+    """Largest allowed voltage of either sign [V]."""
     sample_rate_hz: PositiveFloat
-    """Rate of the output; it must take this rate exactly."""
+    """Rate of the output, which the hardware must support exactly."""
     # Three blocks of a run at least: one plays, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
-    """How much is written ahead [s]: what a pause of this computer may last, and how long what is
-    written already plays on before an early ramp down begins."""
+    """Buffered time [s]: the longest tolerated pause of this computer, and the delay of an early ramp
+    down."""
     source: str = Field(min_length=1)
-    """Where limit and rate come from."""
+    """Source of limit and rate."""
 
 
 _LARGEST = 1e250
-"""Of a shaker's numbers, in SI units: products of some are formed."""
+"""Largest value of a shaker, in SI units; products of several must not overflow."""
 HIGH_Z: Literal["high-z"] = "high-z"
 SOURCE_OHM = 50.0
 """Output impedance of a function generator."""
 
 
 Options = dict[str, str | int | float]
-"""Settings of a plug-in that only it knows; it says what it allows."""
+"""Settings of a plug-in; only the plug-in checks them."""
 
 
 class GeneratorConfig(FrozenModel):
-    """The function generator and what its output sees."""
+    """The function generator and the load on its output."""
 
     driver: str = "afg1022x"
     """Name of an entry point of ``vibench.generators``."""
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
-    """VISA resource name; empty for a generator that is not found by VISA."""
+    """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """What else the driver wants to know; none of ours does."""
+    """Further settings of the driver; ours have none."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
     load_ohm: Literal["high-z"] | PositiveFloat = HIGH_Z
-    """Load set at the generator; its panel shows volts into this load."""
+    """Load set at the generator; its display shows volts into this load."""
     connected_ohm: PositiveFloat
-    """Input impedance that really hangs on the output: the amplifier's [ohm]."""
+    """Connected input impedance: the amplifier's [ohm]."""
     amplitude_limit_vpp: PositiveFloat
-    """The largest setting that this bench allows, peak to peak [V]."""
+    """Largest allowed setting, peak to peak [V]."""
     settle_s: NonNegativeFloat = 0.0
-    """Pause after each command that the instrument needs [s]."""
+    """Pause that the instrument needs after each command [s]."""
     dead_man_s: float | None = Field(default=None, ge=0.2, le=60.0)
-    """Where given, sines play as bursts of this length that the run triggers again while it lives: should
-    this computer hang, the drive ends with the burst [s]. docs/safety.md says what it costs in signal."""
+    """Length of bursts [s]: sines play as bursts that a living run triggers again, so the drive ends with
+    the burst if this computer hangs. docs/safety.md describes the effect on the signal."""
 
     @model_validator(mode="after")
     def _has_bursts(self) -> Self:
@@ -195,17 +196,17 @@ class GeneratorConfig(FrozenModel):
 
     @property
     def shown_fraction(self) -> float:
-        """Part of the open-circuit voltage that the panel shows for the load that is declared."""
+        """Displayed voltage for the declared load, relative to the open-circuit voltage."""
         ohm = inf if self.load_ohm == HIGH_Z else self.load_ohm
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
     def terminal_factor(self) -> float:
-        """Volts at the terminal per volt on the panel: 2 when 50 ohm are set and nothing loads it."""
+        """Return volts at the terminal per displayed volt: 2 for a setting of 50 ohm without a load."""
         return self.connected_ohm / (self.connected_ohm + SOURCE_OHM) / self.shown_fraction
 
 
 class AmplifierConfig(FrozenModel):
-    """The power amplifier. Its knobs cannot be read: the operator confirms them."""
+    """The power amplifier. Its settings cannot be read: the operator confirms them."""
 
     model: str
     serial: str = ""
@@ -235,7 +236,7 @@ class AmplifierConfig(FrozenModel):
 
 
 class ShakerLimits(FrozenModel):
-    """What the shaker survives; all as peak values of a sine."""
+    """Limits of the shaker; all are peak values of a sine."""
 
     stroke_m: Sourced
     velocity_m_per_s: Sourced
@@ -245,13 +246,13 @@ class ShakerLimits(FrozenModel):
 
 
 class ShakerConfig(FrozenModel):
-    """An electrodynamic shaker as a coil and a suspended mass, with the fixture it carries."""
+    """An electrodynamic shaker as a coil and a suspended mass, with its fixture."""
 
     model: str
     serial: str = ""
     moving_mass_kg: PositiveFloat
     fixture_mass_kg: NonNegativeFloat
-    """Everything rigid on the table except the specimen [kg]."""
+    """All rigid masses on the table except the specimen [kg]."""
     suspension_stiffness_n_per_m: PositiveFloat
     suspension_damping_ns_per_m: PositiveFloat
     force_constant_n_per_a: PositiveFloat
@@ -280,41 +281,41 @@ class ChannelConfig(FrozenModel):
     terminal: Literal["default", "pseudo_differential", "differential", "single_ended"] = "default"
     iepe_current_a: NonNegativeFloat = 0.0
     attenuation: PositiveFloat = 1.0
-    """Divider in front of the input: volts at the source per volt at the input."""
+    """Voltage divider in front of the input: volts at the source per volt at the input."""
     sensor: str | None = None
-    """Name of an entry point of ``vibench.sensors``; absent: the usual one of the role."""
+    """Name of an entry point of ``vibench.sensors``; absent: the default of the role."""
     options: Options = Field(default_factory=dict)
-    """What else the sensor wants to know."""
+    """Further settings of the sensor."""
     calibrated: date
     """Date of the converter's last calibration."""
     uncertainty: StatedUncertainty | None = None
-    """Uncertainty of volts, the divider in front included; absent: not stated."""
+    """Uncertainty of the voltage, divider included; absent: not stated."""
 
 
 class DaqConfig(FrozenModel):
     """The converter."""
 
     driver: str = "daqmx"
-    """Name of an entry point of ``vibench.digitizers``, and of ``vibench.outputs`` where it has an output."""
+    """Name of an entry point of ``vibench.digitizers``; also of ``vibench.outputs`` for an output."""
     options: Options = Field(default_factory=dict)
-    """What else the driver wants to know."""
+    """Further settings of the driver."""
     product: str
     device: str
     """Device name in the driver: ``"cDAQ1Mod1"``."""
     server: str | None = None
-    """Address of a gRPC device server, ``"host:port"``; absent for a converter on this computer."""
+    """Address of a gRPC device server, ``"host:port"``; absent: a converter on this computer."""
     sample_rate_hz: PositiveFloat
-    """Rate to ask for; the rate that the hardware takes is read back and stored beside it."""
+    """Requested rate; the actual rate is read back and stored as well."""
     buffer_s: PositiveFloat = 10.0
     clock_ppm: Sourced | None = None
-    """Bounds of the sample clock [parts in a million]; absent: not stated."""
+    """Largest error of the sample clock [parts per million]; absent: not stated."""
     channels: tuple[ChannelConfig, ...] = Field(min_length=1)
     output: OutputConfig | None = None
-    """An analogue output for streamed noise; absent when there is none."""
+    """Analogue output for streamed noise; optional."""
 
     @property
     def output_channel(self) -> str | None:
-        """Full name of the analogue output: ``"Dev1/ao0"``; None without one."""
+        """Full name of the analogue output: ``"Dev1/ao0"``; None if there is none."""
         if self.output is None:
             return None
         return f"{self.output.device or self.device}/{self.output.physical}"
@@ -332,14 +333,14 @@ class DaqConfig(FrozenModel):
 
 
 class SpecimenConfig(SpecimenTable):
-    """The specimen on the shaker, as far as it is known: one that it names, and what differs from it."""
+    """The specimen on the shaker: a named one, and the values that differ from it."""
 
     amplitude_limit_m: Sourced
-    """Largest displacement of a mass that the springs bear."""
+    """Largest displacement of a mass that the springs survive."""
 
 
 class LoopInput(StrEnum):
-    """What a controller samples, in the order of its inputs."""
+    """Channels that a controller samples, in the order of its inputs."""
 
     BASE = "base_acceleration"
     M0 = "m0_velocity"
@@ -348,46 +349,46 @@ class LoopInput(StrEnum):
 class ControllerConfig(FrozenModel):
     """A real-time controller: sensors of base and m0 at its inputs, its output at the amplifier's input.
 
-    Its output takes the place of the generator's while it plays.
+    While it plays, its output replaces the generator's.
     """
 
     driver: str = "lines"
     """Name of an entry point of ``vibench.controllers``."""
     resource: str = Field(default="", pattern=r"^$|^TCPIP.*::SOCKET$")
-    """VISA resource name of its socket; empty on a virtual rig, which knows it."""
+    """VISA resource name of its socket; empty on a virtual rig."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     options: Options = Field(default_factory=dict)
-    """What else the driver wants to know."""
+    """Further settings of the driver."""
     rate_hz: float = Field(ge=1_000, le=25_600)
-    """Samples a second; 1 to 20 kHz are usual."""
+    """Samples per second; 1 to 20 kHz are usual."""
     latency_s: float = Field(ge=0, le=5e-3)
-    """From a sample to the voltage that answers it, as measured [s]."""
+    """Measured time from a sample to the resulting voltage [s]."""
     limit_v: PositiveFloat
     """Largest output, peak [V]."""
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
-    """Told nothing for so long, it ramps down by itself [s]."""
+    """Time without a message after which it ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """The input of which alone it takes a law, proportional and derivative; absent: any linear law."""
+    """Only input of a law that is limited to proportional and derivative parts; absent: any linear law."""
     source: str = Field(min_length=1)
-    """Where rate, latency and limit come from."""
+    """Source of rate, latency and limit."""
 
     @property
     def loop_time_s(self) -> float:
-        """Time from a motion to the drive that answers it [s]."""
-        # A mean over a sample, and a volt that is held over one, are late by one and a half.
+        """Time from a motion to the resulting drive [s]."""
+        # The mean over a sample delays by half a sample, and the held voltage by one.
         return self.latency_s + 1.5 / self.rate_hz
 
 
 class Rig(FrozenModel):
-    """A whole bench as its configuration file describes it."""
+    """A whole bench, from its configuration file."""
 
     name: str = Field(min_length=1)
     generator: GeneratorConfig
     amplifier: AmplifierConfig
     shaker: ShakerConfig
     vibrometer: VibrometerConfig | None = None
-    """Sensor of the channel ``m0_velocity``; absent where another sensor shows m0."""
+    """Sensor of the channel ``m0_velocity``; absent if another sensor shows m0."""
     accelerometer: AccelerometerConfig
     """Sensor of the channel ``base_acceleration``."""
     sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
@@ -395,21 +396,20 @@ class Rig(FrozenModel):
     daq: DaqConfig
     specimen: SpecimenConfig
     controller: ControllerConfig | None = None
-    """Present where a real-time controller can play in the generator's place."""
+    """Real-time controller that can replace the generator; optional."""
     calibration_valid_days: PositiveInt = 730
     check_valid_h: PositiveFloat = 12.0
-    """How long a bench check that passed allows to arm [h]."""
+    """Time after a passed bench check during which the bench can be armed [h]."""
     virtual: VirtualConfig | None = None
-    """Present when every instrument is simulated."""
+    """Present if all instruments are simulated."""
 
     @model_validator(mode="after")
     def _has_sensors(self) -> Self:
         for role, sensor in self.sensors.items():
             if role.quantity == "voltage":
                 raise ValueError(f"sensors.{role}: a voltage comes by wire; leave the table out")
-            if role in (Role.BASE_ACCELERATION, Role.M0_VELOCITY):
-                table = "accelerometer" if role is Role.BASE_ACCELERATION else "vibrometer"
-                raise ValueError(f"sensors.{role}: describe it in the table [{table}]")
+            if sensor_table(role) != f"sensors.{role}":
+                raise ValueError(f"sensors.{role}: describe it in the table [{sensor_table(role)}]")
             try:
                 sensor.units_per_volt(role.unit)
             except ValueError as error:
@@ -418,22 +418,22 @@ class Rig(FrozenModel):
             role = channel.role
             is_described = role.quantity == "voltage" or self.sensor(role) is not None
             if not is_described and (channel.sensor is None or self.virtual is not None):
-                table = "vibrometer" if role is Role.M0_VELOCITY else f"sensors.{role}"
                 raise ValueError(
-                    f"the channel {role} has no sensor; add the table [{table}] (docs/sensor-units.md)"
+                    f"the channel {role} has no sensor; add the table [{sensor_table(role)}] "
+                    "(docs/sensor-units.md)"
                 )
         if self.controller is not None and self.vibrometer is None:
             raise ValueError("a controller samples the velocity of m0; add the table [vibrometer]")
         return self
 
     def sensor(self, role: Role) -> SensorConfig | None:
-        """Return the sensor of a channel; None for a voltage, and where none is described."""
+        """Return the sensor of a channel; None for a voltage, or if none is described."""
         described = {Role.BASE_ACCELERATION: self.accelerometer, Role.M0_VELOCITY: self.vibrometer}
         return described.get(role, self.sensors.get(role))
 
     @property
     def response(self) -> Role | None:
-        """Channel that shows the motion of m0, the first of RESPONSE_ROLES; None without one."""
+        """Channel that shows the motion of m0, the first of RESPONSE_ROLES; None if there is none."""
         roles = {channel.role for channel in self.daq.channels}
         return next((role for role in RESPONSE_ROLES if role in roles), None)
 
@@ -464,12 +464,12 @@ class Rig(FrozenModel):
 
     @property
     def plays_back(self) -> bool:
-        """Whether a recording takes the place of the instruments."""
+        """Whether a recording replaces the instruments."""
         return self.daq.driver == "file"
 
     @property
     def knobs(self) -> tuple[Knob, ...]:
-        """Everything that is set by hand."""
+        """All manual settings."""
         amplifier, vibrometer = self.amplifier, self.vibrometer
         knobs = (
             Knob(instrument=amplifier.model, setting="gain", value=f"{amplifier.gain_db:g} dB"),

@@ -1,12 +1,11 @@
-"""What is set by hand: the operator confirms it, and the sheet goes into every recording."""
+"""Manual settings, which the operator confirms, and calibrations; both are stored in every recording."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from enum import StrEnum, auto
 from pathlib import Path
-from types import MappingProxyType
 from typing import Protocol, cast
 
 from pydantic import AwareDatetime, Field
@@ -16,32 +15,30 @@ from vibench.sim.operating_system.this import replace_file
 from ..errors import CheckFailed, CheckStopped, ConfigurationError
 from ..host.toml_file import FrozenModel, load_toml
 from ..instruments import Knob, PlugInKind, SensorFacts, driver_of
-from ._configuration import ChannelConfig, Rig, Role
+from ._configuration import ChannelConfig, Rig
+from ._sensors import Role, sensor_table
 
 
 class Sensor(Protocol):
-    """What an entry point of ``vibench.sensors`` is: it tells the facts, and may ask its instrument."""
+    """Entry point of ``vibench.sensors``: returns a sensor's facts, and may read its instrument."""
 
     def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
         """Return the facts of the sensor in front of an input."""
 
 
-_USUAL: Mapping[Role, str] = MappingProxyType(
-    {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
-)
-
-
 def sensor_name(config: ChannelConfig) -> str:
-    """Name the sensor in front of an input: the one that is given, or the usual one of its role."""
-    usual = "wire" if config.role.quantity == "voltage" else "transducer"
-    return config.sensor or _USUAL.get(config.role, usual)
+    """Return the plug-in of a channel's sensor: the configured one, or the default of its role."""
+    if config.sensor is not None:
+        return config.sensor
+    table = sensor_table(config.role)
+    return "wire" if config.role.quantity == "voltage" else "transducer" if "." in table else table
 
 
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Return the facts of the sensor in front of an input.
 
-    Raises ConfigurationError when no package offers it, or it measures something else than the role records;
-    BrokenPromise when it is somebody else's, and fails or tells what no sensor can be.
+    Raises ConfigurationError when no package offers it, or it measures another quantity than the channel;
+    BrokenPromise when another package's sensor fails or returns impossible facts.
     """
     name = sensor_name(config)
     facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
@@ -55,7 +52,7 @@ def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 
 def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Volts as they are, behind the attenuation of the channel."""
+    """Return the facts of a wire: volts, divided by the channel's attenuation."""
     if config.role is Role.AMPLIFIER_VOLTAGE:
         return SensorFacts(
             "voltage", "V", 1.0, float("inf"), "amplifier output, by wire", rig.amplifier.serial
@@ -71,7 +68,7 @@ def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
     role, sensor = config.role, rig.sensor(config.role)
     if sensor is None:
         raise ConfigurationError(
-            f"the channel {role.value} has no sensor; add the table [sensors.{role.value}]"
+            f"the channel {role.value} has no sensor; add the table [{sensor_table(role)}]"
         )
     return SensorFacts(
         role.quantity,
@@ -87,7 +84,7 @@ def transducer(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 @dataclass(frozen=True)
 class Channel:
-    """One recorded quantity and everything needed to turn its volts into units."""
+    """One recorded quantity, and the conversion of its volts to units."""
 
     role: Role
     physical: str
@@ -99,7 +96,7 @@ class Channel:
     units_per_volt: float
     """Physical units per volt at the converter's input."""
     full_scale_v: float
-    """The smaller of what the sensor can put out and what the input can take [V]."""
+    """The smaller of the sensor's largest output and the input's range [V]."""
     range_v: float
     coupling: str
     iepe_current_a: float
@@ -111,7 +108,7 @@ class Channel:
 
 
 def channels_of(rig: Rig) -> tuple[Channel, ...]:
-    """All channels of a rig, in the order of its configuration."""
+    """Return all channels of a rig, in the order of its configuration."""
     return tuple(_channel(rig, config) for config in rig.daq.channels)
 
 
@@ -135,38 +132,38 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# Long enough for a campaign of a day and a night; later somebody may have turned a knob.
+# Long enough for a campaign of a day and a night; later, somebody may have changed a setting.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
 
 class KnobSheet(FrozenModel):
-    """Which settings somebody has seen with their own eyes, who, and when."""
+    """Settings that an operator has looked at, with name and time."""
 
     operator: str = Field(min_length=1)
-    """Name, or how it was confirmed."""
+    """Name, or the way of confirmation."""
     confirmed: AwareDatetime
     knobs: tuple[Knob, ...]
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Asks for the knobs and returns the sheet; raises CheckFailed when one of them is not as it should be."""
+"""Ask about the settings and return the sheet; raises CheckFailed when one of them is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Confirm for a virtual rig, whose knobs stand where its configuration says."""
+    """Confirm the settings of a virtual rig, which always follow its configuration."""
     return KnobSheet(operator="simulated", confirmed=datetime.now(UTC), knobs=knobs)
 
 
 def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
-    """Ask about each knob, one question each.
+    """Return a function that asks one question about each setting.
 
     Parameters
     ----------
     ask
-        Shows a question and returns the answer: ``input``, or a dialogue's.
+        Shows a question and returns the answer: ``input``, or a dialogue.
     operator
-        Who answers.
+        Name of the person who answers.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -183,7 +180,7 @@ def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
 
 
 def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Ask the person at the terminal; raises CheckFailed when there is none, CheckStopped at a Ctrl-C.
+    """Ask at the terminal; raises CheckFailed when there is none, CheckStopped at a Ctrl-C.
 
     An unattended program uses `confirm_by_sheet`.
     """
@@ -202,19 +199,19 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
-    """Take an earlier confirmation for granted, as long as it is recent and about the same settings.
+    """Return a function that accepts an earlier confirmation if it is recent and has the same settings.
 
     Parameters
     ----------
     path
-        The sheet, as `save_knob_sheet` wrote it.
+        The sheet from `save_knob_sheet`.
     valid
-        How long a confirmation holds.
+        Time during which a confirmation is valid.
 
     Raises
     ------
     CheckFailed
-        When it is asked, and the sheet is older or about other settings.
+        When the function is called, and the sheet is older or has other settings.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -237,7 +234,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Keep a sheet in place of an older one; raises ConfigurationError where another file has the name."""
+    """Save a sheet, replacing an older one; raises ConfigurationError when the file is no sheet."""
     if path.exists():
         load_knob_sheet(path)
     knobs = "".join(
@@ -256,7 +253,7 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
 
 
 def load_knob_sheet(path: Path) -> KnobSheet:
-    """Read a sheet; raises ConfigurationError with file, key and what is allowed."""
+    """Read a sheet; raises ConfigurationError with file, key and allowed values."""
     return load_toml(path, KnobSheet)
 
 
@@ -271,17 +268,17 @@ def _quote(text: str) -> str:
 
 
 class CalibrationRule(StrEnum):
-    """What a calibration that has run out does."""
+    """Effect of an expired calibration."""
 
     ENFORCED = auto()
     """The bench does not open."""
     WAIVED = auto()
-    """The bench opens; the dates stand in every recording."""
+    """The bench opens; every recording contains the dates."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """One calibration and its age."""
+    """A calibration and its age."""
 
     what: str
     calibrated: date
@@ -290,17 +287,17 @@ class Calibration:
 
     @property
     def is_to_come(self) -> bool:
-        """Whether its date is a slip of the pen."""
+        """Whether its date is in the future, a slip of the pen."""
         return self.age_days < 0
 
     @property
     def is_valid(self) -> bool:
-        """Whether it holds today; a date to come does not."""
+        """Whether it is valid today; a future date is not."""
         return 0 <= self.age_days <= self.valid_days
 
     @property
     def advice(self) -> str:
-        """What to do about one that does not hold."""
+        """Advice about an invalid one."""
         if self.is_to_come:
             return "the date is still to come: enter the one on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"
@@ -311,14 +308,9 @@ class Calibration:
 
 
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
-    """Every calibration of a rig: that of each sensor which tells one, and each input's.
+    """Return all calibrations of a rig: of every sensor with a date, and of every input.
 
-    Parameters
-    ----------
-    rig
-        Whose sheets are read.
-    today
-        Their ages are counted to it.
+    Their ages are counted up to ``today``.
     """
     channels = channels_of(rig)
     sensors = dict.fromkeys(
@@ -333,20 +325,7 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
 
 
 def check_calibrations(rig: Rig, today: date) -> None:
-    """Refuse a rig of which a calibration has run out.
-
-    Parameters
-    ----------
-    rig
-        Whose sheets are read.
-    today
-        Their ages are counted to it.
-
-    Raises
-    ------
-    CheckFailed
-        When one has run out; it names each.
-    """
+    """Raise CheckFailed when a calibration of a rig has expired; the message names each."""
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:
         raise CheckFailed(

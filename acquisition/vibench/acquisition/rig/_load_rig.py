@@ -1,4 +1,4 @@
-"""Hardware configurations from files, with the plug-ins that they name and scripts of faults."""
+"""Read hardware configurations, and find the drivers and scripts of faults that they name."""
 
 from pathlib import Path
 from typing import Any, Protocol, cast
@@ -20,12 +20,9 @@ from ._configuration import GeneratorConfig, OutputConfig, Rig
 
 
 def load_rig(path: Path | str) -> Rig:
-    """Read a hardware configuration: a TOML file, or by its name (``"virtual_rig"``) a shipped one.
+    """Read a hardware configuration: a TOML file, or a shipped one by its name (``"virtual_rig"``).
 
-    Raises
-    ------
-    ConfigurationError
-        With file, key, what was given and what is allowed.
+    Raises ConfigurationError with file, key, given value and allowed values.
     """
     path = named(path, "hardware_configs")
     rig = load_toml(path, Rig)
@@ -36,7 +33,7 @@ def load_rig(path: Path | str) -> Rig:
 
 
 def _require_plug_ins(rig: Rig, path: Path) -> None:
-    """Refuse names that no installed package offers; a recording that names them is read without."""
+    """Refuse names that no installed package offers; reading a recording does not need them."""
     asked = [
         ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
         ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
@@ -63,9 +60,9 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
 
 
 def with_faults(rig: Rig, script: Path) -> Rig:
-    """Have a script of faults played on a virtual rig.
+    """Return a virtual rig that plays a script of faults.
 
-    Raises ConfigurationError when the rig is a real one, whose faults come by themselves.
+    Raises ConfigurationError when the rig is a real one.
     """
     if rig.virtual is None:
         raise ConfigurationError(
@@ -78,27 +75,27 @@ def with_faults(rig: Rig, script: Path) -> Rig:
 
 
 class GeneratorDriver(Protocol):
-    """What an entry point of ``vibench.generators`` is: a class, mostly, with both as class methods."""
+    """Entry point of ``vibench.generators``: usually a class with both as class methods."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Yield what the generator can do with this configuration; nothing is opened."""
+        """Return the generator's abilities with this configuration, without opening it."""
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open a generator, its output off, at its smallest amplitude.
+        """Open a generator with its output off, at its smallest amplitude.
 
         Raises InstrumentError when none answers, or another one; nothing stays open then.
         """
 
 
 class DigitizerDriver(Protocol):
-    """What an entry point of ``vibench.digitizers`` is."""
+    """Entry point of ``vibench.digitizers``."""
 
     def open(self, rig: Rig) -> Digitizer:
-        """Reserve a converter with the channels of ``rig.daq``, each setting read back."""
+        """Reserve a converter with the channels of ``rig.daq``, and read each setting back."""
 
 
 class OutputDriver(Protocol):
-    """What an entry point of ``vibench.outputs`` is; it has the name of the digitizer that it starts with."""
+    """Entry point of ``vibench.outputs``; it has the name of the digitizer that it starts with."""
 
     def open(self, physical: str, config: OutputConfig, digitizer: Any) -> AnalogOutput:
         """Set an output to zero volts and reserve it.
@@ -108,20 +105,20 @@ class OutputDriver(Protocol):
         physical
             Full name: ``"Dev1/ao0"``.
         digitizer
-            What the digitizer's driver of the same name has opened; both start together.
+            The digitizer that the driver of the same name has opened; both start together.
         """
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:
-    """Find the driver of a generator; raises ConfigurationError where none is installed."""
+    """Return the driver of a generator; raises ConfigurationError when it is not installed."""
     return cast("GeneratorDriver", driver_of(PlugInKind.GENERATOR, config.driver, GeneratorDriver))
 
 
 def digitizer_driver(rig: Rig) -> DigitizerDriver:
-    """Find the driver of a converter; raises ConfigurationError where none is installed."""
+    """Return the driver of a converter; raises ConfigurationError when it is not installed."""
     return cast("DigitizerDriver", driver_of(PlugInKind.DIGITIZER, rig.daq.driver, DigitizerDriver))
 
 
 def output_driver(rig: Rig) -> OutputDriver:
-    """Find the driver of an analogue output; raises ConfigurationError where none is installed."""
+    """Return the driver of an analogue output; raises ConfigurationError when it is not installed."""
     return cast("OutputDriver", driver_of(PlugInKind.OUTPUT, rig.daq.driver, OutputDriver))

@@ -1,4 +1,4 @@
-"""The rig as a linear chain, from a volt at the generator's terminal to table and specimen."""
+"""Linear model of the rig, from voltage at the generator's terminal to table and specimen."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,7 +16,7 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""The current limiter's setting is the rms of the largest sine it lets pass."""
+"""The current limiter's setting is the rms of the largest unlimited sine."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
@@ -59,25 +59,25 @@ _COLUMNS = {
     BaseQuantity.M0_ACCELERATION: (_M0, 2),
     BaseQuantity.P: (_P, 0),
 }
-"""Column of the motion, and the power of i w that it is multiplied by."""
+"""Column of the motion, and the power of i w that multiplies it."""
 
 
 class OnTable(StrEnum):
-    """What stands on the table."""
+    """Load on the table."""
 
     SPECIMEN = "specimen"
     NOTHING = "nothing"
-    """Smooth over frequency: for feedback, which measures what the specimen does."""
+    """Smooth over frequency: for feedback, which measures the specimen's influence."""
 
 
 @dataclass(frozen=True)
 class RigModel:
     """A rig from the generator's terminal to table and specimen, linear except for the specimen's stops.
 
-    Coil, table and specimen answer a voltage together (`vibench.sim.shaker`): the specimen notches and raises
-    the table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops
-    are in it to first order. Not in it: clipping, the current limiter, the table's stops and its axial
-    resonance above 15 kHz. Those belong to the virtual rig or to the check with the rig itself.
+    Coil, table and specimen are solved together (`vibench.sim.shaker`): the specimen changes the table's
+    motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops are included
+    to first order. Not included: clipping, the current limiter, the table's stops and its axial resonance
+    above 15 kHz. Those belong to the virtual rig or to the check with the rig itself.
     """
 
     rig: Rig
@@ -85,35 +85,35 @@ class RigModel:
 
     @property
     def gap_m(self) -> float:
-        """Smaller clearance of m1 at rest [m]; infinite without stops."""
+        """Smaller gap of m1 at rest [m]; infinite without stops."""
         specimen = specimen_of(self.rig)
         without = self.on_table is OnTable.NOTHING or isinstance(specimen.contact, NoContact)
         return inf if without else min(specimen.gaps_m)
 
     def transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Peak of ``quantity`` per volt at the generator's terminal, with phase, shape of ``frequency_hz``.
+        """Return ``quantity`` per volt at the generator's terminal, complex peaks, shape of ``frequency_hz``.
 
-        While no stop is touched. Time goes as exp(+i omega t). Zero hertz is allowed: a direct-coupled
-        amplifier holds the table deflected, one with a lower band edge does not.
+        Valid without collisions; time dependence exp(+i omega t). Zero hertz is allowed: only a
+        direct-coupled amplifier deflects the table permanently.
         """
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return `transfer` while the stops hold m1 to m2."""
+        """Return `transfer` with m1 fixed to m2 by the stops."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Peak of ``quantity`` per metre of a p that the stops bring about, shape of ``frequency_hz``."""
+        """Return peaks of ``quantity`` per metre of p that the stops cause, shape of ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
-        """Peak of ``quantity`` under sines of these voltages at the terminal, peak, shape of both [V]."""
+        """Return peaks of ``quantity`` under sines of peak voltage ``terminal_v`` [V], shape of both."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).under(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:
-        """Return the peak at the terminal [V] that holds the table's acceleration [m/s2], shape (n,)."""
+        """Return the peak voltage at the terminal [V] for a table's acceleration [m/s2], shape (n,)."""
         hz = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         base_m = np.asarray(acceleration, dtype=np.float64) / (2 * np.pi * hz) ** 2
         return self._motion(hz).volts_for(base_m, self.gap_m)
@@ -140,12 +140,12 @@ class RigModel:
 def _kept_motion(
     amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: bytes
 ) -> LinearMotion:
-    """Solve once for what is asked of the same lines quantity by quantity."""
+    """Solve once for all quantities at the same frequencies."""
     return linear_motion(amplifier, shaker, specimen, np.frombuffer(frequency_hz, dtype=np.float64))
 
 
 def suspended_mass_kg(shaker: ShakerConfig) -> float:
-    """Everything rigid that the coil moves [kg]: moving element and fixture, without the specimen."""
+    """Return the rigid mass that the coil moves [kg]: moving element and fixture, without the specimen."""
     return shaker.moving_mass_kg + shaker.fixture_mass_kg
 
 
@@ -155,7 +155,7 @@ def specimen_of(rig: Rig) -> Specimen:
 
 
 def amplifier_of(rig: Rig) -> Amplifier:
-    """Return the numbers of a rig's amplifier that the simulated table is driven with."""
+    """Return the values of a rig's amplifier for the simulation."""
     amplifier = rig.amplifier
     return Amplifier(
         gain=amplifier.gain,
@@ -167,7 +167,7 @@ def amplifier_of(rig: Rig) -> Amplifier:
 
 
 def shaker_of(rig: Rig) -> Shaker:
-    """Return the numbers of a rig's shaker, its fixture included."""
+    """Return the values of a rig's shaker, fixture included, for the simulation."""
     shaker = rig.shaker
     return Shaker(
         moving_mass_kg=suspended_mass_kg(shaker),

@@ -1,9 +1,12 @@
 """Sensors as data sheets and certificates describe them, and the channels that they show."""
 
 import re
+from abc import abstractmethod
+from collections.abc import Mapping
 from datetime import date
 from enum import StrEnum
 from itertools import product
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat
@@ -27,7 +30,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Of a number in front of a unit; what lies beyond, or beyond its inverse, is a slip."""
+"""Smallest number of a sensitivity; anything below it, or above its inverse, is a slip of the pen."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
@@ -63,25 +66,25 @@ def volts_per_unit(text: str, unit: str) -> float:
 
 
 def _plain(unit: str) -> str:
-    """Write a unit with one spelling of powers, products and spaces."""
+    """Return a unit in one spelling of powers, products and spaces."""
     letters = unit.translate(_SIGNS).replace("**", "").replace("^", "").replace("*", " ")
     return re.sub(r"\s*([/()])\s*", r"\1", letters).strip()
 
 
 class Sourced(FrozenModel):
-    """A figure with the place it comes from, so that nobody mistakes a memory for a data sheet."""
+    """A value and its source, so that nobody mistakes an assumption for a data sheet."""
 
     value: PositiveFloat
     source: str = Field(min_length=1)
 
 
 class StatedUncertainty(FrozenModel):
-    """Relative uncertainty of a sensitivity, as a certificate or a data sheet states it."""
+    """Relative uncertainty of a sensitivity, from a certificate or a data sheet."""
 
     relative: float = Field(gt=0.0, lt=1.0)
     """Expanded uncertainty over the value: 0.01 for 1 %."""
     coverage_factor: PositiveFloat = 2.0
-    """Expanded over standard uncertainty: 2 on most certificates, 1.73 for bounds of a rectangle."""
+    """Expanded over standard uncertainty: 2 on most certificates, 1.73 for uniform bounds."""
     source: str = Field(min_length=1)
     """Certificate with its number, or data sheet."""
 
@@ -102,44 +105,44 @@ class SensorConfig(FrozenModel):
     full_scale_v: PositiveFloat
     """Largest output, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
-    """Upper -3 dB frequency, first order [Hz]; absent: far above what is measured."""
+    """Upper -3 dB frequency, first order [Hz]; absent: far above the measured band."""
     resonance_hz: PositiveFloat | None = None
-    """Mounted resonance [Hz]; absent likewise."""
+    """Mounted resonance [Hz]; absent: far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
-    """Signal delay of its electronics, bandwidth included [s]; the analysis takes it out of the phase."""
+    """Signal delay of its electronics, bandwidth included [s]; the analysis corrects the phase for it."""
     iepe: Literal["yes", "no"] = "no"
-    """Whether the input feeds it a current."""
+    """Whether the input supplies it with current."""
     calibrated: date
     uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the calibration; absent: not stated, and every result says so."""
+    """Uncertainty of the calibration; absent: not stated, and every result reports that."""
     alignment_deg: Sourced | None = None
     """Largest angle between sensitive axis, or beam, and motion [degree]."""
     noise_per_rthz: Sourced | None = None
-    """Density of its noise [SI unit per root hertz]; absent: not stated."""
+    """Spectral density of its noise [SI unit per root hertz]; absent: not stated."""
 
     @property
     def name(self) -> str:
         """Name in results."""
         return self.model
 
+    @abstractmethod
     def units_per_volt(self, unit: str) -> float:
-        """Return SI units of the motion per volt; ``unit`` is that of the channel."""
-        raise NotImplementedError(unit)
+        """Return SI units of the quantity per volt; ``unit`` is the channel's."""
 
 
 class TransducerConfig(SensorConfig):
-    """Any sensor of a channel: a table ``[sensors.m0_acceleration]``."""
+    """Any other sensor: a table such as ``[sensors.m0_acceleration]``."""
 
     sensitivity: str
     """With the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
 
     def units_per_volt(self, unit: str) -> float:
-        """Return SI units per volt; raises ValueError when the sensitivity is not one for this unit."""
+        """Return SI units per volt; raises ValueError when the sensitivity has another unit."""
         return 1 / volts_per_unit(self.sensitivity, unit)
 
 
 class VibrometerConfig(SensorConfig):
-    """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
+    """The laser vibrometer. The operator sets range and filters by hand, and confirms them."""
 
     decoder: str
     range_mm_per_s_per_v: Annotated[
@@ -149,7 +152,7 @@ class VibrometerConfig(SensorConfig):
     bandwidth_hz: PositiveFloat
     tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
     delay_s: NonNegativeFloat
-    """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
+    """Signal delay of the decoder [s]; the analysis corrects the phase for it."""
 
     @property
     def name(self) -> str:
@@ -179,9 +182,9 @@ class AccelerometerConfig(SensorConfig):
 
 
 class Role(StrEnum):
-    """What a channel records; the name of its dataset: a place on the rig, and a quantity.
+    """Place and quantity that a channel records; the name of its dataset.
 
-    ``base_force`` is the force by which the shaker's table moves what stands on it.
+    ``base_force`` is the force of the shaker's table on everything mounted on it.
     """
 
     DRIVE_VOLTAGE = "drive_voltage"
@@ -225,4 +228,12 @@ UNIT_OF_QUANTITY = {
 }
 """UDUNITS text, by the quantity of a channel."""
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
-"""Channels that show the motion of m0; the first that is there is used."""
+"""Channels that show the motion of m0; the first one of a rig is used."""
+_TABLES: Mapping[str, str] = MappingProxyType(
+    {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
+)
+
+
+def sensor_table(role: str) -> str:
+    """Return the table of a hardware configuration that describes the sensor of a channel."""
+    return _TABLES.get(role, f"sensors.{role}")

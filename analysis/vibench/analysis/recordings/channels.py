@@ -12,6 +12,7 @@ from vibench.acquisition.recording import (
     SegmentLabel,
     coupling_cut_hz,
 )
+from vibench.acquisition.rig import sensor_table
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Reals
@@ -59,9 +60,7 @@ def coupled_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz:
 
 def described_sensor(bench: Mapping[str, Any], role: str) -> Mapping[str, Any]:
     """Return what a bench configuration says of the sensor of a channel; empty where it says nothing."""
-    table = {BASE: "accelerometer", VELOCITY: "vibrometer"}.get(role)
-    found = bench.get(table) if table else (bench.get("sensors") or {}).get(role)
-    return found or {}
+    return bench.get(sensor_table(role)) or (bench.get("sensors") or {}).get(role) or {}
 
 
 def _number(sensor: Mapping[str, Any], key: str) -> float:
