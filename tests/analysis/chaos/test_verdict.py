@@ -278,11 +278,11 @@ def test_a_motion_that_noise_could_hide_is_not_called_periodic():
 @pytest.mark.parametrize(
     ("value", "noise", "drive_hz", "said"),
     [
-        (np.full((500, 2), np.nan), QUIET, DRIVE_HZ, "points hold values that are not finite"),
+        (np.full((500, 2), np.nan), QUIET, DRIVE_HZ, "points contain values that are not finite"),
         (np.zeros(500), QUIET, DRIVE_HZ, r"points of shape \(500,\) with noise of shape \(2,\) were given"),
         (np.zeros((500, 2)), np.full(3, 1e-3), DRIVE_HZ, r"with noise of shape \(3,\) were given"),
-        (np.zeros((500, 2)), -QUIET, DRIVE_HZ, "is none; give standard deviations"),
-        (np.zeros((500, 2)), QUIET, -260.0, "a drive of -260.0 Hz is none"),
+        (np.zeros((500, 2)), -QUIET, DRIVE_HZ, "is not allowed; give standard deviations"),
+        (np.zeros((500, 2)), QUIET, -260.0, "a drive frequency of -260.0 Hz is not allowed"),
     ],
 )
 def test_points_that_are_none_are_refused(value, noise, drive_hz, said):

@@ -149,7 +149,7 @@ def test_where_nothing_was_played_there_are_no_densities(tmp_path):
     with open_recording(recorded(tmp_path / "a.h5", RUN)) as recording:
         for stretch in ((0.0, 1.5), (0.0, 2.4)):
             with pytest.raises(
-                NotEnoughData, match=r"need 1 s in one piece of what was played.*; choose more of it"
+                NotEnoughData, match=r"need 1 s of uninterrupted excitation.*; choose a longer excerpt"
             ):
                 spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest())
 

@@ -1,6 +1,6 @@
-"""The verdict on a recorded motion: periodic, quasi-periodic, chaotic, or that the data cannot say.
+"""Verdict on a recorded motion: periodic, quasi-periodic, chaotic or undecided.
 
-Where in a record its last motion begins: chaos may be a transient that ends in the middle of a dwell.
+Chaos may be a transient that ends during a dwell, so the last motion of a record is found first.
 """
 
 import math
@@ -31,28 +31,28 @@ from .witnesses import (
 
 _HARMONICS = 8
 _EXPLAINED = 0.02
-"""Part of the spread that the harmonics of one rotation may leave unexplained on a smooth closed curve."""
+"""Largest residual of a fit of one rotation's harmonics to a smooth closed curve, relative to the spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Largest residual beside one rotation that stands out of noise."""
+"""Largest residual of one rotation that is significant above noise."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
-"""Relative deviation of a grid's frequency."""
+"""Relative tolerance of the mains frequency."""
 
 
 @dataclass(frozen=True)
 class Rotation:
-    """The best closed curve through a section's points."""
+    """Best closed curve through the points of a section."""
 
     turns_per_period: float
-    """How far the points run round it in a drive period, 0 to 0.5."""
+    """Rotation number: turns per drive period, 0 to 0.5."""
     left_over: float
-    """Root mean square distance of the points from it, over their spread."""
+    """RMS distance of the points from it, relative to their spread."""
 
 
 def rotation(points: Reals) -> Rotation:
-    """Fit the harmonics of one frequency to the points of a section.
+    """Fit a closed curve, the harmonics of one frequency, to the points of a section.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def rotation(points: Reals) -> Rotation:
 
 
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
-    """Return the mains frequency, or its harmonic, that explains this rotation of the points; else None."""
+    """Return the mains frequency or harmonic that explains this rotation; otherwise None."""
     for mains in _MAINS_HZ:
         for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
             turns = hum_hz / drive_hz
@@ -94,15 +94,15 @@ def _residual(centred: Reals, turns: float) -> float:
 
 _BLOCKS = 10
 _SHORTEST_BLOCK = 50
-"""Drive periods that say whether a motion repeats."""
+"""Drive periods per block, enough to see whether a motion repeats."""
 
 
 def begin_of_last_motion(points: Points) -> int:
-    """Return the index of the first point of the motion that a record ends in; 0 where it never changes.
+    """Return the index at which the last motion of a record starts; 0 if it never changes.
 
-    A record is cut into blocks, each of which repeats itself within its noise or does not. One change from
-    the one to the other is a transient that has ended, or a motion that was lost. More than one are chaos
-    with calm stretches, and belong to one motion.
+    Each block of the record repeats within its noise or not. A single change between the two is the end of
+    a transient or the loss of a motion. Several changes are chaos with calm stretches and count as one
+    motion.
     """
     count = len(points.value)
     edges = np.linspace(0, count, max(min(_BLOCKS, count // _SHORTEST_BLOCK), 1) + 1).astype(int)
@@ -115,59 +115,60 @@ def begin_of_last_motion(points: Points) -> int:
     changes = np.flatnonzero(repeats[1:] != repeats[:-1])
     if changes.size != 1:
         return 0
-    # The block in which it changes does not repeat: a motion that is lost begins somewhere inside it.
+    # The change lies somewhere inside the block that does not repeat.
     last = int(changes[0]) + 1
     return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
 
 
 MOST_POINTS = 3000
-"""Number of last points whose shape is tested: more would only cost time."""
+"""Number of last points whose shape is tested; more would only take time."""
 ABOVE_NOISE = 5.0
-"""Scatter of the points over their noise below which its shape says nothing."""
+"""Least ratio of scatter to noise for tests of the shape."""
 LARGEST_NOISE = 0.1
-"""Noise over the size of the orbit, beyond which points that repeat within it may hide any other motion."""
+"""Largest ratio of noise to orbit; more noise could hide another motion."""
 SMALL = 0.05
-"""Scatter, as part of the orbit, up to which linear noise about a fixed point leaves a motion periodic."""
+"""Largest scatter relative to the orbit of a periodic motion with linear noise."""
 SLOW = 0.5
-"""Part of the points' variance between tenths of the record, beyond which slow change explains it."""
+"""Share of the variance between tenths of the record, beyond which slow change explains the scatter."""
 _FEWEST_TURNS = 3.0
-"""Turns of a closed curve in a record below which it counts as a slow change."""
+"""Fewest turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
-"""Part of the orbit that mains hum may reach; more may be a motion at its frequency."""
+"""Largest mains hum relative to the orbit; more may be motion at its frequency."""
 _LOW_PERIOD = 4
-"""Period doublings reach it; a drive of twice the mains' frequency makes hum repeat as soon."""
+"""Longest period of interest; a drive at twice the mains frequency makes hum repeat as soon."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Standard deviations below the surrogates' mean: a rank alone is reached once in 40 series of noise."""
+"""Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40 series of
+noise."""
 _ASYMMETRIC = 2.5
-"""The same for the symmetry in time; the better of two coordinates exceeds it in about 4 % of noise."""
+"""The same for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0
-"""Standard deviations, from tenths of a record, by which a bound lies below a slope."""
+"""Distance of the lower bound below a slope in standard deviations, from tenths of a record."""
 _DELAYS = 3
 _STEPS = 8
 
 
 class MotionKind(StrEnum):
-    """How a motion under a sine repeats."""
+    """Kind of motion under a sine."""
 
     PERIODIC = "periodic"
     QUASI_PERIODIC = "quasi-periodic"
     CHAOTIC = "chaotic"
     UNDECIDED = "undecided"
-    """The data carry no verdict; `MotionVerdict.why` says what is missing."""
+    """The data allow no verdict; `MotionVerdict.why` states the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was measured on the points; None where a question did not arise."""
+    """Results of the tests; None if a test was not needed."""
 
     drive_hz: float
     periods: int
-    """Drive periods judged."""
+    """Number of drive periods tested."""
     spread: float
-    """Scatter of the points, over the size of the orbit."""
+    """Scatter of the points relative to the size of the orbit."""
     noise: float
-    """The same of the noise."""
+    """Noise relative to the size of the orbit."""
     is_settled: bool
     rotation: Rotation | None = None
     zero_one: ZeroOne | None = None
@@ -177,7 +178,7 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class MotionVerdict(Labelled):
-    """What a motion is, and why one may say so."""
+    """Kind of a motion, with the reason."""
 
     DOCUMENT: ClassVar = (
         "kind why period periods_judged=evidence.periods is_settled=evidence.is_settled "
@@ -194,10 +195,10 @@ class MotionVerdict(Labelled):
 
     @property
     def least_exponent_per_s(self) -> float | None:
-        """Lower bound on the largest Lyapunov exponent of a chaotic motion; None where the data resolve none.
+        """Lower bound on the largest Lyapunov exponent of a chaotic motion; None if unresolved.
 
-        Noise and the size of the motion flatten the slope that neighbours part with, by up to a half, and
-        nothing in a record tells how much. Points that scatter for other reasons part as well.
+        Noise and the size of the motion reduce the slope by up to a half, by an unknown amount. Points that
+        scatter for other reasons diverge as well.
         """
         parting = self.evidence.divergence
         if self.kind is not MotionKind.CHAOTIC or parting is None or not parting.is_resolved:
@@ -207,32 +208,32 @@ class MotionVerdict(Labelled):
 
 
 def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
-    """Judge a motion by its points, taken once per drive period.
+    """Classify a motion from its points, one per drive period.
 
-    A motion is *periodic* when its points repeat within their noise, *quasi-periodic* when they run round
-    a closed curve, and *chaotic* only when all witnesses agree: settled, far above the noise, on no curve,
-    the 0-1 test near one on points that are not oversampled, and more than linear noise by surrogates. Each
-    of these alone passes noise for chaos; anything less is undecided. Of a motion that changes once, as when
-    a chaotic transient ends, the last part is judged: an end that repeats by itself, any other if it is the
-    longer part. Where the noise is more than a tenth of the orbit, nothing can be said to repeat.
+    A motion is *periodic* if its points repeat within their noise, *quasi-periodic* if they lie on a closed
+    curve, and *chaotic* only if all tests agree: settled, far above the noise, on no closed curve, 0-1 test
+    near one without oversampling, and linear noise rejected by surrogates. Each test alone would accept
+    some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a
+    chaotic transient ends, the last part is classified: always if it repeats, otherwise only if it is the
+    longer part. Noise above a tenth of the orbit excludes the verdict periodic.
 
     Parameters
     ----------
     points
-        As many drive periods as there are; whether they repeat is judged over all, their shape over the last
+        All drive periods; repetition is tested over all, the shape over the last
         3000.
     drive_hz
-        Turns exponents per period into exponents per second.
+        Drive frequency, to convert exponents per period to exponents per second.
     seed
         Of the random frequencies and surrogates.
 
     Raises
     ------
     InvalidRequest
-        When the drive's frequency is not positive and finite.
+        When the drive frequency is not positive and finite.
     """
     if not 0.0 < drive_hz < math.inf:
-        raise InvalidRequest(f"a drive of {drive_hz} Hz is none; give a positive frequency")
+        raise InvalidRequest(f"a drive frequency of {drive_hz} Hz is not allowed; give a positive one")
     count = len(points.value)
     if count < FEWEST:
         return _too_few(
@@ -244,12 +245,12 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     if before == 0:
         return _of_one_motion(points, drive_hz, seed)
     rest = Points(points.value[before:], points.noise)
-    too_late = "before the end, too late to judge what it became; dwell longer"
+    too_late = "before the end, too late to classify the new motion; dwell longer"
     if count - before < FEWEST:
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
-    # A settled end is seen to repeat, however long the transient; an irregular one may be a transient, and
-    # so may a long period: what decays into noise turns round a point.
+    # A settled end repeats, however long the transient was. An irregular end or a long period may itself be
+    # a transient: a decay into noise rotates about a point.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
@@ -264,8 +265,8 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
         )
     if last.noise_level > LARGEST_NOISE:
         return _undecided(
-            f"noise is {100 * last.noise_level:.0f} % of the orbit, which may hide whether "
-            "it repeats, or that there is any motion at all; raise the level or use a finer range",
+            f"noise is {100 * last.noise_level:.0f} % of the orbit, which is too much to see whether the "
+            "motion repeats; raise the level or use a finer range",
             evidence,
         )
     period = shortest_period(last)
@@ -284,7 +285,7 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
 
 
 def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
-    """Mains hum on a motion that repeats every drive period, unless it may be a motion at its frequency."""
+    """Return the verdict on a periodic motion with mains hum, which may also be motion at its frequency."""
     if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
         why = (
             f"the points repeat every drive period, except for {100 * evidence.spread:.2g} % of the orbit at "
@@ -325,17 +326,18 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
         hum_hz = mains_hz(found, so_far.drive_hz, len(points.value))
         if hum_hz is not None:
             return _humming(evidence, hum_hz, None)
-        why = f"the points run round a closed curve, {found.turns_per_period:.4f} turns a drive period"
+        why = f"the points lie on a closed curve, {found.turns_per_period:.4f} turns a drive period"
         return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
         if evidence.spread <= SMALL:
             why = (
-                f"the points stay within {100 * evidence.spread:.1f} % of the orbit, hardly above their noise"
+                f"the points stay within {100 * evidence.spread:.1f} % of the orbit, not clearly above their "
+                "noise"
             )
             return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
         return _undecided(
-            f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and below "
-            f"{ABOVE_NOISE:g} times its shape says nothing; raise the level or use a finer vibrometer range",
+            f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and the "
+            f"tests of shape need {ABOVE_NOISE:g} times; raise the level or use a finer vibrometer range",
             evidence,
         )
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
@@ -351,7 +353,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
-    """Test for noise behind a static nonlinearity; a monotone one keeps ranks, any keeps symmetry in time."""
+    """Test for noise after a static nonlinearity: a monotone one keeps ranks, any keeps time symmetry."""
     ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:
@@ -381,8 +383,8 @@ def _verdict(
         )
     if test.is_oversampled:
         return _undecided(
-            f"neighbouring points resemble each other ({test.neighbour_correlation:.2f}), which the 0-1 test "
-            "takes for order; record longer",
+            f"neighbouring points are correlated ({test.neighbour_correlation:.2f}), so the 0-1 test is "
+            "not valid; record longer",
             evidence,
         )
     if test.k < CHAOTIC_K:
@@ -396,11 +398,11 @@ def _verdict(
 
 
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
-    """Nothing but linear noise is seen: about a fixed point if it is small, else who can say."""
+    """Return the verdict for linear noise: periodic if it is small, otherwise undecided."""
     if evidence.spread > SMALL:
         return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (
         f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
-        f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"
+        f"(p = {noise_test.p:.2f}), although by more than the vibrometer noise"
     )
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)

@@ -1,4 +1,4 @@
-"""Witnesses of chaos in a recorded motion: parting neighbours, the 0-1 test, and surrogates."""
+"""Tests for chaos in a recorded motion: divergence of neighbours, the 0-1 test, and surrogates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""Neighbours looked at before a point is given up: those in its own time window do not count."""
+"""Neighbours tried for each point; those within its own time window do not count."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
-    """Put each value beside those before it.
+    """Return delay vectors of a series.
 
     Parameters
     ----------
     series
         Shape (n,) or (n, channels).
     delays
-        How many successive values make one point.
+        Number of successive values per point.
 
     Returns
     -------
@@ -33,7 +33,9 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
         raise InvalidRequest(f"an embedding of {delays} delays is not allowed; give one or more")
     points = columns.shape[0] - delays + 1
     if points < 2:
-        raise NotEnoughData(f"{columns.shape[0]} values do not make an embedding of {delays}; measure longer")
+        raise NotEnoughData(
+            f"{columns.shape[0]} values are too few for an embedding of {delays} delays; measure longer"
+        )
     return np.hstack([columns[first : first + points] for first in range(delays)])
 
 
@@ -58,9 +60,9 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
         Theiler's window: points less than this many steps apart in time are no neighbours, since one
         is merely the other a little later (Theiler, Phys. Rev. A 34 (1986) 2427).
     last
-        Only points before this index take part, so that both can be followed beyond it.
+        Only points before this index are used, so that both can be followed beyond it.
     floor
-        Neighbours at this distance or nearer do not count: noise decides about them.
+        Neighbours closer than this are skipped, because noise dominates.
     """
     tree = cKDTree(points[:last])
     wanted = np.arange(last)
@@ -68,7 +70,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     distance = np.full(last, np.nan)
     tried = 4
     while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
-        # A list of ranks keeps the answer two-dimensional, whatever its length.
+        # A list of ranks keeps the result two-dimensional.
         ranks = list(range(1, min(tried, last) + 1))
         reach, index = (np.asarray(each) for each in tree.query(points[wanted], k=ranks))
         allowed = (np.abs(index - wanted[:, np.newaxis]) >= apart) & (reach > floor)
@@ -84,7 +86,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
 
 
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
-    """Find several neighbours of each point that are ``apart`` steps from it in time or more.
+    """Find several neighbours of each point, at least ``apart`` steps away in time.
 
     Returns
     -------
@@ -97,18 +99,18 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Distances beyond this part of the typical one feel the size of the attractor, not its stretching."""
+"""Larger distances relative to the typical one are limited by the size of the attractor."""
 _ABOVE_NOISE = 3.0
-"""Distances below this many times the noise are made by it."""
+"""Least ratio of a distance to the noise."""
 _SHORTEST_FIT = 3
-"""Steps a line needs to be a statement."""
+"""Fewest steps for a line fit."""
 _BLOCKS = 10
 FEWEST_PAIRS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Divergence:
-    """The mean logarithm of the distance of former neighbours, step by step."""
+    """Mean logarithm of the distance of initial neighbours, step by step."""
 
     logarithm: Reals
     """Mean ln(distance), shape (steps + 1,)."""
@@ -116,34 +118,34 @@ class Divergence:
     """ln of the typical distance of two points of the motion."""
     first: int
     last: int
-    """Steps between which the line was fitted; last - first is 0 where there was no room for one."""
+    """Steps between which the line was fitted; last - first is 0 if there was no room for one."""
     exponent: float
-    """Slope [1/step]; NaN where no line could be fitted."""
+    """Slope [1/step]; NaN without a line."""
     sd_exponent: float
     """Scatter of the slope over tenths of the record."""
     pairs: int
 
     @property
     def is_resolved(self) -> bool:
-        """Whether there was room for a line between noise and saturation."""
+        """Return whether a line could be fitted between noise and saturation."""
         return self.last - self.first >= _SHORTEST_FIT
 
 
 def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float = 0.0) -> Divergence:
-    """Follow neighbouring points until they part.
+    """Follow neighbouring points while they diverge.
 
-    Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit begins where distances stand above
-    the noise and ends before they feel the size of the attractor; a slope fitted across either end is a
-    property of the noise or of the size. Where nothing is left between, there is no exponent.
+    Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit starts where distances exceed the
+    noise and ends before the size of the attractor limits them. Without a range between, there is no
+    exponent.
 
     Raises NotEnoughData when fewer than 50 points have a neighbour.
 
     Parameters
     ----------
     points
-        The motion, shape (n, dimensions): one point a step.
+        The motion, shape (n, dimensions), one point per step.
     steps
-        How long pairs are followed.
+        Number of steps to follow pairs.
     apart
         Neighbours are at least this many steps apart in time.
     noise
@@ -170,7 +172,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
 
 
 def _typical(points: Reals) -> float:
-    """Mean ln distance of points that have nothing to do with each other: half the record apart."""
+    """Mean ln distance of unrelated points, half the record apart."""
     half = points.shape[0] // 2
     distance = np.linalg.norm(points[half : 2 * half] - points[:half], axis=1)
     return float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
@@ -181,7 +183,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # Within its own memory a difference turns into the stretching direction: no part of the line.
+    # Initially a difference rotates into the stretching direction, which is no part of the line.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -201,7 +203,7 @@ _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
 """Frequencies c outside are prone to resonances (section 3.1 of the source)."""
 _FREQUENCIES = 100
 _CUT = 10
-"""The mean square displacement is followed over this part of the series."""
+"""The mean square displacement is computed over this fraction of the series."""
 FEWEST = 200
 OVERSAMPLED = 0.8
 """Correlation of neighbours above which a series is a flow sampled too finely for this test."""
@@ -214,13 +216,13 @@ class ZeroOne:
     k: float
     """Median of the correlations K_c: near 0 regular, near 1 chaotic *or noisy*."""
     spread: float
-    """Half the distance between their quartiles."""
+    """Half their interquartile range."""
     neighbour_correlation: float
     """Neighbour correlation of each value with the next."""
 
     @property
     def is_oversampled(self) -> bool:
-        """Whether neighbours resemble each other so much that K says nothing."""
+        """Return whether neighbours are too correlated for K to be valid."""
         return self.neighbour_correlation > OVERSAMPLED
 
 
@@ -228,8 +230,8 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     """Test a series that was taken once per drive period.
 
     Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
-    oscillatory term removed (eqs. 3.1 to 3.6). Noise passes for chaos in it, and an oversampled chaotic
-    flow for regular motion: it is one witness, never the judge.
+    oscillatory term removed (eqs. 3.1 to 3.6). It mistakes noise for chaos, and an oversampled chaotic flow
+    for regular motion, so it is never used alone.
 
     Raises NotEnoughData when the series is too short.
 
@@ -238,7 +240,7 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     series
         Shape (n,), at least 200 values.
     seed
-        Of the frequencies c.
+        Seed of the frequencies c.
     """
     count = series.size
     if count < FEWEST:
@@ -255,7 +257,7 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
 
 
 def _correlation(series: Reals, frequency: float) -> float:
-    """K_c: how straight the mean square displacement of the translated motion grows."""
+    """K_c: correlation of the mean square displacement of the translated motion with time."""
     count = series.size
     cut = count // _CUT
     walk = np.cumsum(series * np.exp(1j * frequency * np.arange(1, count + 1)))
@@ -268,53 +270,53 @@ def _correlation(series: Reals, frequency: float) -> float:
 
 
 SURROGATES = 39
-"""The smallest statistic of 40 then has a chance of 1/40 = 0.025 if the series is linear noise."""
+"""For linear noise, the statistic is the smallest of 40 with probability 1/40 = 0.025."""
 _DELAYS, _NEIGHBOURS = 4, 10
-"""Values that make a past, and similar pasts that foretell the next value."""
+"""Number of values in a past, and of similar pasts used to predict the next value."""
 _ITERATIONS = 200
 _SETTLED = 1e-8
 _LAGS = (1, 2, 3, 4)
 _SPECTRUM_KEPT = 0.05
-"""Relative error of a surrogate's spectrum up to which it stands for the series."""
+"""Largest relative error of a valid surrogate's spectrum."""
 
 
 @dataclass(frozen=True)
 class SurrogateTest:
-    """A series against linear noise with the same spectrum and the same values."""
+    """Test of a series against linear noise with the same spectrum and values."""
 
     statistic: float
     surrogates: tuple[float, ...]
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
     least_margin: float = 0.0
-    """Margin below which the statistic is due to chance."""
+    """Smaller margins are due to chance."""
 
     @property
     def margin(self) -> float:
-        """How far the statistic lies below the surrogates' mean, in their standard deviations."""
+        """Distance of the statistic below the surrogates' mean, in their standard deviations."""
         away = float(np.mean(self.surrogates)) - self.statistic
         return away / max(float(np.std(self.surrogates, ddof=1)), np.finfo(np.float64).tiny)
 
     @property
     def p(self) -> float:
-        """Chance of a statistic as small as this if the series were linear noise (one-sided rank)."""
+        """Probability of such a small statistic for linear noise (one-sided rank)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 
     @property
     def is_valid(self) -> bool:
-        """Whether the surrogates took over the spectrum; if not, their test says nothing."""
+        """Return whether the surrogates have the right spectrum, without which the test is invalid."""
         return self.spectrum_error <= _SPECTRUM_KEPT
 
     @property
     def rejects_linear_noise(self) -> bool:
-        """Whether the series is more than linear noise."""
+        """Return whether linear noise is rejected."""
         is_lowest = self.p <= 1 / (len(self.surrogates) + 1)
         return self.is_valid and is_lowest and self.margin >= self.least_margin
 
 
 def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
-    """Make one surrogate: the series' values in an order that has its spectrum, else at random.
+    """Return one surrogate: the same values with the same spectrum, otherwise in random order.
 
     Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
 
@@ -339,14 +341,14 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
 
 
 def prediction_error(series: Reals) -> float:
-    """Return how badly each value is foretold by what followed the most similar pasts, over the scatter.
+    """Return the relative prediction error of each value from what followed the most similar pasts.
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
-    4.2), the mean over neighbours: far below 1 where the past decides the future, near 1 where it does not.
-    One neighbour, and fewer delays, left more of the chaos among impacts undecided.
+    4.2), mean over neighbours: far below 1 for a deterministic series, near 1 otherwise. With one neighbour
+    or fewer delays, more chaos with impacts stayed undecided.
     """
     pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
-    # Pasts that share values with the one in question are no neighbours of it.
+    # Pasts with values in common are no neighbours.
     index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
     has = nearest.any(axis=1)
     foretold = np.sum(next_values[index[has]] * nearest[has], axis=1) / np.sum(nearest[has], axis=1)
@@ -357,7 +359,7 @@ def prediction_error(series: Reals) -> float:
 def time_symmetry(series: Reals) -> float:
     """Return the skewness of a series' increments, root mean square over lags of 1 to 4, with a minus sign.
 
-    Linear noise is symmetric in time, also behind any static nonlinearity; dissipative chaos seldom is
+    Linear noise is symmetric in time, also after a static nonlinearity; dissipative chaos rarely is
     (Schreiber and Schmitz, Physica D 142 (2000) 346, section 5).
     """
     rises = [series[lag:] - series[:-lag] for lag in _LAGS]
@@ -368,7 +370,7 @@ def time_symmetry(series: Reals) -> float:
 def surrogate_test(
     series: Reals, statistic: Callable[[Reals], float] = prediction_error, *, seed: int = 0
 ) -> SurrogateTest:
-    """Compare a statistic, which is small for determinism, with that of surrogates.
+    """Compare a statistic, small for deterministic series, with its values for surrogates.
 
     Parameters
     ----------
@@ -377,7 +379,7 @@ def surrogate_test(
     statistic
         `prediction_error` or `time_symmetry`.
     seed
-        Of the surrogates.
+        Seed of the surrogates.
     """
     matched = _with_matching_ends(series)
     rng = np.random.default_rng(seed)
@@ -390,16 +392,16 @@ def surrogate_test(
 
 
 def normal_scores(series: Reals) -> Reals:
-    """Replace values by normal ones of the same rank: this undoes a static, monotone nonlinearity of noise.
+    """Replace values by normal ones of the same rank, which undoes a static monotone nonlinearity.
 
-    Surrogates with the distorted values themselves match the spectrum only after iterations.
+    Surrogates of the distorted values would match the spectrum only after iterations.
     """
     rank = np.argsort(np.argsort(series))
     return np.asarray(ndtri((rank + 0.5) / series.size))
 
 
 def _with_matching_ends(series: Reals) -> Reals:
-    """Cut a few values off so that the end joins the beginning: a jump there would pass for noise."""
+    """Cut a few values off so that the ends match: a jump there would act like noise."""
     most = max(1, series.size // 10)
     heads = series[:most]
     tails = series[series.size - most :]

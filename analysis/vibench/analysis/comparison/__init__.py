@@ -1,6 +1,6 @@
-"""Measurements and predictions overlaid as curves of one kind.
+"""Compare measurements and predictions as curves over frequency.
 
-A curve is displacement of m0 over displacement of the base, against frequency [Hz], with its relative
-standard deviation; a transmission, Response I or Response II, measured, simulated or predicted. Peaks,
-readings at markers and differences of curves; how recordings are analysed for it. Nothing is drawn here.
+A curve is the ratio of m0's displacement to the base displacement over frequency [Hz], with its relative
+standard deviation: a transmission, Response I or Response II, measured, simulated or predicted. Peaks,
+values at markers and differences of curves.
 """

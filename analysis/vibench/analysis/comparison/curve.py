@@ -1,7 +1,7 @@
-"""A curve that can be overlaid on others: motion of m0 over motion of the base, against frequency.
+"""Curve for comparisons: motion of m0 over motion of the base, against frequency.
 
-Transmissions of noise, Responses I and II of sweeps, steps and dwells, and predictions of them all are
-ratios of displacements, so they share one axis. What each of them is stands in its name: a transmission
+All measured and predicted responses are ratios of displacements and share one axis. The name tells them
+apart: the transmission
 of a colliding specimen is not its Response I.
 """
 
@@ -20,22 +20,22 @@ from ..tables import Labelled
 
 
 class CurveOrigin(StrEnum):
-    """Where a curve comes from."""
+    """Origin of a curve."""
 
     MEASURED = "measured"
     SIMULATED = "simulated"
-    """Rig and specimen under the recorded voltage, or the specimen under the recorded base motion, through
+    """Simulation under the recorded voltage or base motion, analysed with
     the same estimator."""
     PREDICTED = "predicted"
-    """The specimen under sines."""
+    """Prediction for the specimen under sines."""
     STABLE = "stable branches"
-    """Periodic motions that an experiment can rest on; several at one frequency."""
+    """Stable periodic motions; possibly several at one frequency."""
     UNSTABLE = "unstable branches"
-    """Periodic motions that only feedback holds; several at one frequency."""
+    """Unstable periodic motions; possibly several at one frequency."""
 
 
 class CurveKind(StrEnum):
-    """What a curve tells of the motion."""
+    """Quantity of a curve."""
 
     TRANSMISSIBILITY = "transmission"
     RESPONSE_I = "Response I"
@@ -44,7 +44,7 @@ class CurveKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Curve(Labelled):
-    """One curve; arrays of shape (points,), frequencies ascending but on branches."""
+    """One curve; arrays of shape (points,), with ascending frequencies except on branches."""
 
     source: str
     """Name of the recording or of the prediction."""
@@ -54,11 +54,11 @@ class Curve(Labelled):
     magnitude: Reals
     """Displacement of m0 over displacement of the base; NaN where there is none."""
     relative_sd: Reals
-    """Relative standard deviation of the magnitude; NaN where nothing is known of it."""
+    """Relative standard deviation of the magnitude; NaN if unknown."""
     note: str = ""
-    """What else is to be known: averages, window, accuracy."""
+    """Remarks, such as averages, window, accuracy."""
     level_m: float | None = None
-    """Amplitude of the base for which a simulated curve holds [m]; None where none was asked for."""
+    """Base amplitude of a simulated curve [m]; None if none was requested."""
 
     @property
     def name(self) -> str:
@@ -67,21 +67,23 @@ class Curve(Labelled):
 
     @property
     def is_single_valued(self) -> bool:
-        """Each frequency has one value: no branches, which fold."""
+        """Whether each frequency has one value; branches fold."""
         return self.origin not in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE)
 
     @property
     def lower(self) -> Reals:
-        """Magnitude less two standard deviations, on a logarithmic scale; a tenth of it at the least."""
+        """Magnitude minus two standard deviations on a logarithmic scale, at least a tenth of it."""
         return np.asarray(self.magnitude * np.exp(-self._reach))
 
     @property
     def upper(self) -> Reals:
-        """Magnitude and two standard deviations, on a logarithmic scale; ten times it at the most."""
+        """Magnitude plus two standard deviations on a logarithmic scale, at most ten times it."""
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies, lowest and highest bounds in at most ``columns``: areas are slow to draw."""
+        """Return frequencies and bounds, reduced to at most ``columns`` points, since areas are slow to
+        draw.
+        """
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -89,14 +91,11 @@ class Curve(Labelled):
 
     @property
     def _reach(self) -> Reals:
-        """Bounds that reach further say that nothing is known, and would only fill the picture."""
+        """Wider bounds would only fill the picture."""
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Curve":
-        """Read the curve at other frequencies, straight between points in both logarithms; NaN outside.
-
-        NaN everywhere on branches, which have several values at one frequency.
-        """
+        """Interpolate the curve on logarithmic axes; NaN outside and on branches."""
         known = np.isfinite(self.magnitude) & (self.magnitude > 0)
         if not known.any() or not self.is_single_valued:
             return replace(
@@ -112,7 +111,7 @@ class Curve(Labelled):
 
 
 def sorted_curve(curve: Curve) -> Curve:
-    """Bring the points into ascending order, each frequency once: sweeps downwards come the other way."""
+    """Sort the points by frequency and remove duplicates, for example of downward sweeps."""
     frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
         curve,
@@ -123,14 +122,14 @@ def sorted_curve(curve: Curve) -> Curve:
 
 
 def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
-    """Return how far a curve lies above another, at its own frequencies within both.
+    """Return the difference of two curves at the frequencies of the first, within both.
 
     Raises NotEnoughData when the two have no frequency in common.
     """
     for each in (curve, reference):
         if not each.is_single_valued:
             raise NotEnoughData(
-                f"{each.name} has several values at one frequency, so that there is no one difference; "
+                f"{each.name} has several values at one frequency, so its difference is not defined; "
                 "compare curves of recordings or predictions"
             )
     low = max(curve.frequency_hz[0], reference.frequency_hz[0])
@@ -149,24 +148,24 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     )
 
 
-# The peaks of a curve, placed between its points, with the width at half power where it is seen.
+# Peaks of a curve, interpolated between its points, with the half-power width if it is resolved.
 #
-# Curves read at a few frequencies: what stands beside the markers.
+# Values of curves at the markers.
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One curve at the markers."""
+    """Values of one curve at the markers."""
 
     name: str
     magnitudes: tuple[float, ...]
-    """One for each marker; NaN outside of the curve."""
+    """One value for each marker; NaN outside the curve."""
     decibel: float
-    """The last over the first; NaN where either is missing."""
+    """Last value over first; NaN if either is missing."""
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
-    """Read every curve at every frequency."""
+    """Return the values of every curve at every frequency."""
     return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
 
 
@@ -179,13 +178,13 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """Least height of a peak above the valley beside it ..."""
 _LEAST_RISE_SD = 8.0
-"""... and by this many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
+"""... and in standard deviations: the range of a thousand points of noise is 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Chaotic motion makes many peaks: one with this many others within this many half widths is no mode."""
+"""A peak with this many others within this many half widths is no mode: chaotic motion has many peaks."""
 _CROWD_RISE = 0.3
-"""Others count that rise by this share of what a peak must rise by."""
+"""Others are counted from this share of the required height."""
 _USUAL_HALF_WIDTH = 0.01
-"""Usual half width of the frequency; for a peak that does not fall by 3 dB on both sides."""
+"""Assumed relative half width of a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
 _PER_NEPER_DB = 20 / np.log(10)
 
@@ -195,12 +194,12 @@ class CurvePeak:
     """One peak of a curve."""
 
     frequency_hz: float
-    """Frequency of the parabola through the highest point and its neighbours, in logarithms."""
+    """Frequency of the vertex of a parabola through the highest point and its neighbours, in logarithms."""
     magnitude: float
     relative_sd: float
-    """Relative standard deviation of the magnitude; NaN where nothing is known of it."""
+    """Relative standard deviation of the magnitude; NaN if unknown."""
     half_power_width_hz: float | None
-    """Where the curve falls by 3 dB on both sides; None where a neighbour comes first."""
+    """Half-power frequencies; None if a neighbouring peak is closer."""
 
     @property
     def damping_ratio(self) -> float | None:
@@ -210,16 +209,16 @@ class CurvePeak:
 
 
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
-    """Find the highest resonance peaks, in the order of frequency.
+    """Find the highest resonance peaks, sorted by frequency.
 
-    Branches have none, because they fold there; nor has a stretch where the motion is chaotic.
+    Branches and chaotic stretches have none.
 
     Parameters
     ----------
     curve
         Measured or predicted.
     most
-        How many are given.
+        Maximum number of peaks.
     """
     known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
     frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])
@@ -244,9 +243,9 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
 
 
 def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
-    """Measure a peak; gives it, and the larger of its two half widths [Hz]."""
+    """Measure a peak; return it and the larger of its two half widths [Hz]."""
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
-    # The parabola by divided differences: a chaotic curve has thousands of peaks to be looked at.
+    # Divided differences are fast: a chaotic curve has thousands of peaks.
     (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
     bend, slope, top = (
         (right - left) / (before + after),

@@ -1,4 +1,4 @@
-"""The curves of one recording, and of what the model says of it, as a comparison shows them."""
+"""Measured and simulated curves of one recording, for a comparison."""
 
 from collections.abc import Iterator
 from enum import StrEnum
@@ -23,11 +23,11 @@ from ..sine.sweep import SweptMotion
 from .curve import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
-"""Frequencies that lie within this are one [Hz]."""
+"""Frequencies closer than this count as equal [Hz]."""
 
 
 def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
-    """Yield Responses I and II under sines."""
+    """Yield predicted Responses I and II."""
     low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
     note = f"sines of A0 = {level}, {found.accuracy.value}"
@@ -37,7 +37,7 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
 
 
 def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:
-    """Make a curve of an estimated transmission, with its bounds."""
+    """Yield the curve of an estimated transmission with its bounds."""
     found = response.frequency_response
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
@@ -53,7 +53,7 @@ def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Ite
 
 
 def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator[Curve]:
-    """Make a curve of each response that a sweep measured."""
+    """Yield a curve for each response of a sweep."""
     note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
     yield from _responses(
         name, origin, found.frequency_hz, (found.response_i, found.response_ii, found.sd_response_ii), note
@@ -61,9 +61,9 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator
 
 
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
-    """Make a curve of each response of the steps up, and of those down: between jumps they differ."""
+    """Yield curves of the steps up and of the steps down, since they differ between jumps."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
-        return  # levels at one frequency are no curve over it
+        return  # several levels at one frequency are no curve
     directions = np.array(found.direction)
     for direction in dict.fromkeys(found.direction):
         at = directions == direction
@@ -74,7 +74,7 @@ def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> It
 
 
 def dwell_traces(name: str, origin: CurveOrigin, found: DwellResponse) -> Iterator[Curve]:
-    """Make a point of each response that a dwell measured."""
+    """Yield a point for each response of a dwell."""
     values = (
         np.array([found.response_i]),
         np.array([found.response_ii]),
@@ -94,13 +94,13 @@ def _responses(
 
 
 class Model(StrEnum):
-    """Whether the model is overlaid on measurements."""
+    """Simulation to overlay on measurements."""
 
     LEFT_OUT = "left out"
     UNDER_VOLTAGE = "under the recorded voltage"
-    """Rig and specimen together, as an ensemble: holds in chaos too."""
+    """Ensemble of rig and specimen; valid for chaotic motion too."""
     UNDER_BASE = "under the recorded base motion"
-    """The specimen alone, once: for linear and coherent motion."""
+    """One run of the specimen alone; for linear and coherent motion."""
 
 
 _SIMULATIONS = {
@@ -111,38 +111,38 @@ _SIMULATIONS = {
 
 
 class AnalysisOptions(FrozenModel):
-    """What an analyst may choose; estimator to confidence concern noise only."""
+    """Options of an analysis; those from estimator to confidence apply to noise only."""
 
     model: Model = Model.LEFT_OUT
-    """The simulated specimen, with its rig under the recorded voltage (the twin) or alone under the recorded
-    base motion; it takes seconds to minutes a recording."""
+    """Overlay the simulation: rig and specimen under the recorded voltage (the twin) or the specimen alone
+    under the recorded base motion. Takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
-    """drive is unbiased by noise on both channels; h1 by noise on the response, h2 on the base."""
+    """drive has no bias by noise on either channel; h1 none by noise on the response, h2 none on the base."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
     """For hv alone: noise density of m0's velocity over that of the base's acceleration, in s²."""
     window: Window = Window.HANN
     """Taper of the segments of streamed noise."""
     resolution_hz: PositiveFloat | None = None
-    """Width of a line of streamed noise; chosen if not given. At most one of resolution and averages."""
+    """Resolution for streamed noise; automatic by default. Give resolution or averages, not both."""
     averages: Annotated[float, Field(gt=1.0)] | None = None
-    """Independent averages of streamed noise; chosen if not given."""
+    """Independent averages of streamed noise; automatic by default."""
     overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
-    """Part that neighbouring segments share."""
+    """Overlap of neighbouring segments, as a fraction."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
-    """Probability that the bounds of a line hold the truth."""
+    """Probability that the bounds of a line contain the true value."""
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
-        """Refuse here what the analysis would refuse later, in its own sentence."""
+        """Refuse invalid combinations with the analysis' own error."""
         self.request  # noqa: B018 - making it is the check
         return self
 
     @property
     def request(self) -> FrequencyResponseRequest:
-        """The same for the analysis."""
+        """These options as a request for the analysis."""
         return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))
 
     @property
     def simulation(self) -> Simulation:
-        """What the model is moved by, if it is asked."""
+        """Input of the model, if it is overlaid."""
         return _SIMULATIONS[self.model]

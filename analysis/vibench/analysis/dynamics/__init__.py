@@ -1,7 +1,7 @@
-"""Branches of periodic motions, spectra of exponents and chains of the model, as a person asks for them.
+"""Requests for branches of periodic motions, Lyapunov spectra and chains, and their results.
 
-What is asked is a value that a file keeps; answers come one by one, as columns of numbers with their errors
-and costs, are kept as HDF5 and read back, and are turned into curves that are overlaid on recordings.
+Requests are stored with their results. Results arrive one by one, with errors and costs, are stored as
+HDF5, and can be overlaid on recordings as curves.
 
 >>> from vibench.analysis.dynamics import BranchRequest, diagram_of
 >>> request = BranchRequest(amplitude_m=5e-6, start=60.0, stop=62.0, places=2, starts=1)

@@ -1,4 +1,4 @@
-"""An answer on branches: columns of numbers a branch, its special points, and what it cost."""
+"""Results on branches: columns of numbers, special points, and cost."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,14 +28,14 @@ class LineEvent:
     frequency_hz: float
     amplitude_m: float
     index: int
-    """It lies after this point of the branch, and before the next."""
+    """Index of the point of the branch before it."""
     response_ii: float
     """Response II of m0 there, between the two points."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchLine(Labelled):
-    """One branch; n points in the order in which it runs."""
+    """One branch; n points in order."""
 
     OWN_UNITS: ClassVar = {"states": "m, m, m, m s-1, m s-1, m s-1"}
     DOCUMENT: ClassVar = "periods shape has_twin is_isolated origin begin end elapsed_s events points=motions"
@@ -52,34 +52,34 @@ class BranchLine(Labelled):
     """Floquet multipliers over the period of the motion, largest first, shape (n, 6)."""
     multiplier_imaginary: Reals
     impacts: NDArray[np.int64]
-    """Contacts that begin in the period of the motion, shape (n,)."""
+    """Number of contacts per period of the motion, shape (n,)."""
     error_estimate: Reals
-    """How far the true motion may be, as part of the fundamental of p, shape (n,)."""
+    """Bound on the distance to the true motion, relative to the fundamental of p, shape (n,)."""
     events: tuple[LineEvent, ...]
     periods: int
-    """Drive periods of a motion."""
+    """Drive periods per period of the motion."""
     shape: str
-    """mirrored: its own mirror image after half its period; or repeated."""
+    """mirrored (its own mirror image after half its period) or repeated."""
     has_twin: bool
-    """The mirror images of these motions are another branch."""
+    """Whether the mirror images of these motions form another branch."""
     is_isolated: bool
-    """It closes on itself."""
+    """Whether it closes on itself."""
     origin: str
-    """How it was found."""
+    """Method by which it was found."""
     begin: str
-    """Why it was left at its first point."""
+    """Reason why it ends at its first point."""
     end: str
-    """Why it was left at its last."""
+    """Reason why it ends at its last point."""
     elapsed_s: float
 
     @property
     def points(self) -> int:
-        """How many."""
+        """Number of points."""
         return len(self.frequency_hz)
 
     @property
     def motions(self) -> list[dict[str, Any]]:
-        """Each point with its numbers of m0, and of p = y - z."""
+        """Values of m0 and of p = y - z at each point."""
         found = columns(
             self,
             "frequency_hz amplitude_m is_stable largest_multiplier growth_time_s impacts "
@@ -95,12 +95,12 @@ class BranchLine(Labelled):
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """No multiplier outside the unit circle, shape (n,)."""
+        """Whether all multipliers lie within the unit circle, shape (n,)."""
         return np.isinf(self.growth_time_s)
 
     @property
     def growth_time_s(self) -> Reals:
-        """Time in which a small distance from the motion grows by e; infinite where stable, shape (n,)."""
+        """Time in which a small deviation grows by e; infinite if stable, shape (n,)."""
         return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
     def along(self, parameter: Parameter) -> Reals:
@@ -108,7 +108,7 @@ class BranchLine(Labelled):
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
     def pieces(self) -> Iterator[tuple[bool, slice]]:
-        """Yield stretches that are stable throughout, or not; neighbours share a point."""
+        """Yield stable and unstable stretches; neighbours share a point."""
         is_stable = self.is_stable[1:] & self.is_stable[:-1]
         edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
         for first, last in pairwise(edges):
@@ -117,7 +117,7 @@ class BranchLine(Labelled):
 
 
 def line_of(found: FoundBranch) -> BranchLine:
-    """Take a branch as it was found."""
+    """Convert a computed branch."""
     branch = found.branch
     return BranchLine(
         frequency_hz=branch.frequencies_hz,
@@ -151,7 +151,7 @@ def line_of(found: FoundBranch) -> BranchLine:
 
 
 def _response_at(found: FoundBranch, index: int, value: float) -> float:
-    """Read Response II of m0 between a point and the next, by the parameter."""
+    """Interpolate Response II of m0 between a point and the next."""
     branch = found.branch
     two = slice(index, index + 2)
     place, size = branch.parameters[two], branch.response_ii[two, 0]
@@ -163,7 +163,7 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class BranchDiagram(Labelled):
-    """Everything that was found for one request."""
+    """All branches found for one request."""
 
     DOCUMENT: ClassVar = "options=request branches=lines least_growth_time_s elapsed_s"
 
@@ -178,13 +178,13 @@ class BranchDiagram(Labelled):
 
     @property
     def largest_error(self) -> float:
-        """Of all points but those beside a fold, where any error grows; NaN where there are none."""
+        """Largest error of all points except beside folds, where errors grow; NaN without points."""
         errors = [np.median(line.error_estimate) for line in self.lines]
         return float(max(errors, default=float("nan")))
 
     @property
     def cost_sentence(self) -> str:
-        """Return what was found, with its error and its cost."""
+        """Return a sentence on number, error and cost of the branches."""
         if not self.lines:
             return f"{self._none_found}; {self.elapsed_s:.1f} s."
         isolated = sum(line.is_isolated for line in self.lines)
@@ -206,18 +206,18 @@ class BranchDiagram(Labelled):
         harmonics = self.request.balance_options.most
         return (
             f"No harmonic balance of at most {harmonics} harmonics was found: there is no motion of the "
-            "drive's period here, or it has more harmonics, as with impacts; the method shooting tells"
+            "drive's period here, or it has more harmonics, as with impacts; use the method shooting"
         )
 
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """Of each branch, which motions the bench's loop is fast enough to hold; None where none is named."""
+        """For each branch, the motions that the bench's loop is fast enough to hold; None without a bench."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 
     @property
     def holding_sentence(self) -> str:
-        """Return how many unstable motions the bench can hold; nothing where no bench is named."""
+        """Return a sentence on the unstable motions that the bench can hold; empty without a bench."""
         holdable = self.holdable
         if not holdable:
             return ""
@@ -226,19 +226,21 @@ class BranchDiagram(Labelled):
         held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
         told = (
-            f"A loop of {self.request.loop_time_s:.3g} s holds what takes {self.least_growth_time_s:.3g} s "
-            f"or more to grow by e: {held} of {count} unstable motions"
+            f"A loop of {self.request.loop_time_s:.3g} s can hold motions whose deviations take "
+            f"{self.least_growth_time_s:.3g} s or more to grow by e: {held} of {count} unstable motions"
         )
         return told + (f"; the quickest takes {quickest:.2g} s." if count else ".")
 
     @property
     def least_growth_time_s(self) -> float | None:
-        """What an unstable motion takes to grow by e that the bench can hold; None where none is named."""
+        """Least growth time by e of an unstable motion that the bench can hold; None without a bench."""
         loop_s = self.request.loop_time_s
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of m0 over frequency, stable and unstable apart; none along amplitude."""
+        """Return Responses I and II of m0 over frequency, stable and unstable separately; empty along
+        amplitude.
+        """
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []
@@ -253,7 +255,7 @@ class BranchDiagram(Labelled):
         return tuple(found)
 
     def _strung(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
-        """Return all stretches of one stability as one row; NaN keeps them apart."""
+        """Join all stretches of one stability, separated by NaN."""
         places: list[Reals] = []
         sizes: list[Reals] = []
         for line in self.lines:

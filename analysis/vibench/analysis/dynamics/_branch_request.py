@@ -1,4 +1,4 @@
-"""What is asked of branches: a specimen, a range of frequency or level, and a method."""
+"""Request for branches: a specimen, a range of frequency or level, and a method."""
 
 from enum import StrEnum
 from itertools import pairwise
@@ -26,11 +26,12 @@ from ..signals.arrays import Reals
 from ._specimen_choice import SpecimenChoice
 
 EXACT_ENOUGH = 1e-4
-"""Part of the fundamental of p that harmonics left out may move it by, unless one harmonic is asked for."""
+"""Largest relative change of the fundamental of p by neglected harmonics, unless one harmonic is
+requested."""
 
 
 class BranchMethod(StrEnum):
-    """How motions are found and followed."""
+    """Method to find and follow motions."""
 
     SHOOTING = "shooting"
     """Exact motions of any period, with every contact; every law."""
@@ -41,12 +42,12 @@ class BranchMethod(StrEnum):
 
 
 class BranchRequest(SpecimenChoice):
-    """All periodic motions that are found over a range."""
+    """Request for all periodic motions over a range."""
 
     method: BranchMethod = BranchMethod.SHOOTING
     """Exact; harmonic balance; or with one harmonic, the paper's eq. 5."""
     along: Parameter = Parameter.FREQUENCY
-    """What changes: the drive's frequency, or its amplitude."""
+    """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement, along frequency."""
     frequency_hz: PositiveFloat = 260.0
@@ -56,26 +57,26 @@ class BranchRequest(SpecimenChoice):
     stop: PositiveFloat = 600.0
     """Upper end of the range, in Hz or in m."""
     error: TargetError | None = None
-    """Relative error that every motion is to reach, 0.01 or "1 %". Shooting reaches 1e-8 or less in any case;
-    a balance takes as many harmonics as it needs; absent: 1e-4 of the fundamental of p."""
+    """Relative error of every motion, 0.01 or "1 %"; by default 1e-4 of the fundamental of p. Shooting
+    always reaches 1e-8; a balance uses as many harmonics as needed."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
-    """Highest that a balance may use."""
+    """Highest harmonic of a balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
-    """Values in the range at which motions are looked for."""
+    """Number of values in the range at which motions are searched."""
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
-    """Random states at each of them: more find more isolated branches."""
+    """Random initial states at each value; more find more isolated branches."""
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
-    """Longest motion that is looked for, in drive periods."""
+    """Longest period to search, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
     """Along amplitude: follow the phase resonance of the one mode between these frequencies [Hz]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
-    """Of a phase resonance: the motion of m0 that is a quarter of a period behind the base."""
+    """For a phase resonance: the quantity of m0 that lags the base by a quarter of a period."""
     loop_time_s: PositiveFloat | None = None
-    """Of a bench, from a motion to the drive that answers it: what it can hold is then told [s]."""
+    """Latency of a bench's feedback loop, to report which motions it can hold [s]."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
-    """Pairs of frequency [Hz] and base amplitude [m] that stand in the place of one amplitude."""
+    """Pairs of frequency [Hz] and base amplitude [m], instead of one amplitude."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -91,7 +92,7 @@ class BranchRequest(SpecimenChoice):
             )
         if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
             raise ValueError(
-                "rigid stops push with no finite force, so that they have no harmonic balance; take the "
+                "harmonic balance needs a finite contact force, and rigid stops have none; take the "
                 "method shooting"
             )
         if self.error is not None and self.method is BranchMethod.FIRST_ORDER:
@@ -102,7 +103,9 @@ class BranchRequest(SpecimenChoice):
         self._refuse_other_resonances()
         pairs = self.recorded_level
         if pairs and self.along is Parameter.AMPLITUDE:
-            raise ValueError("a recorded level goes along frequency; along amplitude give one frequency")
+            raise ValueError(
+                "a recorded level is for branches along frequency; along amplitude give one frequency"
+            )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
         return self
@@ -123,7 +126,7 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def path(self) -> DrivePath:
-        """How the drive changes."""
+        """Path of the drive."""
         if self.along is Parameter.AMPLITUDE:
             return AmplitudePath(self.frequency_hz)
         if self.recorded_level:
@@ -133,14 +136,14 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def search(self) -> MotionSearch:
-        """Where motions are looked for."""
+        """Settings of the search."""
         return MotionSearch(
             places=self.places, starts=self.starts, most_periods=self.most_periods, seed=self.seed
         )
 
     @property
     def balance_options(self) -> BalanceOptions:
-        """Harmonics, for the two methods that balance them."""
+        """Options of harmonic balance."""
         lower, upper = self.shaken.gaps_m
         kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
         most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
@@ -148,7 +151,7 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def title(self) -> str:
-        """Name curves and figures by it."""
+        """Title for curves and figures."""
         where = f"{1e6 * self.amplitude_m:g} µm"
         if self.resonance_band_hz is not None:
             low_hz, high_hz = self.resonance_band_hz
@@ -161,12 +164,12 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def sentence(self) -> str:
-        """Say the options under a figure."""
+        """Return the caption of a figure, with all options."""
         said = f"{self.title}; {self.specimen_text}"
         if self.resonance_band_hz is not None:
             return f"{said}."
         return (
-            f"{said}; motions looked for at {self.places} places from {self.starts} random states each, seed "
+            f"{said}; motions searched at {self.places} places from {self.starts} random states each, seed "
             f"{self.seed}, up to {self.most_periods} drive periods long."
         )
 
@@ -180,8 +183,8 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     Parameters
     ----------
     frequency_hz, drive_amplitude_m
-        As measured, in any order, up and down together; shape (n,). In each bin stands the median, so that
-        one bad interval does not bend the level.
+        As measured, in any order; shape (n,). Each bin takes the median, so that one bad interval has no
+        effect.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Runs of chains, one by one as they are computed."""
+"""Compute runs of chains one by one."""
 
 import math
 import time
@@ -37,11 +37,11 @@ from ..tables import Labelled
 from ._chain_request import ChainDrive, ChainRequest
 
 WAVES = 61
-"""Wave numbers at which bands are drawn, from 0 to pi."""
+"""Number of wave numbers from 0 to pi for bands."""
 LINES = 800
-"""Frequencies at which a transmissibility without contact is drawn."""
+"""Number of frequencies for the transmissibility without contact."""
 MOST_SHOWN = 4
-"""Cells of one chain whose transmission is drawn."""
+"""Number of cells of one chain to draw."""
 ABOVE_BANDS = 1.15
 """... up to this many times the highest band."""
 REACHED = Outcome.REACHED_END.text
@@ -66,26 +66,26 @@ class ChainRun(Labelled):
     transmission: Reals
     """|x of m0 at that frequency| over the base's, shape (m, cells)."""
     transmission_error: Reals
-    """Relative error of it, shape (cells,); NaN without a requested error or time."""
+    """Its relative error, shape (cells,); NaN without a requested error or time."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell while observed, shape (cells,)."""
     impacts: NDArray[np.int64]
-    """Contacts that began while observed, shape (cells,)."""
+    """Number of contacts while observed, shape (cells,)."""
     observed_s: float
     energy_j: Reals
-    """Mean energy of every cell: masses, springs with the link to the cell before, stops; shape (cells,)."""
+    """Mean energy of every cell with its link to the previous cell, shape (cells,)."""
     energy_error_j: Reals
     """Standard error of that mean."""
     exponent_per_s: float
-    """Largest Lyapunov exponent; NaN where it was not asked for."""
+    """Largest Lyapunov exponent; NaN if not requested."""
     exponent_error_per_s: float
     time_s: Reals
-    """Time of the picture, shape (n,)."""
+    """Time axis of the picture, shape (n,)."""
     motion_m: Reals
     """x of m0 in every cell over the last periods of a steady sine; under other drives its root mean square
     in equal stretches; shape (n, cells)."""
     impact_time_s: Reals
-    """Contacts that began in the time of the picture."""
+    """Contacts during the picture."""
     impact_cell: NDArray[np.int64]
     outcome: str
     elapsed_s: float
@@ -93,7 +93,7 @@ class ChainRun(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class ChainAnswer(Labelled):
-    """Everything that was computed for one request."""
+    """All results for one request."""
 
     OWN_UNITS: ClassVar = {"wave_numbers": "rad"}
     DOCUMENT: ClassVar = (
@@ -107,7 +107,7 @@ class ChainAnswer(Labelled):
 
     @cached_property
     def gaps(self) -> tuple[BandGap, ...]:
-        """Gaps of the endless chain without damping and contact."""
+        """Band gaps of the infinite chain without damping and contact."""
         return band_gaps(self.request.unit)
 
     @property
@@ -127,7 +127,7 @@ class ChainAnswer(Labelled):
 
     @cached_property
     def linear_hz(self) -> Reals:
-        """Frequencies of what is drawn without contact; denser where a peak is."""
+        """Frequencies for results without contact; denser near peaks."""
         top = ABOVE_BANDS * float(self.bands_hz.max())
         return np.linspace(top / LINES, top, LINES)
 
@@ -137,17 +137,17 @@ class ChainAnswer(Labelled):
 
     @property
     def linear_transmissions(self) -> dict[int, list[list[float]]]:
-        """The same of every length, cell by cell."""
+        """The same for every length, cell by cell."""
         return {cells: self.linear_transmission(cells).T.tolist() for cells in self.request.lengths}
 
     @cached_property
     def attenuation_db(self) -> Reals:
-        """Decay of a wave of the endless damped chain from unit to unit, at `linear_hz` [dB]."""
+        """Attenuation per unit of the infinite damped chain, at `linear_hz` [dB]."""
         return np.asarray(-DECIBELS * np.log(np.abs(bloch_factor(self.request.unit, self.linear_hz))))
 
     @property
     def shown_cells(self) -> tuple[tuple[int, int, str], ...]:
-        """Length, place and name of cells to draw: the last of every chain, or a few of the only one."""
+        """Length, place and name of cells to draw: the last of every chain, or several of a single chain."""
         lengths = self.request.lengths
         if len(lengths) > 1:
             return tuple((cells, cells - 1, f"{cells} cells: last") for cells in lengths)
@@ -157,7 +157,7 @@ class ChainAnswer(Labelled):
 
     @property
     def shown_run(self) -> ChainRun | None:
-        """The last run that reached its end: its motion, energies and impacts are drawn."""
+        """The last complete run, whose motion, energies and impacts are drawn."""
         return next((run for run in reversed(self.runs) if run.outcome == REACHED), None)
 
     def driven_transmission(self, cells: int, place: int) -> tuple[Reals, Reals]:
@@ -170,14 +170,14 @@ class ChainAnswer(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Return what was found and what it cost."""
+        """Return a sentence on band gaps, runs and cost."""
         gaps = ", ".join(
             f"{gap.lower_hz:.4g} Hz and above"
             if math.isinf(gap.upper_hz)
             else f"{gap.lower_hz:.4g} to {gap.upper_hz:.4g} Hz"
             for gap in self.gaps
         )
-        said = f"Gaps of the endless chain: {gaps}."
+        said = f"Band gaps of the infinite chain: {gaps}."
         if not self.runs:
             return said
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
@@ -194,24 +194,24 @@ class ChainAnswer(Labelled):
 
 
 SAMPLES_PER_PERIOD = 8
-"""Samples per period of the highest frequency that matters; means of energies need no more."""
+"""Samples per period of the highest relevant frequency, enough for mean energies."""
 MOST_NUMBERS = 3e7
-"""In the samples of a run: a quarter of a gigabyte."""
+"""Most numbers in the samples of a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Number of stretches of a picture that shows a whole run."""
+"""Number of time steps in a picture of a whole run."""
 ENERGY_S = 0.5
-"""Under a steady sine energies are averaged over this long, after the responses were observed."""
+"""Averaging time of energies under a steady sine, after the responses [s]."""
 SWEEP_PARTS = 120
-"""Frequencies at which a swept transmission is read, but each over `FEWEST_PERIODS` or more."""
+"""Number of frequencies of a swept transmission, each over at least `FEWEST_PERIODS`."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
-"""Number of segments of a recorded motion, in the average that gives the transmission."""
+"""Number of segments averaged for the transmission under a recorded motion."""
 X, VX = 0, 3
 
 
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
-    """Yield each run as soon as it has been computed; stop asking, and no more is computed.
+    """Compute the runs lazily and yield each.
 
     Raises InvalidRequest when the recording cannot be read, or a run is not possible.
     """
@@ -233,7 +233,7 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
 
 
 def chain_answer(request: ChainRequest) -> ChainAnswer:
-    """Compute everything."""
+    """Compute all runs."""
     began = time.perf_counter()
     runs = tuple(chain_runs(request))
     return ChainAnswer(request, runs, time.perf_counter() - began)
@@ -254,7 +254,7 @@ def _timed_run(
 
 
 def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
-    """Responses are observed in a run from rest; energies and the picture over some time after it."""
+    """Observe responses in a run from rest, then energies and the picture."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error = np.full(chain.size, math.nan)
     if request.has_target:
@@ -318,7 +318,7 @@ def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
 
 def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
-    # A sample of the response beside each of the base, so that one estimator takes both.
+    # Response and base have the same sample times, for one estimator.
     run = integrate_chain(
         chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded_rate(rate, chain, duration_s)
     )
@@ -343,7 +343,7 @@ def _lost_run(
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Describe a run that did not reach its end: how it ended, and what it struck until then."""
+    """Describe an incomplete run: how it ended and its impacts until then."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,
@@ -368,7 +368,7 @@ def _lost_run(
 
 
 def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, ratio: Reals) -> ChainRun:
-    """Describe a run that is shown from end to end."""
+    """Describe a run whose picture shows all of it."""
     energy, error = mean_energies(chain, run.states, base)
     stretches = np.array_split(np.arange(len(run.time_s)), min(STRETCHES, max(1, len(run.time_s))))
     sizes = [np.sqrt(np.mean(run.states[each, :, X] ** 2, axis=0)) for each in stretches]
@@ -396,7 +396,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Component at the momentary frequency, by Hann-weighted means over equal stretches of time."""
+    """Component at the instantaneous frequency, by Hann-weighted means over equal stretches of time."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
     turning = np.exp(-2j * np.pi * drive.turns(run.time_s))
@@ -411,7 +411,7 @@ def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Real
 
 
 def _base_of(request: ChainRequest) -> Sampled:
-    """Take the base's motion from a recording."""
+    """Read the base motion of a recording."""
     path = Path(request.recording)
     with open_recording(path) as recording:
         require_measured_size(recording)
@@ -421,7 +421,7 @@ def _base_of(request: ChainRequest) -> Sampled:
 
 
 def _rate_hz(chain: Chain, highest_hz: float, duration_s: float) -> float:
-    """Choose samples per second that show the fastest motion, and fit into memory."""
+    """Choose a sample rate that resolves the fastest motion and fits into memory."""
     highest_hz = max(highest_hz, float(chain.natural_frequencies_hz[-1]))
     return _bounded_rate(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
 
@@ -431,6 +431,6 @@ def _bounded_rate(rate_hz: float, chain: Chain, duration_s: float) -> float:
     if wanted > MOST_NUMBERS:
         raise ValueError(
             f"{chain.size} cells for {duration_s:g} s make {wanted:.2g} numbers, more than the "
-            f"{MOST_NUMBERS:.0g} that are held at once; take fewer cells or a shorter run"
+            f"{MOST_NUMBERS:.0g} that fit into memory; take fewer cells or a shorter run"
         )
     return rate_hz

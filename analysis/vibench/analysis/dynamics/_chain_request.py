@@ -1,4 +1,4 @@
-"""What is asked of a chain: its cells, how many of them, and what drives it."""
+"""Request for a chain: its cells, their number, and the drive."""
 
 from collections.abc import Sequence
 from enum import StrEnum
@@ -19,27 +19,27 @@ MOST_RUNS = 20_000
 
 
 class ChainDrive(StrEnum):
-    """How the base of a chain moves."""
+    """Motion of the base of a chain."""
 
     NONE = "none"
-    """Not at all: bands, gaps and transmissibility without contact."""
+    """None: bands, gaps and transmissibility without contact."""
     STEADY = "steady"
-    """A sine, at one frequency after another, each from rest."""
+    """A steady sine at each frequency, each from rest."""
     SWEPT = "swept"
-    """A sine whose frequency moves by equal hertz in every second, up or down."""
+    """A linear sine sweep, up or down."""
     RECORDED = "recorded"
-    """The base motion of a recording, sample by sample."""
+    """The base motion of a recording."""
 
 
 class ChainRequest(SpecimenChoice):
-    """Cells in a row under one kind of drive; the unit of the chain is the specimen, and others after it."""
+    """A chain under one kind of drive; the unit consists of the specimen and any `others`."""
 
     others: tuple[SpecimenTable, ...] = ()
-    """Specimens that follow the first before it comes again."""
+    """Further specimens in the unit of the chain, after the first."""
     lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
-    """How many cells the chain has; several for a study over the number of cells."""
+    """Number of cells; several numbers for a study over the length."""
     drive: ChainDrive = ChainDrive.STEADY
-    """What moves the base: nothing, a steady sine, a swept one, or what was recorded."""
+    """Drive of the base: none, a steady sine, a sweep, or a recorded motion."""
     amplitude_m: PositiveFloat = 20e-6
     """Amplitude of the base displacement under a sine."""
     start_hz: PositiveFloat = 220.0
@@ -47,22 +47,22 @@ class ChainRequest(SpecimenChoice):
     stop_hz: PositiveFloat = 220.0
     """Last frequency of a sine; below the first for a sweep downwards."""
     step_hz: PositiveFloat = 10.0
-    """Between neighbouring frequencies of a steady sine."""
+    """Frequency step of a steady sine."""
     recording: str = ""
     """Path of the recording whose base motion drives the chain."""
     duration_s: PositiveFloat = 2.0
-    """Observed under a steady sine; length of a sweep; of a recording at most so much is taken."""
+    """Observation time under a steady sine, length of a sweep, or most of a recording to use."""
     settle_s: NonNegativeFloat = 2.0
-    """Left out before under a steady sine, from rest."""
+    """Settling time from rest under a steady sine."""
     exponent_s: NonNegativeFloat = 0.0
-    """Over which the largest Lyapunov exponent is averaged under a steady sine; 0 for none."""
+    """Averaging time of the largest Lyapunov exponent under a steady sine; 0 for none."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every level."""
     error: TargetError | None = None
-    """Relative error of the transmission of every cell that is to be reached under a steady sine, 0.01 or
-    "1 %"; accuracy, settling and duration follow from it."""
+    """Requested relative error of every cell's transmission under a steady sine, 0.01 or "1 %"; sets
+    accuracy, settling and duration."""
     time_s: TargetTime | None = None
-    """Time for each run under a steady sine, 2 or "2 s"; a minute when absent."""
+    """Time for each run under a steady sine, 2 or "2 s"; one minute by default."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -81,16 +81,16 @@ class ChainRequest(SpecimenChoice):
                 "frequencies, or take a steady drive"
             )
         if self.drive is ChainDrive.RECORDED and not self.recording:
-            raise ValueError("no recording was given whose base motion drives the chain; give its path")
+            raise ValueError("no recording was given to drive the chain; give its path")
         return self
 
     @property
     def has_target(self) -> bool:
-        """Whether an error or a time was requested."""
+        """Return whether an error or a time was requested."""
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """Refuse what a requested error or time decides by itself, and drives that it cannot be met for."""
+        """Refuse options that a requested error or time sets, and drives for which it is not supported."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:
@@ -101,7 +101,7 @@ class ChainRequest(SpecimenChoice):
 
     @cached_property
     def unit(self) -> Chain:
-        """The cells that come again."""
+        """The unit of the chain."""
         changed = self.model.strip() or None, self.damping_time_s, self.gap_m
         return Chain((self.shaken, *(each.specimen(*changed) for each in self.others)))
 
@@ -117,7 +117,7 @@ class ChainRequest(SpecimenChoice):
 
     @property
     def title(self) -> str:
-        """Name figures by it."""
+        """Title for figures."""
         cells = ", ".join(str(each) for each in self.lengths)
         match self.drive:
             case ChainDrive.NONE:
@@ -131,7 +131,7 @@ class ChainRequest(SpecimenChoice):
 
     @property
     def sentence(self) -> str:
-        """Say the options under a figure."""
+        """Return the caption of a figure, with all options."""
         names = ", ".join([self.specimen_text, *(each.name for each in self.others)])
         times = {
             ChainDrive.NONE: "",

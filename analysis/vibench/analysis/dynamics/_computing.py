@@ -1,4 +1,4 @@
-"""Answers to requests, one by one as they are computed."""
+"""Compute the results of requests one by one."""
 
 import time
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from ._spectrum_request import ExponentSpectrum, SpectrumPoint, SpectrumRequest,
 
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
-    """Yield each branch as soon as it has been followed; stop asking, and no more is computed."""
+    """Follow the branches lazily and yield each."""
     where = request.shaken, request.path, request.start, request.stop
     if request.resonance_band_hz is not None:
         found = _resonance(request, request.resonance_band_hz)
@@ -39,7 +39,7 @@ def diagram_of(request: BranchRequest) -> BranchDiagram:
 
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
-    """Compute the exponents of each value of a request, in order, and give each as soon as it is known."""
+    """Compute the exponents of each value of a request in order, and yield each."""
     specimen = request.shaken
     for value in request.values:
         began = time.perf_counter()

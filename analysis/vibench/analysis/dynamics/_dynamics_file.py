@@ -1,4 +1,4 @@
-"""Branches, spectra and chains as HDF5 files: columns with units, and what was asked."""
+"""HDF5 files of branches, spectra and chains, with units and the request."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,7 +36,7 @@ _UNITS = {
 }
 """Columns of a branch, a dataset each."""
 _WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
-"""What else is known of a branch, an attribute each."""
+"""Attributes of a branch."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
 _SPECTRUM_UNITS = {
     "frequency_hz": "Hz",
@@ -82,9 +82,9 @@ _LINEAR_UNITS = {
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
-    """Write branches, a group each; a file that exists is refused.
+    """Write branches to a new file, a group each.
 
-    Raises InvalidRequest when the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
@@ -109,7 +109,9 @@ def read_diagram(path: Path) -> BranchDiagram:
     Raises InvalidRequest when the file is not there, or holds none.
     """
     if not path.is_file():
-        raise InvalidRequest(f"{path} does not exist, or is no file; give a file that vibench branches wrote")
+        raise InvalidRequest(
+            f"{path} does not exist or is not a file; give a file that vibench branches wrote"
+        )
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != BRANCHES_FORMAT:
@@ -124,15 +126,14 @@ def read_diagram(path: Path) -> BranchDiagram:
 
 
 def branch_curves(path: Path) -> tuple[Curve, ...]:
-    """Read the curves of branches, to be overlaid on recordings.
+    """Read the curves of branches, to overlay them on recordings.
 
-    Raises InvalidRequest when the file holds none, or branches along the level, which no recording's
-    frequencies fit.
+    Raises InvalidRequest when the file contains none, or branches along amplitude.
     """
     found = read_diagram(path).curves()
     if not found:
         raise InvalidRequest(
-            f"{path} holds no branches over frequency; find some with --frequency START:STOP"
+            f"{path} contains no branches over frequency; compute them with --frequency START:STOP"
         )
     return found
 
@@ -151,9 +152,9 @@ def _read_line(group: h5py.Group) -> BranchLine:
 
 
 def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
-    """Write all exponents, a dataset a quantity; a file that exists is refused.
+    """Write all exponents to a new file, a dataset each quantity.
 
-    Raises InvalidRequest when the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _SPECTRUM_UNITS.items():
@@ -165,9 +166,9 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
 
 
 def write_chain(found: ChainAnswer, path: Path) -> Path:
-    """Write the endless chain and every run, a group each; a file that exists is refused.
+    """Write the infinite chain and every run to a new file, a group each.
 
-    Raises InvalidRequest when the name is taken, or nothing can be written there.
+    Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
         for name, units in _LINEAR_UNITS.items():
@@ -183,7 +184,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
 
 @contextmanager
 def _new_file(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
-    """Make a new file that says what it holds; nothing is left of one that failed."""
+    """Create a new file with its kind and request; remove it if writing fails."""
     with new_file(path) as unfinished, open_hdf5_to_write(unfinished, "x") as file:
         file.attrs["format"] = kind
         file.attrs["format_version"] = FORMAT_VERSION

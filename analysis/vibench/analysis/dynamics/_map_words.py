@@ -1,4 +1,4 @@
-"""What is said of a map: motions as classes and in words, and a caption that says what was filled in."""
+"""Texts of a map: classes and names of motions, and a caption."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ MOTION_CLASSES = (
     ("chaotic", "#d55e00"),
     ("undecided", "#9a9a9a"),
 )
-"""How the motions of a map are distinguished, and their colours."""
+"""Classes of motions in a map, and their colours."""
 NO_NUMBERS = ("name", "about", "sources")
-"""Keys of a specimen that change no motion."""
+"""Keys of a specimen that do not change the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedLevel:
-    """A recording's level over frequency, and what was measured at it."""
+    """Measured level and Response of a recording over frequency."""
 
     name: str
     pairs: Sequence[tuple[float, float]]
@@ -39,7 +39,7 @@ class RecordedLevel:
 
 
 def motion_classes(results: MapResults, start: int = 0) -> Reals:
-    """Return the place in `MOTION_CLASSES` of each point, from the start of number ``start``; NaN: not known.
+    """Return the index in `MOTION_CLASSES` of each point for start number ``start``; NaN if unknown.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def motion_classes(results: MapResults, start: int = 0) -> Reals:
 
 
 def motion_words(motion: MapMotion) -> str:
-    """Name a motion and its share."""
+    """Return the name and share of a motion."""
     kind = f"period {motion.period}" if motion.period is not None else str(motion.motion)
     kind = kind if motion.has_impacts else "no impacts"
     share = motion.share
@@ -69,7 +69,7 @@ def motion_words(motion: MapMotion) -> str:
 
 
 def map_caption(results: MapResults) -> str:
-    """Say of what it is, what was computed, what was filled in, and how often that was wrong."""
+    """Return the caption: specimen, computed points, filled points and their error rate."""
     plan = results.plan
     said = [
         (
@@ -82,15 +82,18 @@ def map_caption(results: MapResults) -> str:
     if audit is not None and audit.audited:
         share = audit.wrong_share
         said.append(
-            f"The others lie between neighbours that agree; of {audit.audited} such cells drawn at random "
-            f"and computed {audit.wrong} came to another motion ({share.low:.1%} to {share.high:.1%} of the "
+            f"The others lie between neighbours that agree; {audit.audited} such cells were drawn at "
+            f"random and computed, and {audit.wrong} had another motion ({share.low:.1%} to "
+            f"{share.high:.1%} of the "
             "filled)."
         )
     return " ".join(said)
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Name a specimen, with what differs from the shipped one of its name, or else from the paper's."""
+    """Return the name of a specimen and its differences from the shipped one of that name or from the
+    paper's.
+    """
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
@@ -101,7 +104,7 @@ def _specimen_words(specimen: SpecimenTable) -> str:
 
 
 def _fixed(plan: Map) -> list[str]:
-    """Return what a map states beside its ranges: all but a start at zero, which is no choice."""
+    """Return the fixed parameters of a map, except a start at zero."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
     is_said = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}

@@ -1,4 +1,4 @@
-"""Which specimen a question is about: the one place where its options become one."""
+"""Options that select a specimen."""
 
 from pathlib import Path
 from typing import Annotated, Self
@@ -22,13 +22,13 @@ ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CO
 
 
 def _at(field: str, error: ValueError) -> ValidationError:
-    """Return the error of one field, so that a form shows it there."""
+    """Return the error of one field, so that a form shows it beside the field."""
     said = PydanticCustomError("value_error", "{said}", {"said": str(error)})
     return ValidationError.from_exception_data(field, [{"type": said, "loc": (field,), "input": None}])
 
 
 class SpecimenChoice(FrozenModel):
-    """A described specimen, with another contact, damping or gap where one is given."""
+    """A specimen, optionally with another contact, damping or gap."""
 
     specimen: Annotated[str, ChosenFrom(shipped_specimens)] = USUAL_SPECIMEN
     """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses (`vibench specimen`
@@ -41,11 +41,11 @@ class SpecimenChoice(FrozenModel):
     gap_m: PositiveFloat | None = None
     """Clearance at both stops; the specimen's own if not given."""
     described: SpecimenTable | None = None
-    """What the specimen is, number by number: read from its file when absent, so that an answer holds it."""
+    """All values of the specimen, stored with the result; read from its file by default."""
 
     @model_validator(mode="after")
     def _is_a_specimen(self) -> Self:
-        """Read the description, and refuse here, in its own words, what cannot be built of it."""
+        """Read the description and refuse invalid specimens with its own error."""
         found = self.described
         if found is None:
             try:
@@ -58,14 +58,14 @@ class SpecimenChoice(FrozenModel):
         try:
             self.shaken  # noqa: B018 - making it is the check
         except ValueError as error:
-            # With its own law it fails in the same way, unless the law is at fault.
+            # If it fails with its own law too, the law is not the cause.
             self.specimen_under(found.contact)
             raise _at("model", error) from error
         return self
 
     @property
     def shaken(self) -> Specimen:
-        """What is shaken."""
+        """The specimen."""
         return self.specimen_under(self.law)
 
     def specimen_under(self, model: str) -> Specimen:
@@ -75,13 +75,13 @@ class SpecimenChoice(FrozenModel):
 
     @property
     def law(self) -> str:
-        """Word of the contact."""
+        """Name of the contact law."""
         assert self.described is not None, "validation fills it"
         return self.model.strip() or self.described.contact
 
     @property
     def specimen_text(self) -> str:
-        """The specimen and what of it is replaced, for a caption."""
+        """The specimen and its changes, for a caption."""
         said = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
         if self.gap_m is not None:
             said.append(f"gap {1e6 * self.gap_m:g} µm")
@@ -91,7 +91,7 @@ class SpecimenChoice(FrozenModel):
 
     @property
     def damping_sum_per_s(self) -> float:
-        """Rate at which the dampers alone shrink volumes of states: -tr(M^-1 C)."""
+        """Rate at which the dampers contract phase-space volume: -tr(M^-1 C)."""
         found = self.shaken
         damping, mass = found.damping_matrix.diagonal(), found.mass_matrix.diagonal()
         return -float((damping / mass).sum())

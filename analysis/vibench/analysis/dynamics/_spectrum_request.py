@@ -1,4 +1,4 @@
-"""What is asked of exponents, and the answer at one drive."""
+"""Request for Lyapunov exponents, and the result at one drive."""
 
 import math
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
-"""Longest duration of an average: its intervals are kept, some hundreds of megabytes of them."""
+"""Longest averaging time: its intervals take some hundreds of megabytes."""
 ROUNDING = 1e-9
-"""A step that fits into the range except for rounding fits."""
+"""Tolerance for rounding when a step divides the range."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
-"""Kinds of contact that take no energy: there the exponents add up to what the dampers take."""
+"""Elastic contact laws, for which the sum of exponents is known from the dampers."""
 
 
 class SpectrumRequest(SpecimenChoice):
-    """All exponents at every frequency, or at every level."""
+    """Request for all exponents at every frequency or level."""
 
     along: Parameter = Parameter.FREQUENCY
-    """What changes: the drive's frequency, or its amplitude."""
+    """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement, along frequency."""
     frequency_hz: PositiveFloat = 260.0
@@ -36,15 +36,15 @@ class SpectrumRequest(SpecimenChoice):
     stop: PositiveFloat = 280.0
     """Upper end of the range, in Hz or in m."""
     step: PositiveFloat = 10.0
-    """Between neighbouring points, in Hz or in m."""
+    """Step between points, in Hz or in m."""
     accuracy: Accuracy = Accuracy.REFERENCE
-    """Accuracy of contacts; the sum of the exponents is as exact."""
+    """Accuracy of contacts and of the sum of the exponents."""
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
-    """Over which exponents are averaged."""
+    """Averaging time of the exponents."""
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = 5.0
-    """Left out before, from rest."""
+    """Settling time from rest."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-    """Probability that an interval holds the exponent."""
+    """Probability that an interval contains the exponent."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -58,12 +58,12 @@ class SpectrumRequest(SpecimenChoice):
 
     @property
     def points(self) -> int:
-        """Scenes that are computed."""
+        """Number of scenes."""
         return math.floor((self.stop - self.start) / self.step * (1.0 + ROUNDING) + ROUNDING) + 1
 
     @property
     def values(self) -> tuple[float, ...]:
-        """What changes [Hz, or m]."""
+        """Values of the varied parameter [Hz or m]."""
         return tuple(self.start + k * self.step for k in range(self.points))
 
     def drive(self, value: float) -> tuple[float, float]:
@@ -74,13 +74,13 @@ class SpectrumRequest(SpecimenChoice):
 
     @property
     def is_elastic(self) -> bool:
-        """The contact takes no energy, whatever it does."""
+        """Whether the contact dissipates no energy."""
         law = self.shaken.contact
         return isinstance(law, PowerLaw) or law.kind in ELASTIC
 
     @property
     def title(self) -> str:
-        """Name figures by it."""
+        """Title for figures."""
         is_level = self.along is Parameter.AMPLITUDE
         return f"{self.law}, " + (
             f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
@@ -89,7 +89,7 @@ class SpectrumRequest(SpecimenChoice):
 
 @dataclass(frozen=True)
 class SpectrumPoint:
-    """All exponents of the motion in which a run from rest ended."""
+    """All exponents of the motion reached from rest."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
@@ -100,36 +100,35 @@ class SpectrumPoint:
     frequency_hz: float
     amplitude_m: float
     exponents_per_s: tuple[float, ...]
-    """Descending; minus infinity where a stop that holds m1 took a direction away, NaN where the run was
-    lost."""
+    """Descending; minus infinity if a stop that holds m1 removes a direction, NaN if the run failed."""
     low_per_s: tuple[float, ...]
     high_per_s: tuple[float, ...]
     sum_per_s: float
     dampers_per_s: float
-    """What the sum must be where the contact takes no energy: -tr(M^-1 C)."""
+    """Sum of the exponents for an elastic contact: -tr(M^-1 C)."""
     dimension: float
-    """Kaplan and Yorke's, of the stroboscopic section."""
+    """Kaplan-Yorke dimension of the stroboscopic section."""
     dimension_low: float
     dimension_high: float
     verdict: str
     motion: str
     source: str
     blocks: int
-    """Independent stretches behind the least known exponent: with few, intervals are wide."""
+    """Independent stretches behind the least certain exponent; with few, intervals are wide."""
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
 
     @property
     def sum_difference(self) -> float:
-        """Sum of the exponents over what the dampers take, less one."""
+        """Sum of the exponents over the rate of the dampers, minus one."""
         return self.sum_per_s / self.dampers_per_s - 1.0 if self.dampers_per_s else math.nan
 
 
 def point_of(
     found: LyapunovSpectrum, dampers_per_s: float, confidence: float, elapsed_s: float
 ) -> SpectrumPoint:
-    """Take a spectrum as it was computed."""
+    """Convert a computed spectrum."""
     bounds = found.intervals_per_s(confidence)
     low, high = found.dimension_interval(confidence)
     is_known = bool(np.isfinite(found.exponents_per_s[0]))
@@ -156,7 +155,7 @@ def point_of(
 
 @dataclass(frozen=True)
 class ExponentSpectrum(Labelled):
-    """Everything that was computed for one request."""
+    """All results for one request."""
 
     DOCUMENT: ClassVar = "options=request points largest_sum_difference elapsed_s"
 
@@ -170,7 +169,7 @@ class ExponentSpectrum(Labelled):
 
     @property
     def largest_sum_difference(self) -> float:
-        """How far the sums are from the dampers' at most, relative; NaN where the contact takes energy."""
+        """Largest relative difference of the sums from the rate of the dampers; NaN for inelastic contact."""
         if not self.request.is_elastic:
             return math.nan
         known = [abs(each.sum_difference) for each in self.points if math.isfinite(each.sum_difference)]
@@ -178,12 +177,12 @@ class ExponentSpectrum(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Return what was found, with its check and its cost."""
+        """Return a sentence on the points, the check of their sums, and the cost."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
-            check = "the contact takes energy, so that the dampers alone do not give the sum"
+            check = "the contact dissipates energy, so the sum is not known from the dampers"
         elif not math.isfinite(self.largest_sum_difference):
-            check = "there is no damping to compare the sums with"
+            check = "there is no damping to compare the sums to"
         else:
             check = f"sums differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
             check += f"{self.largest_sum_difference:.1g} at most"

@@ -1,9 +1,9 @@
-"""Pictures of a recording in bounded memory and width: while it is made, and of any stretch afterwards.
+"""Pictures of a recording in bounded memory: live during the run, or of any stretch afterwards.
 
-A running measurement is kept as its newest seconds: time histories, spectra, transmission, Responses I
-and II, phase portrait, levels and counted impacts, each made when it is drawn. A finished one is drawn
-from the extremes that its file keeps of every 128 samples (docs/decisions/0020-overview.md): an impact
-of three samples is in every picture. Samples come in volts or channel units; no widget is known here.
+Live pictures cover the newest seconds: time histories, spectra, transmission, Responses I and II, phase
+portrait, levels and impact count, each computed when it is drawn. A finished recording is drawn from the
+extremes of every 128 samples in its file (docs/decisions/0020-overview.md), so that an impact of three
+samples is always visible. This package imports no Qt.
 
 >>> import numpy as np
 >>> from vibench.analysis.live import LiveChannel, LiveView

@@ -1,4 +1,4 @@
-"""Level meters: how much of an input's range a channel uses, with the peak held for a while."""
+"""Level meters with peak hold: the share of its input range that a channel uses."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -9,15 +9,15 @@ from ..signals.arrays import Reals
 from ._ring import Values
 
 OVER_SHARE = 0.95
-"""Share of full scale: what is louder is about to be clipped."""
+"""Share of full scale above which clipping is near."""
 QUIET_SHARE = 0.01
-"""A channel below this uses less than a hundredth of its range, or its sensor is missing."""
+"""Share of full scale below which the range is too large or the sensor is missing."""
 QUIET_AFTER_S = 3.0
 HOLD_S = 1.5
 
 
 class LevelVerdict(Enum):
-    """What a level means."""
+    """Meaning of a level."""
 
     OVER = auto()
     GOOD = auto()
@@ -26,7 +26,7 @@ class LevelVerdict(Enum):
 
 @dataclass(frozen=True)
 class Level:
-    """One channel's meter; shares of full scale, 0 to 1 and more."""
+    """Level of one channel as shares of full scale; more than 1 is overload."""
 
     peak_share: float
     rms_share: float
@@ -36,14 +36,14 @@ class Level:
 
 
 class LevelMeters:
-    """One meter a channel.
+    """Level meters, one per channel.
 
     Parameters
     ----------
     full_scale
-        Of each channel, in the unit of the samples, shape (channels,).
+        Full scale of each channel in the unit of the samples, shape (channels,).
     sample_rate_hz
-        Tells how long peaks are held.
+        Sample rate, which sets the peak hold.
     """
 
     def __init__(self, full_scale: Reals, sample_rate_hz: float) -> None:
@@ -55,7 +55,7 @@ class LevelMeters:
         self._levels: tuple[Level, ...] = ()
 
     def add(self, values: Values) -> tuple[Level, ...]:
-        """Take the next samples, shape (channels, samples), and read the meters."""
+        """Add the next samples, shape (channels, samples), and return the levels."""
         known = values[:, np.isfinite(values).all(axis=0)]
         if known.shape[1] == 0:
             return self._levels

@@ -1,10 +1,9 @@
-"""The edges of a signal as they are drawn, where its periods are too many to be told apart.
+"""Outline of a signal for drawing, also when a column of the picture is shorter than a period.
 
-A column of the picture that is shorter than a period holds a part of it: one column has the crest,
-the next has not, and the edges of a steady sine look like a comb that beats with the columns. There
-each column is given the extremes of a whole period around it, and a steady sine has straight edges.
-Where a period is many columns long its waveform is drawn, and where a column holds a whole one its
-extremes are: both are left alone, and nowhere is an extreme lost.
+Plain extremes per column would beat with the period there: the outline of a steady sine would look like a
+comb. Each column therefore takes the extremes of a whole period around it. Where a period spans many
+columns, the waveform is drawn; where a column contains a whole period, its extremes are. No extreme is ever
+lost.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,10 +30,9 @@ from ..errors import InvalidRequest
 from ..recordings.channels import RESPONSE
 from ..signals.arrays import Reals
 
-# What of a signal is drawn: the smallest and largest sample of every column of the picture.
-#
-# Every sample is in exactly one column, so an impact of three samples is seen at any zoom; every n-th
-# sample would show it in a few percent of the frames.
+# Envelopes: the smallest and largest sample of every column of the picture.
+# Every sample belongs to one column, so an impact of three samples is visible at any zoom. Drawing every
+# n-th sample would show it in a few percent of the frames.
 
 Samples = NDArray[np.float32] | NDArray[np.float64]
 
@@ -47,12 +45,12 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     samples
         Shape (..., samples). Lost samples are NaN; a column is NaN where all of its samples are lost.
     columns
-        Of the picture. Fewer samples than columns are given back as they are.
+        Number of columns. Fewer samples than columns are returned unchanged.
 
     Returns
     -------
-    Smallest and largest value of each column, shape (..., columns). Column c holds the samples from
-    ``c * n // columns`` on, which `column_starts` names.
+    Smallest and largest value of each column, shape (..., columns). Column c starts at sample ``c * n //
+    columns``, see `column_starts`.
 
     Raises
     ------
@@ -65,7 +63,7 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     if count <= columns:
         return samples, samples
     starts = column_starts(count, columns)
-    # fmin and fmax pass over NaN, and cost the same as minimum and maximum.
+    # fmin and fmax ignore NaN and cost the same as minimum and maximum.
     return (
         np.asarray(np.fmin.reduceat(samples, starts, axis=-1)),
         np.asarray(np.fmax.reduceat(samples, starts, axis=-1)),
@@ -78,9 +76,9 @@ def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
     Parameters
     ----------
     samples
-        How many a signal has.
+        Number of samples of the signal.
     columns
-        How many the picture has.
+        Number of columns of the picture.
 
     Returns
     -------
@@ -92,7 +90,7 @@ def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
 
 
 def zigzag(low: Reals, high: Reals) -> Reals:
-    """Lay both edges of an envelope into one line, low and high in turn, shape (..., 2 columns).
+    """Join both edges of an envelope into one line, low and high alternating.
 
     Parameters
     ----------
@@ -108,13 +106,13 @@ def zigzag(low: Reals, high: Reals) -> Reals:
 
 
 LEGIBLE_COLUMNS = 6.0
-"""A period of this many columns is seen as a wave."""
+"""Periods of at least this many columns are drawn as a waveform."""
 _MARGIN = 1.25
-"""Periods around a column: those of a sweep are not all alike."""
+"""Number of periods around a column, since the period of a sweep changes."""
 _CLEAR = 0.25
-"""Share of the usual height that a sample must be away from the middle to tell its side."""
+"""Hysteresis of zero crossings, as a share of the typical amplitude."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
-"""Periods are counted in this many stretches, each of this many columns or more."""
+"""Number of stretches in which periods are counted, and the fewest columns of each."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
@@ -125,7 +123,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     samples
         Shape (..., samples).
     columns
-        Of the picture.
+        Number of columns of the picture.
 
     Returns
     -------
@@ -143,10 +141,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
-    """Count the columns that hold a period, around each column; 1 where the edges are to be left alone.
-
-    The period is that of the stretch around the column: a sweep has many.
-    """
+    """Return the period at each column, in columns; 1 where the edges stay unchanged."""
     low, high = edges
     count = low.size
     blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))
@@ -160,7 +155,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Spread periods of stretches [columns] over their columns; next to a longer one it is that."""
+    """Assign the period of each stretch [columns] to its columns; the longer one wins at borders."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")
@@ -169,9 +164,9 @@ def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def period_of(samples: Samples, low: Samples, high: Samples) -> float:
-    """Measure a period in columns; infinite where the signal never goes up and down.
+    """Return the period in columns; infinite for a signal that does not oscillate.
 
-    Noise around the middle does not count.
+    Noise around the mean is ignored.
     """
     known = np.isfinite(low)
     if not known.any():
@@ -184,7 +179,7 @@ def period_of(samples: Samples, low: Samples, high: Samples) -> float:
 
 
 def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
-    """Return every column the extremes of this many columns around it."""
+    """Return, for every column, the extremes of this many columns around it."""
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
         here = reach == each
@@ -194,7 +189,7 @@ def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tup
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
-    """Return every column the extreme of this many columns around it."""
+    """Return, for every column, the extreme of this many columns around it."""
     before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
     for shift in range(reach):
@@ -202,33 +197,32 @@ def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
     return found
 
 
-# Any stretch of a recording as a picture of bounded width, however long the recording is.
+# Pictures of bounded width of any stretch of a recording.
+# Long stretches are drawn from the extremes stored in the file, short ones from the samples; no sample is
+# skipped, so an impact of three samples is in every picture.
 #
-# Wide stretches are drawn from the extremes of bins that the file keeps, narrow ones from the samples
-# themselves; nothing in between is skipped, so an impact of three samples is in every picture.
-#
-# A whole recording in a hundred columns: what a list of recordings shows beside a name.
+# A thumbnail shows a whole recording in a hundred columns, for lists of recordings.
 
 _COARSER = 16
-"""Bins of one level in one bin of the next."""
+"""Bins of one level per bin of the next."""
 _LEAST_BINS = 20_000
-"""A level with fewer bins than this needs no coarser one: reducing it takes a tenth of a millisecond."""
+"""A level with fewer bins needs no coarser one: reducing it takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Where periods are counted in a long recording: number of places, columns of each, most samples."""
+"""Places where periods of a long recording are counted: number, columns of each, maximum samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
 OnRead = Callable[[int, int], None]
-"""Told (values read, values in all), when an overview has to be made."""
+"""Callback (values read, total values) while an overview is computed."""
 
 
 def ignore_reading(done: int, asked: int) -> None:
-    """Watch nothing."""
+    """Ignore the progress."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A stretch of some channels, as it is drawn."""
+    """A stretch of some channels, for drawing."""
 
     time_s: Reals
     """Left edge of each column, since the first sample, shape (columns,)."""
@@ -236,12 +230,12 @@ class Picture:
     """Shape (channels, columns), in the channels' units; NaN where all samples were lost."""
     high: Samples
     samples_per_column: float
-    """1 where the samples themselves are shown."""
+    """Samples per column; 1 if the samples themselves are shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class OverviewLevel:
-    """Extremes of bins of one length, in a channel's unit; arrays of shape (bins,)."""
+    """Extremes of bins of one length in the channel's unit, shape (bins,)."""
 
     bin_samples: int
     low: NDArray[np.float32]
@@ -250,19 +244,19 @@ class OverviewLevel:
 
 @dataclass(frozen=True, eq=False)
 class RecordingOverview:
-    """A recording that can be looked at; made by `overview_of`."""
+    """A recording with its overview, from `overview_of`."""
 
     recording: Recording
     levels: dict[str, tuple[OverviewLevel, ...]]
     """Levels by role, fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
-        """Draw samples ``start`` to ``stop`` (exclusive) of some channels, about this many columns wide.
+        """Return samples ``start`` to ``stop`` (exclusive) of some channels in about this many columns.
 
         Raises
         ------
         InvalidRequest
-            For a stretch or a width of nothing.
+            When the stretch or the width is empty.
         """
         begin, end = max(0, start), min(stop, self.recording.samples)
         if not (begin < end and columns >= 1 and roles):
@@ -302,9 +296,9 @@ class RecordingOverview:
         return Picture(time_s, low, high, per_column)
 
     def _reach(self, role: str, begin: int, end: int, columns: int) -> NDArray[np.int64]:
-        """Count the columns that hold a period, from a piece of each of some stretches.
+        """Return periods in columns, from the samples of some places.
 
-        The file keeps no bin shorter than a column, and samples alone tell a period of less than two columns.
+        Stored bins are too long to show a period of less than two columns.
         """
         borders = np.linspace(0, columns, _STRETCHES + 1).astype(np.int64)
         wide = (end - begin) / columns
@@ -320,15 +314,15 @@ class RecordingOverview:
 
 
 def has_overview(recording: Recording) -> bool:
-    """Whether the file keeps its overview, so that looking at it reads next to nothing."""
+    """Return whether the file contains an overview, so that drawing reads little data."""
     return recording.read_overview(recording.roles[0]) is not None
 
 
 def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingOverview:
-    """Take the overview from the file, or make it of all samples when the file has none.
+    """Read the overview from the file, or compute it from all samples if there is none.
 
-    A growing or interrupted recording, and one from an older version, has none: half a gigabyte of
-    samples then takes one or two seconds.
+    Growing, interrupted and older recordings have none; half a gigabyte of samples takes one to two
+    seconds.
     """
     return RecordingOverview(recording, overview_levels(recording, on_read))
 
@@ -336,15 +330,7 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Return the extremes of every channel, fine to coarse: what crosses from a process that made them.
-
-    Parameters
-    ----------
-    recording
-        Open.
-    on_read
-        Told how many samples were read, and of how many.
-    """
+    """Return the extremes of every channel, fine to coarse."""
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
@@ -356,19 +342,12 @@ def overview_levels(
 
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
-    """Return the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
-
-    Parameters
-    ----------
-    recording
-        Open.
-    role
-        Name of the channel.
+    """Return the stored extremes of one channel, fine to coarse; see `has_overview`.
 
     Raises
     ------
     InvalidRequest
-        When the file keeps none.
+        When the file contains none.
     """
     kept = recording.read_overview(role)
     if kept is None:
@@ -413,19 +392,19 @@ def _scaled(counts: Counts, channel: ChannelHeader) -> NDArray[np.float32]:
 
 THUMBNAIL_COLUMNS = 120
 READ_WHOLE_SAMPLES = 50_000_000
-"""Values that are read for the thumbnail of a file without an overview: about a second."""
+"""Most values to read for the thumbnail of a file without an overview: about one second."""
 
 
 @dataclass(frozen=True, eq=False)
 class Thumbnail:
-    """The response of a whole recording, in few columns; each between -1 and 1."""
+    """Outline of the response of a whole recording, between -1 and 1."""
 
     low: NDArray[np.float32]
     high: NDArray[np.float32]
 
 
 def thumbnail(path: Path) -> Thumbnail | None:
-    """Draw a recording small; None where there is nothing to draw, or it would take too long."""
+    """Return a thumbnail; None if the recording is empty or too slow to read."""
     try:
         with open_recording(path) as recording:
             if recording.samples == 0 or not (

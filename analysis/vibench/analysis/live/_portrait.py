@@ -13,16 +13,16 @@ from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25
-"""Periods at either end of the stretch that integration and the drive's phase need."""
+"""Periods at each end of the stretch that integration and drive phase need."""
 POINTS_A_PERIOD = 120
-"""Of the drawn orbit: at 20 periods 2400 points, which take a painter about a millisecond."""
+"""Points per period of the orbit: 2400 points in 20 periods are painted in about 1 ms."""
 MOST_POINTS = 3000
-"""Poincaré points that are kept; the oldest go first."""
+"""Maximum number of Poincaré points; the oldest are dropped."""
 
 
 @dataclass(frozen=True, eq=False)
 class Portrait(Labelled):
-    """The orbit of the newest periods, and the motion once a drive period."""
+    """Orbit of the newest periods, with one Poincaré point per drive period."""
 
     drive_hz: float
     orbit_displacement_m: Reals
@@ -30,9 +30,9 @@ class Portrait(Labelled):
     """Shape (samples,)."""
     strobe_displacement_m: Reals
     strobe_velocity_m_per_s: Reals
-    """Where the drive, a cosine, begins a period; shape (periods,)."""
+    """Points at the maxima of the drive, a cosine; shape (periods,)."""
     strobe_sample: Reals
-    """When, in samples since the run began."""
+    """Times of these points, in samples since the run started."""
 
 
 def portrait(
@@ -44,7 +44,7 @@ def portrait(
     *,
     delay_s: float = 0.0,
 ) -> Portrait | None:
-    """Draw the newest periods; None when no sine is playing, or too few samples are there.
+    """Return the newest periods; None without a sine or with too few samples.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def portrait(
 
 
 def portrait_samples(frequency_hz: float, sample_rate_hz: float) -> int:
-    """How many samples a portrait is made of."""
+    """Return the number of samples for a portrait."""
     wanted = (SHOWN_PERIODS + 2 * _EDGE_PERIODS) * sample_rate_hz / frequency_hz
     return fft.next_fast_len(int(np.ceil(wanted)), real=True)
 
 
 class PoincareSection:
-    """Collects the points of portraits that overlap, each point once."""
+    """Poincaré points collected from overlapping portraits, each point once."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
@@ -96,7 +96,7 @@ class PoincareSection:
         self._newest = -np.inf
 
     def add(self, found: Portrait) -> None:
-        """Keep the points that were not there before: those half a period or more past the newest."""
+        """Add the new points: those at least half a period after the newest."""
         if found.strobe_sample.size == 0:
             return
         spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0

@@ -12,12 +12,12 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class RingWindow:
-    """Consecutive samples up to the newest."""
+    """Consecutive samples that end with the newest."""
 
     first_sample: int
-    """Since the run began."""
+    """Number of the first sample since the start of the run."""
     values: Values
-    """Shape (channels, samples), a view that the next samples will overwrite; lost samples are NaN."""
+    """Shape (channels, samples); a view that the next samples overwrite; lost samples are NaN."""
 
     @property
     def stop_sample(self) -> int:
@@ -26,10 +26,9 @@ class RingWindow:
 
 
 class Ring:
-    """Holds the newest samples of one run; never copies them to hand them out.
+    """Ring buffer that returns its samples without copying.
 
-    Every sample is written twice, a capacity apart: any stretch of the newest samples then lies in
-    one piece.
+    Every sample is written twice, one capacity apart, so that any stretch is contiguous.
     """
 
     def __init__(self, channels: int, capacity: int) -> None:
@@ -41,18 +40,15 @@ class Ring:
         self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)
         self._begun: int | None = None
         self.next_sample = 0
-        """Number of the sample that has not come yet."""
+        """Number of the next sample."""
 
     @property
     def held(self) -> int:
-        """How many samples can be handed out."""
+        """Number of samples available."""
         return 0 if self._begun is None else min(self.next_sample - self._begun, self._capacity)
 
     def add(self, first_sample: int, values: Values) -> None:
-        """Take samples, shape (channels, samples); what lies between these and the last is NaN.
-
-        Samples that are already there are passed over; those of another run belong in another ring.
-        """
+        """Add samples, shape (channels, samples); gaps become NaN and known samples are skipped."""
         if self._begun is None:
             self._begun = self.next_sample = first_sample
         late = self.next_sample - first_sample
@@ -68,13 +64,13 @@ class Ring:
         self.next_sample = first_sample + values.shape[1]
 
     def newest(self, samples: int) -> RingWindow:
-        """Return this many of the newest samples, or all that there are."""
+        """Return this many of the newest samples, or all if there are fewer."""
         count = min(max(samples, 0), self.held)
         end = self.next_sample % self._capacity + self._capacity
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
-        """Return what came from a sample on, as far as it is still held."""
+        """Return the samples from a number on, as far as they are still available."""
         return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

@@ -1,4 +1,4 @@
-"""Responses I and II of the newest stretch of a sine or a slow sweep, point by point as it goes."""
+"""Live Responses I and II of a sine or a slow sweep."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -14,31 +14,31 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Part of the power that the strongest line and its neighbours hold when the drive is a sine."""
+"""Least share of the power in the strongest line and its neighbours if the drive is a sine."""
 _NEIGHBOURS = 3
-"""Lines on either side that belong to a sine under a Hann window, one whose frequency moves a little too."""
+"""Lines on each side that belong to a sine under a Hann window, also if its frequency changes slowly."""
 _LEAST_LINE = 4
-"""Periods that the stretch must hold, so that the line is clear of the offset's."""
+"""Least number of periods, so that the line is clear of the offset's line."""
 
 
 @dataclass(frozen=True)
 class DriveTone:
-    """A drive that is a sine over a short stretch."""
+    """Sine in a short stretch of the drive."""
 
     frequency_hz: float
-    """In the middle of the stretch, when it sweeps."""
+    """Frequency, for a sweep in the middle of the stretch."""
     amplitude: float
     """Peak [unit of the channel]."""
 
 
 @lru_cache(maxsize=32)
 def _hann(samples: int) -> Reals:
-    """Return the same lengths again and again: making a window costs as much as transforming it."""
+    """Return a cached window: computing one costs as much as a Fourier transform."""
     return taper(Window.HANN, samples)
 
 
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
-    """Find the sine in a short stretch of the drive, shape (samples,); None when it is no sine.
+    """Find the sine in a short stretch of the drive, shape (samples,); None if it is no sine.
 
     Between two lines of a Hann spectrum the ratio of the two largest gives the place exactly
     (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
@@ -63,11 +63,10 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
 
 
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
-    """Return the moments at which the drive, a cosine, begins a period, in samples; a slow sweep too.
+    """Return the times of the maxima of the drive, a cosine or a slow sweep [samples].
 
-    The drive is turned back by its frequency and kept within half of it: what is left is a slow phase,
-    known from few samples. A tenth of the stretch at either end, where the filter lacks its past or
-    future, gives no moment.
+    The drive is demodulated with its frequency and low-pass filtered at half of it, which leaves a slow
+    phase. A tenth of the stretch at each end is left out, where the filter is disturbed.
     """
     half = max(2, int(0.5 * frequency_hz * drive.size / sample_rate_hz))
     if half < _LEAST_LINE:
@@ -88,32 +87,32 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
 
 
 _BAND_BELOW = 0.3
-"""Displacement is kept down to this part of the drive frequency: half orders pass, drift does not."""
+"""High-pass for displacement, relative to the drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
-"""Stretch in which the drive's frequency is looked for: five periods of 10 Hz."""
+"""Length of the stretch in which the drive frequency is searched: five periods of 10 Hz."""
 _STRETCH_PERIODS = 25
-"""... and at least 0.1 s of motion, without the ends that integration disturbs."""
+"""... and at least 0.1 s of motion without the disturbed ends."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Part of its amplitude that the drive keeps along a stretch, unless it is ramped down."""
+"""Share of its amplitude that the drive keeps along a stretch, unless it is ramped down."""
 _STEEPEST_POWER = 2
-"""A sweep's setting follows at most the square of its frequency: constant displacement."""
+"""The voltage of a sweep follows at most the square of its frequency (constant displacement)."""
 
 
 @dataclass(frozen=True)
 class SinePoint:
-    """What one stretch says."""
+    """Result of one stretch."""
 
     time_s: float
     """Middle of the stretch, since the first sample of the run."""
     frequency_hz: float
     drive_amplitude_m: float
-    """A0, of the base displacement at the drive frequency."""
+    """A0, amplitude of the base displacement at the drive frequency."""
     lower: float
     upper: float
-    """Extremes of the response velocity [m/s]."""
+    """Largest and smallest response velocity [m/s]."""
     response_i: float
     """Largest abs(x) over A0."""
     response_ii: float
@@ -121,13 +120,13 @@ class SinePoint:
 
 
 def stretch_samples(frequency_hz: float, sample_rate_hz: float) -> int:
-    """How many samples one point is made of, the ends included that integration disturbs."""
+    """Return the number of samples for one point, including the disturbed ends."""
     wanted_s = max(_STRETCH_S, _STRETCH_PERIODS / frequency_hz) + 2 * _EDGE_PERIODS / frequency_hz
     return fft.next_fast_len(int(np.ceil(wanted_s * sample_rate_hz)), real=True)
 
 
 def look_samples(sample_rate_hz: float) -> int:
-    """How many samples show which frequency is playing."""
+    """Return the number of samples to find the drive frequency."""
     return fft.next_fast_len(round(_LOOK_S * sample_rate_hz), real=True)
 
 
@@ -137,17 +136,17 @@ def sine_point(
     sample_rate_hz: float,
     quantity: Quantity = Quantity.VELOCITY,
 ) -> SinePoint | None:
-    """Make a point of the newest samples.
+    """Compute a point from the newest samples.
 
-    None when they hold no sine, are too few, some were lost, or the drive is ramped down: m0 then rings
-    on over a base that is hardly there.
+    None without a sine, with too few or lost samples, or while the drive is ramped down, when m0 still
+    rings and the base hardly moves.
 
     Parameters
     ----------
     window
-        Samples in physical units; more than are needed do no harm.
+        Samples in physical units; additional samples are ignored.
     rows
-        Which channels are drive, base acceleration and response.
+        Rows of drive, base acceleration and response.
     quantity
         Quantity of the response's channel.
     """
@@ -170,7 +169,7 @@ def sine_point(
 
 
 def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
-    """Return whether the drive falls along a stretch, by more than a sweep downwards lets it."""
+    """Return whether the drive falls along a stretch by more than in a downward sweep."""
     quarter = drive.size // 4
     first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
     if first is None or last is None:
@@ -180,7 +179,7 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
 
 
 def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity) -> SinePoint | None:
-    """Take frequency, amplitudes and extremes from the same stretch: in a sweep they move together."""
+    """Return frequency, amplitudes and extremes of one stretch, since they change together in a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz
@@ -207,7 +206,7 @@ def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quan
 def motion_of(
     response: Reals, sample_rate_hz: float, frequency_hz: float, quantity: Quantity
 ) -> tuple[Reals, Reals]:
-    """Return displacement and velocity around a drive frequency, without the ends that are disturbed."""
+    """Return displacement and velocity around a drive frequency, without the disturbed ends."""
     converted = partial(
         converted_signal,
         response,

@@ -1,4 +1,4 @@
-"""Spectra and transmission of the newest seconds of a run, kept up to date segment by segment."""
+"""Live spectra and transmission of the newest seconds of a run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,17 +28,17 @@ from ..tables import Labelled
 from ._ring import Values
 
 _LEAST_SEGMENTS = 2
-"""The coherence of a single segment is 1, whatever it holds."""
+"""Fewest segments: the coherence of a single one is always 1."""
 
 
 @dataclass(frozen=True)
 class SpectrumSettings:
-    """How the newest samples are averaged."""
+    """Settings of the averages."""
 
     segment_samples: int = 8192
     """At 51.2 kS/s: lines 6.25 Hz apart."""
     averages: int = 24
-    """Segments; older ones are forgotten."""
+    """Number of segments; older ones are dropped."""
     overlap: float = 0.5
 
     def __post_init__(self) -> None:
@@ -52,7 +52,7 @@ class SpectrumSettings:
 
 @dataclass(frozen=True, eq=False)
 class LiveSpectrum(Labelled):
-    """Root of the spectral density of every channel."""
+    """Amplitude spectral density of every channel."""
 
     frequency_hz: Reals
     amplitude_density: Reals
@@ -65,10 +65,9 @@ DEFAULT_SETTINGS = SpectrumSettings()
 
 
 class LiveSpectra:
-    """Takes samples as they come, transforms each segment once, and averages the newest ones (Welch).
+    """Welch average of the newest segments, each transformed once.
 
-    A segment that touches a lost sample is passed over. Work per block is one Fourier transform of
-    each channel and segment that became whole.
+    Segments with lost samples are skipped.
     """
 
     def __init__(
@@ -87,20 +86,20 @@ class LiveSpectra:
         self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
-        """How many segments became whole since the run began: changes when there is something new."""
+        """Number of completed segments; changes when there is something new."""
 
     def add(self, values: Values) -> None:
-        """Take the next samples, shape (channels, samples)."""
+        """Add the next samples, shape (channels, samples)."""
         data = np.concatenate((self._carry, values), axis=1)
         size = self._settings.segment_samples
         whole = max(0, (data.shape[1] - size) // self._hop + 1)
-        # After a long wait only the newest segments count.
+        # After a long pause only the newest segments are transformed.
         for number in range(max(0, whole - self._settings.averages), whole):
             self._take(data[:, number * self._hop : number * self._hop + size])
         self._carry = data[:, whole * self._hop :].copy()
 
     def leave_out(self, newest_s: float) -> None:
-        """Pass over the segments of the newest seconds."""
+        """Exclude the segments of the newest seconds."""
         count = min(self.segments, self._is_used.size, int(np.ceil(newest_s * self._rate_hz / self._hop)))
         self._is_used[(self.segments - 1 - np.arange(count)) % self._is_used.size] = False
 
@@ -138,17 +137,17 @@ class LiveSpectra:
         delay_s: float = 0.0,
         confidence: float = DEFAULT_CONFIDENCE,
     ) -> FrequencyResponse | None:
-        """Return displacement over displacement, with coherence and bounds; None before two segments.
+        """Return transmissibility, coherence and bounds; None before two segments.
 
         Parameters
         ----------
         rows
-            Which channels are the base acceleration, the response and, for an estimate that noise on both
-            does not bias, the drive voltage.
+            Rows of base acceleration and response and, for an estimate without bias by noise, of the drive
+            voltage.
         quantity
             Quantity of the response's channel.
         low_hz, high_hz
-            The band that is looked at.
+            The band.
         delay_s
             By how much the response channel lags the base channel.
         """
@@ -188,7 +187,7 @@ class LiveSpectra:
         )
 
     def _used(self) -> Flags:
-        """Which places hold a segment that counts, oldest first as far as their distances matter."""
+        """Return which places contain a valid segment, oldest first."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
 
@@ -201,15 +200,15 @@ _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
 """Hann width of a line under a Hann window, at half power, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
-"""Length of the visible range over that of a segment, within the limits above."""
+"""Ratio of the visible range to the segment length, within the limits above."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0
-"""What silence is drawn as: zero has no logarithm."""
+"""Density drawn for silence, because zero has no logarithm."""
 
 
 class RowSpacing(StrEnum):
-    """How frequencies are laid out."""
+    """Spacing of the rows."""
 
     LINEAR = "linear"
     LOGARITHMIC = "logarithmic"
@@ -217,7 +216,7 @@ class RowSpacing(StrEnum):
 
 @dataclass(frozen=True)
 class SpectrogramRequest:
-    """What is to be pictured: samples ``start`` to ``stop`` (exclusive) of a channel."""
+    """Samples ``start`` to ``stop`` (exclusive) of a channel, and the settings of the picture."""
 
     path: Path
     role: str
@@ -226,12 +225,12 @@ class SpectrogramRequest:
     highest_hz: float
     spacing: RowSpacing
     resolution_hz: float | None = None
-    """Wished width of a line [Hz]; chosen by the stretch if absent, which shows events best."""
+    """Resolution [Hz]; by default chosen from the length of the stretch, which shows events best."""
 
 
 @dataclass(frozen=True, eq=False)
 class DensityPicture:
-    """Spectral density over time and frequency; rows and columns are evenly spaced."""
+    """Spectral density over time and frequency, with evenly spaced rows and columns."""
 
     request: SpectrogramRequest
     unit: str
@@ -248,10 +247,9 @@ class DensityPicture:
 
 
 def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
-    """Picture a stretch; every sample of it is in the picture.
+    """Return the spectrogram of a stretch; every sample contributes.
 
-    Raises RecordingError or InvalidRequest or NotEnoughData when the file, the channel or the stretch cannot
-    be pictured.
+    Raises RecordingError, InvalidRequest or NotEnoughData for an unusable file, channel or stretch.
     """
     with open_recording(request.path) as recording:
         rate_hz = recording.sample_rate_hz
@@ -284,7 +282,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Lay the lines out; where one row holds several lines it shows the strongest of them."""
+    """Assign the lines to rows; a row shows its strongest line."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

@@ -1,7 +1,4 @@
-"""One run as it is watched: samples go in, and every picture of a frame is asked for when it is drawn.
-
-The history of a sine or a sweep so far: responses and extremes against the frequency really played.
-"""
+"""Live view of one run: samples are added, and each picture is computed when it is drawn."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -22,45 +19,42 @@ from ._ring import Ring, Values
 from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
 from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSettings
 
-# Impacts as the sensor of m0 shows them: kinks in its motion, counted as they come.
-#
-# m1 and m2 strike each other; their jump in velocity reaches m0 through springs and dampers: within one
-# contact its acceleration steps, and changes its slope. The shape of that kink is the same for every
-# impact, and the smooth motion between impacts is far slower. So the smooth motion is taken away by a sixth
-# difference, the kinks are looked for by their shape, and the strongest is taken away first, then the next
-# one, until only noise is left: neighbours a tenth of a millisecond apart are distinguished.
-#
-# Checked against simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to
-# 99 % of the impacts are counted where there are 330 to 1800 a second, and none where there are none.
-# What is lost is weak: grazing contacts, which change m0's motion less than the noise does, are not seen.
+# Impacts are counted as kinks in the motion of m0.
+# When m1 and m2 collide, springs and dampers transmit their jump in velocity to m0: its acceleration steps
+# and changes its slope. This kink always has the same shape, and the motion between impacts is far slower.
+# So a sixth difference removes the smooth motion, a matched filter finds the kinks, and the strongest is
+# subtracted first, until only noise is left. Impacts 0.1 ms apart are resolved.
+# In simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to 99 % of 330
+# to 1800 impacts a second are counted, and none without impacts. Only contacts that change m0's motion less
+# than the noise are missed.
 
 _SPAN_S = 78e-6
-"""Between the samples of a difference: longer lets more of the motion through, shorter more noise."""
+"""Interval of the difference: a longer one passes more of the motion, a shorter one more noise."""
 _DAMPING_TIME_S = 2e-5
-"""Damping time of the springs to m0: the step of the acceleration over the change of its slope."""
+"""Damping time of the springs to m0: step of the acceleration over change of its slope."""
 _CONTACT_S = 30e-6
 """Length of a contact: 20 to 40 us."""
 _APART_S = 100e-6
 """Kinks closer than this are counted as one."""
 _LEAST_FRESH_S = 20e-3
-"""Fewer samples than this say too little about the noise; they wait for more."""
+"""Fewest samples to estimate the noise."""
 _MOST_FRESH_S = 0.1
-"""More samples are looked at piece by piece: each kink is looked for in the whole piece."""
+"""Longer data are processed in pieces of this length."""
 _NOISE_FACTOR = 5.2
-"""Over the standard deviation: noise alone is taken for an impact once in two minutes."""
+"""Threshold over the standard deviation: one false impact by noise in two minutes."""
 _SMOOTH_FACTOR = 3.0
-"""Over what is left of a sine of the motion's mean frequency."""
+"""Threshold over the residual of a sine at the motion's mean frequency."""
 _REST_SHARE = 0.2
-"""Rest share of a kink beside it: less is what is left of that one, for no kink is quite of the one shape."""
+"""Least share of a neighbouring kink; anything smaller is a residual of subtracting that one."""
 _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Noise gain of the sixth difference, for white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""A quarter of the values of |noise| lie below this; impacts disturb most of the others at times."""
+"""First quartile of |noise| in standard deviations; impacts may disturb larger values."""
 
 
 class ImpactCounter:
-    """Counts kinks in a motion that comes block by block."""
+    """Count impacts in a motion that arrives in blocks."""
 
     def __init__(self, sample_rate_hz: float, quantity: Quantity = Quantity.VELOCITY) -> None:
         span = max(1, round(_SPAN_S * sample_rate_hz))
@@ -68,7 +62,7 @@ class ImpactCounter:
         self._difference[::span] = _SIXTH_DIFFERENCE
         kink = _kink(self._difference, sample_rate_hz, 3 - quantity.derivatives)
         power = float(kink @ kink)
-        # What a difference of the samples is correlated with, all in one: samples in, strength of a kink out.
+        # Difference and matched filter in one: samples in, strength of a kink out.
         self._finder = np.convolve(self._difference, kink[::-1]) / power
         self._gain = float(np.sqrt(np.sum(self._finder**2)))
         self._beam = np.correlate(kink, kink, mode="full") / power
@@ -81,13 +75,13 @@ class ImpactCounter:
         """Impacts so far."""
 
     def add(self, motion: Values | Reals) -> int:
-        """Take the next samples, shape (samples,), lost ones NaN; gives how many impacts were found."""
+        """Add the next samples, shape (samples,), lost ones NaN; return the number of impacts found."""
         starts = range(0, max(1, len(motion)), self._most)
         return sum(self._add_piece(motion[first : first + self._most]) for first in starts)
 
     def _add_piece(self, motion: Values | Reals) -> int:
         data = np.concatenate((self._carry, np.asarray(motion, dtype=np.float64)))
-        # A kink is separated from what its neighbours leave, so its surroundings must be there.
+        # To separate a kink from its neighbours, the samples around it are needed.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
         if fresh < self._least_fresh:
             self._carry = data
@@ -99,7 +93,7 @@ class ImpactCounter:
         return int(inside.size)
 
     def _kinks(self, data: Reals) -> "np.ndarray[tuple[int, ...], np.dtype[np.intp]]":
-        """Find kinks, the strongest first; each is taken away with all that it does around it."""
+        """Find kinks, the strongest first; subtract each before the next."""
         strength = np.nan_to_num(np.convolve(data, self._finder[::-1], mode="valid"))
         least = max(_NOISE_FACTOR * self._gain * _noise(data), _SMOOTH_FACTOR * self._smooth(data))
         size, beside = np.abs(strength), np.zeros(strength.size)
@@ -120,7 +114,7 @@ class ImpactCounter:
         return inorder[np.diff(inorder, prepend=-self._apart - 1) > self._apart]
 
     def _smooth(self, data: Reals) -> float:
-        """Return what is left of a sine of the same mean square, and of the same mean square slope."""
+        """Return the filter's residual for a sine with the same mean square and mean square slope."""
         known = data[np.isfinite(data)]
         spread = float(np.std(known)) if known.size > 1 else 0.0
         if spread == 0.0:
@@ -131,18 +125,18 @@ class ImpactCounter:
 
 
 def _noise(data: Reals) -> float:
-    """Judge the noise of one sample from what is quiet; infinite where nothing is known."""
+    """Estimate the noise of one sample from the quiet samples; infinite without data."""
     known = data[np.isfinite(data)]
     if known.size <= _SIXTH_DIFFERENCE.size:
         return np.inf
     rough = np.abs(np.convolve(known, _SIXTH_DIFFERENCE, mode="valid")) / _NOISE_GAIN
     quiet = float(np.quantile(rough, _QUIET_SHARE)) / _QUARTER_OF_NORMAL
-    # What comes from a viewer has single precision: no noise is less than its last digit.
+    # Samples have single precision, so the noise is at least one last digit.
     return max(quiet, float(np.finfo(np.float32).eps * np.max(np.abs(known))))
 
 
 def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
-    """Return what the difference makes of the motion after one impact, which grows as t^power / power!."""
+    """Return the difference of the motion after one impact, which grows as t^power / power!."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)
@@ -154,13 +148,13 @@ def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
 
 
 MOST_POINTS = 36_000
-"""An hour at ten points a second; the oldest go first."""
+"""One hour at ten points per second; the oldest are dropped."""
 _COLUMNS = tuple(each.name for each in fields(SinePoint))
 
 
 @dataclass(frozen=True, eq=False)
 class SweepHistory:
-    """All points so far, in the order of time; arrays of shape (points,)."""
+    """All points in the order of time; arrays of shape (points,)."""
 
     time_s: Reals
     frequency_hz: Reals
@@ -172,7 +166,7 @@ class SweepHistory:
 
 
 class SweepTrace:
-    """Keeps points as they come, in memory that was claimed at the beginning."""
+    """Growing list of points in preallocated memory."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
@@ -181,7 +175,7 @@ class SweepTrace:
 
     @property
     def points(self) -> int:
-        """How many are kept."""
+        """Number of points."""
         return self._end - self._begin
 
     def add(self, point: SinePoint) -> None:
@@ -200,13 +194,13 @@ class SweepTrace:
 
 HELD_S = 10.0
 _POINT_EVERY_S = 0.1
-"""Points of a sweep's course, and portraits, change this often; the other pictures with every frame."""
+"""Update interval of sweep points and portraits; other pictures change with every frame."""
 _LOWEST_DRIVE_HZ = 10.0
 
 
 @dataclass(frozen=True)
 class LiveChannel:
-    """What is to be known of a channel to watch it."""
+    """Properties of a channel in the live view."""
 
     role: str
     unit: str
@@ -216,28 +210,28 @@ class LiveChannel:
 
 @dataclass(frozen=True, eq=False)
 class TimeHistories:
-    """The newest seconds of every channel, as they are drawn."""
+    """The newest seconds of every channel, for drawing."""
 
     time_s: Reals
-    """Left edge of each column, since the run began, shape (columns,)."""
+    """Left edge of each column since the start of the run, shape (columns,)."""
     low: Samples
     """Shape (channels, columns), in the channels' units; lost samples are NaN."""
     high: Samples
 
 
 class LiveView:
-    """Keeps what the pictures of one run need; a new run begins a new view.
+    """Data for the pictures of one run.
 
     Parameters
     ----------
     channels
         In the order of the samples.
     band_hz
-        What the measurement excites: the transmission is shown in it, and no drive is looked for below.
+        Excited band: transmission is shown in it, and no drive is searched below.
     delay_s
         By how much the response channel lags the base channel.
     lead_in_s
-        Until then the motion comes up and settles: it makes no point of a course, and no Poincaré point.
+        Start-up time, in which no sweep points and no Poincaré points are taken.
     """
 
     def __init__(
@@ -265,7 +259,7 @@ class LiveView:
         self._impacts = ImpactCounter(sample_rate_hz, self._quantity)
         self._meters = LevelMeters(np.array([each.full_scale_v for each in channels]), sample_rate_hz)
         self.levels: tuple[Level, ...] = ()
-        """Meters, in the order of the channels; empty before the first sample."""
+        """Levels in the order of the channels; empty before the first sample."""
         self._trace = SweepTrace()
         self._pointed = 0
         self.section = PoincareSection()
@@ -276,11 +270,11 @@ class LiveView:
 
     @property
     def next_sample(self) -> int:
-        """Number of the first sample that is still wanted."""
+        """Number of the next sample to add."""
         return self._ring.next_sample
 
     def add(self, first_sample: int, volts: NDArray[np.float32]) -> None:
-        """Take samples [V], shape (channels, samples); those that are already there are passed over."""
+        """Add samples [V], shape (channels, samples); known samples are skipped."""
         begun = self._ring.next_sample if self._ring.held else first_sample
         self._ring.add(first_sample, volts * self._units_per_volt)
         fresh = self._ring.since(begun).values
@@ -294,7 +288,7 @@ class LiveView:
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
-        """Return the newest seconds as columns of a picture."""
+        """Return the newest seconds reduced to columns."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
@@ -307,7 +301,7 @@ class LiveView:
         return self._spectrum[1]
 
     def frequency_response(self) -> FrequencyResponse | None:
-        """Return |x / U| of the newest segments, with coherence and bounds; None before two of them."""
+        """Return |x / U| of the newest segments, with coherence and bounds; None before two segments."""
         if not self._has(BASE, self._response):
             return None
         if self._frequency_response[0] != self._spectra.segments:
@@ -321,12 +315,12 @@ class LiveView:
         return self._frequency_response[1]
 
     def leave_out(self, newest_s: float) -> None:
-        """Take spectra and transmission from samples before the newest seconds, and from those to come."""
+        """Exclude the newest seconds from spectra and transmission."""
         self._spectra.leave_out(newest_s)
         self._spectrum = self._frequency_response = (-1, None)
 
     def portrait(self) -> Portrait | None:
-        """Return the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
+        """Return the newest orbit and add its Poincaré points; None without a sine."""
         if not self._has(DRIVE, self._response):
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
@@ -347,19 +341,19 @@ class LiveView:
         return found
 
     def history(self) -> SweepHistory:
-        """Return Responses I and II and extremes against the frequency really played, so far."""
+        """Return Responses I and II and extremes over the measured drive frequency."""
         return self._trace.history()
 
     @property
     def impacts(self) -> int:
-        """Kinks in m0's acceleration since the run began."""
+        """Number of impacts since the start of the run."""
         return self._impacts.count
 
     def _has(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)
 
     def _settled(self) -> int:
-        """Count the samples since the lead-in was over."""
+        """Return the number of samples after the lead-in."""
         return max(0, self._ring.next_sample - self._lead_in)
 
     def _is_point_due(self) -> bool:

@@ -1,6 +1,6 @@
-"""Recordings and campaigns analysed, each by the excitation that its plan names.
+"""Analyse recordings and campaigns, each recording by the excitation in its plan.
 
-A recording becomes a noise, sweep, dwell or stepped-sine result, with the model overlaid on it or not; one
-that cannot be analysed says why and stops no other. A result is also one JSON document, every number
-with its unit in its name and its uncertainty beside it, and the curves of a comparison.
+The result of a recording is a noise, sweep, dwell or stepped-sine result, with or without the model
+overlaid. A recording that fails is reported with the reason; the others continue. Results are also
+available as JSON, with units in the keys and an uncertainty beside each number.
 """

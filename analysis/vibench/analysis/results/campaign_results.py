@@ -1,4 +1,4 @@
-"""All recordings of a campaign, analysed; one that cannot be analysed says why and stops no other."""
+"""Analyse all recordings of a campaign; report those that fail and continue with the others."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -33,11 +33,11 @@ from ..uncertainty.budget import Budget
 from .measurement_analysis import analyse
 
 Stage = Callable[[str], None]
-"""Told, in a few words, what is being computed."""
+"""Callback that receives a short description of the current step."""
 
 
 def ignore_stage(stage: str) -> None:
-    """Watch nothing."""
+    """Ignore the step."""
 
 
 def overlay(
@@ -60,20 +60,19 @@ def overlay(
     recording, analysis
         The recording and what `analyse` made of it.
     specimen
-        The model; by default what the recording's bench configuration says is on the shaker.
+        The model; by default the specimen in the recording's bench configuration.
     accuracy
-        Of the contacts in the simulation under the recorded base motion.
+        Accuracy of contacts when the recorded base motion drives the simulation.
     simulation
-        What moves the model: rig and specimen together under the recorded voltage, or the specimen alone
-        under the recorded base motion. Where nothing is known of the shaker, one is fitted
-        to weak noise, and the base drives where that is not possible either: ``run.driven`` and ``run.why``
-        of the result say so.
+        Input of the model: the recorded voltage drives rig and specimen, or the recorded base motion drives
+        the specimen alone. An unknown shaker is fitted to weak noise; if that fails, the base motion is
+        used. ``run.driven`` and ``run.why`` of the result name the choice.
     shaker
-        As `fit_shaker` found it in another recording; taken where the bench configuration describes none.
+        Result of `fit_shaker` for another recording; used if the bench configuration describes no shaker.
     draws
-        How many runs of a colliding motion are made from slightly different starts under the voltage.
+        Number of simulated runs of a colliding motion, from slightly different starts, under the voltage.
     stage
-        Told what is being computed.
+        Receives a description of the current step.
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
     stage(f"simulating {simulation.value}")
@@ -108,7 +107,7 @@ def _source(
 
 
 class FailedStep(StrEnum):
-    """What a recording has no result of."""
+    """Step of the analysis that failed."""
 
     ANALYSIS = "analysis"
     SIMULATION = "simulation"
@@ -116,7 +115,7 @@ class FailedStep(StrEnum):
 
 @dataclass(frozen=True)
 class AnalysisFailure:
-    """A recording without a result, or a result without its simulation, and why."""
+    """Reason why a recording has no result, or a result has no simulation."""
 
     DOCUMENT: ClassVar = "recording=name what error=sentence"
 
@@ -127,13 +126,13 @@ class AnalysisFailure:
 
 @dataclass(frozen=True, eq=False)
 class CampaignResults:
-    """What a report is made of."""
+    """Results of a campaign, the content of a report."""
 
     name: str
     results: tuple[AnyResult, ...]
     failures: tuple[AnalysisFailure, ...]
     model_said: tuple[str, ...] = ()
-    """What is to be known of the model that was overlaid on: a sentence for each fitted value."""
+    """Remarks on the overlaid model, one sentence for each fitted value."""
 
     @property
     def facts(self) -> tuple[RecordingFacts, ...]:
@@ -142,7 +141,7 @@ class CampaignResults:
 
     @property
     def in_order(self) -> tuple[AnyResult, ...]:
-        """Family by family, each weak to strong or in the order given."""
+        """Results by kind, each from weak to strong or in the order given."""
         families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
 
         def place(each: AnyResult) -> tuple[float, ...]:
@@ -180,29 +179,29 @@ def analyse_files(
     draws: int = DRAWS,
     response: str | None = None,
 ) -> CampaignResults:
-    """Analyse recordings one after the other, each with the model overlaid on it, as `analyse` does.
+    """Analyse recordings one after the other with `analyse`, and overlay the model on each.
 
-    The model is the ``specimen`` given; by default what each recording's bench configuration says. Where one
-    describes no shaker, the shaker fitted to the weakest noise among the recordings takes its place.
+    By default the model comes from each recording's bench configuration. If that describes no shaker, a
+    shaker is fitted to the weakest noise among the recordings.
 
     Parameters
     ----------
     paths
         Recordings.
     name
-        What results and report are called.
+        Name of the results and the report.
     simulation
-        What is overlaid on each, if anything.
+        Simulation to overlay on each, if any.
     request
-        Estimator, lines and quantities of noise.
+        Estimator, resolution and quantities for noise.
     observer
-        Told how far it is.
+        Receives the progress.
     specimen
-        In place of the described one.
+        Specimen to use instead of the one in the bench configuration.
     draws
-        Simulated runs of each test.
+        Number of simulated runs of each test.
     response
-        Channel whose motion is analysed; by default that of m0, which alone is simulated.
+        Channel to analyse; by default the motion of m0. Only m0 is simulated.
 
     Raises
     ------
@@ -236,9 +235,9 @@ def analyse_files(
 
 
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
-    """Return the channels of other motions than that of m0, with the recordings that have each.
+    """Return the channels that measure other motions than m0's, with the recordings that have each.
 
-    Recordings that cannot be read are left out: their own analysis says what is wrong with them.
+    Unreadable recordings are left out: their analysis reports the reason.
     """
     found: dict[str, tuple[Path, ...]] = {}
     for path in paths:
@@ -264,7 +263,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
                 if ANALYSES[present_word(plan["kind"])].family == NOISE_FAMILY:
                     unknown.append((float(plan["amplitude_vpp"]), path))
         except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
-            continue  # its own analysis says what is wrong with it
+            continue  # its own analysis reports the reason
     for _, path in sorted(unknown) if needed and len(paths) > 1 else ():
         try:
             with open_recording(path) as recording:
@@ -276,15 +275,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
 
 
 def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
-    """Put results that were made one by one together as one campaign's.
-
-    Parameters
-    ----------
-    name
-        Of the whole.
-    parts
-        Results of one recording or more each.
-    """
+    """Merge results of separate recordings into one campaign."""
     return CampaignResults(
         name,
         tuple(result for part in parts for result in part.results),
@@ -303,7 +294,7 @@ def result_of(
     draws: int = DRAWS,
     response: str | None = None,
 ) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
-    """Analyse one recording; a simulation that fails leaves the measured result standing.
+    """Analyse one recording; keep the measured result if the simulation fails.
 
     Raises AnalysisError when nothing in the recording is usable.
     """
@@ -338,7 +329,7 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
 
 
 def _start_time(path: Path) -> str:
-    """Start of a recording; one that cannot be opened comes last and is named as a failure later."""
+    """Return when a recording started; unreadable ones sort last and are reported later."""
     last = "~"
     try:
         with open_recording(path) as recording:
@@ -348,7 +339,7 @@ def _start_time(path: Path) -> str:
 
 
 def result_summary(result: AnyResult) -> Json:
-    """Say a result in numbers that JSON can hold; what is not finite becomes null."""
+    """Return a result as JSON; numbers that are not finite become null."""
     analysis = result.analysis
     return {
         "recording": plain(analysis.facts),
@@ -361,13 +352,13 @@ def result_summary(result: AnyResult) -> Json:
 
 
 def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
-    """Return the budget of uncertainty of each number that a reader takes away from a result.
+    """Return the uncertainty budget of each main number of a result.
 
     Returns
     -------
-    A budget each for A0 and Responses I and II of a dwell, the largest of both of a sweep or of steps,
-    and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). Those of a
-    recording that lasted until its results were known are widened, see `Budget.widened`.
+    One budget each for A0 and Responses I and II of a dwell, for the largest Responses of a sweep or of
+    steps, and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). If
+    the recording lasted until a bound was met, budgets are widened: see `Budget.widened`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
     has_chosen_end = result.analysis.facts.measurement.until is not None
@@ -375,14 +366,14 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:
-    """Say the numbers of each recording with their uncertainty and what it is made of, a sentence each."""
+    """Return one sentence for each number, with its uncertainty and the contributions to it."""
     for each in results.in_order:
         for budget in budgets_of(each):
             yield f"{each.analysis.facts.name}: {budget.sentence}."
 
 
 def campaign_summary(results: CampaignResults) -> Json:
-    """Say all results of a campaign, and what failed."""
+    """Return all results and failures of a campaign as JSON."""
     return {
         "campaign": results.name,
         "results": [result_summary(each) for each in results.results],

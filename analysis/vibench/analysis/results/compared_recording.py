@@ -1,4 +1,4 @@
-"""The curves of one recording, and of what the model says of it, as a comparison shows them."""
+"""Measured and simulated curves of one recording, for a comparison."""
 
 import pickle
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from .campaign_results import AnalysisFailure, result_of
 
 @dataclass(frozen=True, eq=False)
 class ComparedRecording(Labelled):
-    """What a comparison keeps of a recording; small, so that it crosses from the process that made it."""
+    """Curves and findings of a recording, small enough to pass between processes."""
 
     path: Path
     name: str
@@ -35,9 +35,9 @@ class ComparedRecording(Labelled):
     failures: tuple[str, ...]
     """Sentences on what could not be analysed or simulated."""
     warnings: tuple[str, ...]
-    """What the checks of the recording found."""
+    """Findings of the checks of the recording."""
     kept: bytes
-    """The whole result, for reports: only they open it, with `kept_result`."""
+    """The whole result, pickled for reports; `kept_result` opens it."""
 
 
 def compare_recording(
@@ -48,12 +48,12 @@ def compare_recording(
     Parameters
     ----------
     simulation
-        What is overlaid on it, if anything.
+        Simulation to overlay, if any.
 
     Raises
     ------
     AnalysisError, RecordingError
-        When nothing in it is usable, in one sentence.
+        When nothing in it is usable.
     """
     with open_recording(path) as recording:
         result, failures = result_of(recording, simulation, request)
@@ -69,13 +69,13 @@ def compare_recording(
 
 
 def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
-    """Open the whole result again; the bytes were made by this program a moment ago, never by a file."""
+    """Return the whole result; its bytes come from this program, never from a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
 
 
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
-    """Return the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
+    """Return base amplitudes [m] over frequencies [Hz] of a stepped sine or a sweep, in ascending order.
 
     Raises NotEnoughData when the recording is of another kind, or of one frequency.
     """
@@ -89,7 +89,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
 
 def recorded_response(path: Path) -> RecordedLevel:
-    """Return the level of a stepped sine or a sweep, and Response I as measured: a line on a map.
+    """Return the drive level of a stepped sine or a sweep and its measured Response I, as a line on a map.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def recorded_response(path: Path) -> RecordedLevel:
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Return the same of an analysed recording; nothing where it is of another kind, or of one frequency."""
+    """Return base amplitudes over frequencies of a result; empty for other kinds or a single frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
             try:
@@ -120,7 +120,7 @@ def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
 
 
 def _of_draws(curve: Curve, laid: AbstractOverlay[Any]) -> Curve:
-    """Put the middle and the scatter of all draws in the place of the first one's values."""
+    """Replace the values of the first draw by the median and the scatter of all draws."""
     note = f"{curve.note}; under the {laid.run.driven.value}"
     found = laid.quantity(curve.response.value)
     if found is None or laid.run.draws == 1:

@@ -1,7 +1,8 @@
-"""``python -m vibench.analysis.results.growing_bounds``: bounds of a recording that is still made.
+"""``python -m vibench.analysis.results.growing_bounds``: bounds of a recording during its run.
 
-A line of standard output states that it is ready; then a line of standard input asks for a look, and a
-line of standard output answers it. All are JSON objects. A run that lasts until its results are known
+The first line of standard output says that the process is ready. Then each line of standard input requests
+the bounds, and a line of standard output answers. All lines are JSON objects. A run that lasts until a
+bound is met
 starts this process (`vibench.acquisition.run.until`).
 """
 
@@ -28,20 +29,20 @@ from .campaign_results import budgets_of
 from .measurement_analysis import CONTRADICTIONS
 
 PATIENCE_S = 20.0
-"""How long the file may take to hold the samples of a look [s]."""
+"""Maximum delay until the file contains the requested samples [s]."""
 _PAUSE_S = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class _ChannelsSoFar(RecordedChannels):
-    """A recording up to a look: realisations that were whole, or one stretch as if it ended there."""
+    """A recording up to a time: its complete realisations, or one stretch cut at that time."""
 
     stretch: int = 1
     samples_so_far: int = 0
-    """Of that stretch, or of all realisations."""
+    """Number of samples of that stretch, or of all realisations."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give what belongs to the look."""
+        """Return the stretches up to that time."""
         found = super().stretches(label)
         if label == SegmentLabel.REALISATION:
             whole = [each for each in found if each.is_complete]
@@ -56,9 +57,9 @@ class _ChannelsSoFar(RecordedChannels):
 
 
 def bounds_of(result: AnyResult) -> dict[str, float | None]:
-    """Give the largest relative 95 % bound by noise and chance of each result that a plan may wait for.
+    """Return the largest relative 95 % random bound of each result that a plan may wait for.
 
-    None where it is not determined; a result that was not found at all is left out.
+    None if it is undetermined; results that were not found are left out.
     """
     found: dict[str, float | None] = {}
     for name, pattern in RESULT_PATTERNS.items():
@@ -70,16 +71,16 @@ def bounds_of(result: AnyResult) -> dict[str, float | None]:
 
 
 def bound_of(budget: Budget) -> float | None:
-    """Give the relative 95 % bound of one quantity by noise and chance; None where it is not stated."""
+    """Return the relative 95 % random bound of one quantity; None if it is not stated."""
     parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
     stated = [each for each in parts if each is not None]
     return COVERAGE * hypot(*stated) if len(stated) == len(parts) else None
 
 
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
-    """Analyse a recording up to a time [s] of a stretch, which is the number of the step and else 1.
+    """Analyse a recording up to a time [s] within a stretch: the number of the step, otherwise 1.
 
-    Realisations of noise are analysed as far as they are whole. Raises AnalysisError when nothing is usable.
+    Only complete realisations of noise are analysed. Raises AnalysisError when nothing is usable.
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)
@@ -88,7 +89,7 @@ def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, rec
 
 
 def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
-    """Open a recording as soon as it holds the samples of a look; raises RecordingError."""
+    """Open a recording as soon as it contains the requested samples; raises RecordingError."""
     give_up_s = time.monotonic() + PATIENCE_S
     while True:
         recording = open_recording(path.with_name(f"{path.name}.part"))
@@ -103,12 +104,12 @@ def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
             return recording
         recording.close()
         if time.monotonic() > give_up_s:
-            raise RecordingError(f"the file has not held {recorded_s:g} s of the stretch in time")
+            raise RecordingError(f"the file did not contain {recorded_s:g} s of the stretch in time")
         time.sleep(_PAUSE_S)
 
 
 def main() -> None:
-    """Answer looks until standard input ends."""
+    """Answer requests until standard input ends."""
     facts: dict[str, RecordingFacts] = {}
     sys.stdout.write("{}\n")
     sys.stdout.flush()

@@ -18,7 +18,7 @@ from ..recordings.facts import recording_facts
 from ..uncertainty.expected import until_checks
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
-"""What a calculation raises over a recording that is well formed, and whose parts do not go together."""
+"""Errors of calculations on a well-formed recording with inconsistent parts."""
 
 
 def analyse(
@@ -32,19 +32,19 @@ def analyse(
     Parameters
     ----------
     recording
-        Open, or the path of its file. Finished, interrupted or still growing: what it held when it was opened
-        is analysed.
+        An open recording, or its path. An interrupted or growing one is analysed up to the moment of
+        opening.
     request
-        How the transmission of noise is estimated; other excitations take no notice.
+        Estimator and resolution for noise; other excitations ignore it.
     observer
-        Told how far it is.
+        Receives the progress.
     response
-        Channel whose motion is analysed, such as ``"m2_velocity"``; by default that of m0.
+        Channel to analyse, such as ``"m2_velocity"``; by default the motion of m0.
 
     Raises
     ------
     AnalysisError
-        With one sentence that names the file, when nothing in it is usable.
+        When nothing in it is usable; one sentence that names the file.
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:

@@ -1,4 +1,4 @@
-"""Frequency response, coherence and spectral densities of a recording, for programs that read functions."""
+"""Frequency response, coherence and spectral densities of a recording, for export as functions."""
 
 from dataclasses import dataclass, replace
 
@@ -21,34 +21,34 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Resolution of densities: segments of a second, Hann window, half overlapping."""
+"""Segment length [s] of densities; Hann window, 50 % overlap."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})
-"""What is recorded on the way to the plan and back; pauses and settling have no label."""
+"""Labels of the ramps; pauses and settling have none."""
 _UNITS = {Quantity.DISPLACEMENT: "m", Quantity.VELOCITY: "m/s", Quantity.ACCELERATION: "m/s2"}
 
 
 def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> tuple[UniversalFunction, ...]:
-    """Estimate what an excerpt holds as functions of frequency.
+    """Estimate spectral functions of an excerpt.
 
-    The density of each of its channels over what of the plan was played in its stretch of time, by segments
-    of a second, shorter where nothing was played so long; of noise also the frequency response from base to
-    m0, over the whole recording as `analyse` estimates it, and its coherence.
+    Returns the density of each channel while the excitation played, by segments of at most one second.
+    Noise also has the frequency response from base to m0 and its coherence, of the whole recording as in
+    `analyse`.
 
     Parameters
     ----------
     excerpt
-        Of a recording that is open.
+        Part of an open recording.
     request
-        How the frequency response is estimated, and of which quantities it is.
+        Estimator and quantities of the frequency response.
 
     Raises
     ------
     NotEnoughData
-        When the excerpt holds no segment of what was played, or its analysis finds nothing.
+        When the excerpt contains no segment of excitation, or its analysis finds nothing.
     UnusableData
-        When the recording is not as it was sealed.
+        When the recording was changed after it was sealed.
     """
     require_checked(excerpt.recording)
     played = _played_parts(excerpt)
@@ -65,7 +65,7 @@ def _responses(response: NoiseResponse, view: FrequencyResponseView) -> tuple[Un
     reference = _axis(Role.BASE_ACCELERATION, "base", view.base)
     averages = f"{found.n_eff:.4g} averages over {response.used_s:.6g} s of the whole recording"
     note = f"estimator {found.settings.estimator.value}, {averages}"
-    # A coherence has no unit: a program that turns metres into millimetres must leave it alone.
+    # No unit, so that a program that converts metres to millimetres leaves the coherence unchanged.
     bare, bare_reference = (replace(axis, quantity="", unit="NONE") for axis in (moved, reference))
     hz, kinds = found.frequency_hz, FunctionType
     return (
@@ -80,24 +80,24 @@ def _axis(role: Role, body: str, quantity: Quantity) -> FunctionAxis:
 
 @dataclass(frozen=True, eq=False)
 class _Played:
-    """What of an excerpt is averaged over."""
+    """The parts of an excerpt that are averaged."""
 
     stretches: tuple[Excerpt, ...]
-    """Each at least a segment long."""
+    """Each is at least one segment long."""
     labels: tuple[str, ...]
     segment: int
-    """Samples of each segment."""
+    """Samples per segment."""
 
     @property
     def note(self) -> str:
-        """Over what, for people."""
+        """Description of the averaged parts."""
         first, *_ = self.stretches
         seconds = sum(each.samples for each in self.stretches) / first.recording.sample_rate_hz
         return f"over {seconds:.6g} s of {' and '.join(self.labels)}"
 
 
 def _played_parts(excerpt: Excerpt) -> _Played:
-    """Find the parts of the plan; a recording without named parts is one."""
+    """Return the parts of the plan; a recording without named parts counts as one."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     parts = [(each.label, each.start, each.stop) for each in recording.segments if each.label not in _AROUND]
@@ -110,8 +110,8 @@ def _played_parts(excerpt: Excerpt) -> _Played:
     if not used:
         chosen_s = max((stop - start for _, start, stop in inside), default=0) / rate
         raise NotEnoughData(
-            f"densities need {max(segment, _FEWEST_SAMPLES) / rate:.3g} s in one piece of what was played, "
-            f"and {max(chosen_s, 0.0):.3g} s were chosen; choose more of it"
+            f"densities need {max(segment, _FEWEST_SAMPLES) / rate:.3g} s of uninterrupted excitation, "
+            f"and {max(chosen_s, 0.0):.3g} s were chosen; choose a longer excerpt"
         )
     stretches = tuple(replace(excerpt, start=start, stop=stop) for _, start, stop in used)
     return _Played(stretches, tuple(dict.fromkeys(label for label, _, _ in used)), segment)
@@ -125,7 +125,7 @@ def _density(played: _Played, channel: ChannelHeader) -> UniversalFunction:
         for values in each.channel_blocks(channel.role):
             valid = np.isfinite(values)
             sums.add(np.where(valid, values, 0.0), valid)
-        # No segment reaches from one stretch into the next, and one begins with the next.
+        # Segments do not cross from one stretch into the next.
         between = hop - each.samples % hop
         sums.add(np.zeros(between), np.zeros(between, dtype=np.bool_))
     found = sums.density()

@@ -1,6 +1,6 @@
-"""Sampled signals, whatever they are of: windows, envelopes, integration, interpolation, confidence.
+"""Sampled signals: windows, envelopes, integration, interpolation, confidence bounds.
 
-Arrays are float64 of shape (samples,). Integration and differentiation work in a band of the frequency
-domain; what the missing past and future disturb at the ends is counted and given with the signal.
-Bounds of averaged estimates follow Bendat & Piersol, Random Data. No recording is known here.
+Arrays are float64 of shape (samples,). Signals are integrated and differentiated within a band in the
+frequency domain; the number of disturbed samples at the ends is returned too. Bounds of averaged estimates
+follow Bendat & Piersol, Random Data.
 """

@@ -1,4 +1,4 @@
-"""The array types that results are made of."""
+"""Array types of results."""
 
 import numpy as np
 from numpy.typing import NDArray

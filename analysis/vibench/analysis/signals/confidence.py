@@ -1,4 +1,4 @@
-"""How far an averaged estimate can be trusted: standard deviations, bounds and significance levels."""
+"""Standard deviations, bounds and significance levels of averaged estimates."""
 
 import numpy as np
 import scipy
@@ -7,7 +7,7 @@ from .arrays import Complexes, Reals
 
 DEFAULT_CONFIDENCE = 0.95
 _SMALLEST_DEGREES_OF_FREEDOM = 1e-3
-"""Keeps the quantile finite where averages are worth hardly more than one."""
+"""Least degrees of freedom, which keeps the quantile finite for few averages."""
 
 
 def relative_sd(coherence: Reals, n_eff: float) -> Reals:
@@ -33,9 +33,9 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 
 
 def standard_uncertainty(values: Reals | Complexes) -> float:
-    """Return that of the mean of few equal values, so that twice it holds the truth in 95 of 100 cases.
+    """Return the standard uncertainty of the mean of a few values; twice it covers in 95 % of cases.
 
-    Their standard error by Student's t over the normal deviate (JCGM 100:2008, G.3.2); of complex values that
+    The standard error times Student's t over the normal deviate (JCGM 100:2008, G.3.2); for complex values,
     of either part.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
@@ -85,14 +85,14 @@ def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[
 
 
 _ONE_IN = 1e-3
-"""Right models that exceed the limit of their chi square."""
+"""Share of correct models that exceed the limit of chi square."""
 
 
 def chi_square_of(squared: Reals, n_eff: float) -> Reals:
     """Chi square with 2 degrees of freedom of a line's squared residual over its estimated scatter.
 
-    The two parts of a residual, over a standard deviation from n averages, follow F(2, 2 (n - 1)) and not
-    chi square; what exceeds either with the same probability corresponds: nu ln(1 + squared / nu), nu =
+    A residual over a standard deviation from n averages follows F(2, 2 (n - 1)), not chi square. The value
+    with the same probability is nu ln(1 + squared / nu), nu =
     2 (n - 1). It is twice the negative logarithm of Student's likelihood, except for a factor (nu + 2) / nu.
     """
     freedom = max(2 * (n_eff - 1), 1.0)
@@ -100,6 +100,6 @@ def chi_square_of(squared: Reals, n_eff: float) -> Reals:
 
 
 def chi_square_limit(freedom: int, lines_like_one: float = 1.0) -> float:
-    """Chi square per degree of freedom that one right model in a thousand exceeds."""
+    """Chi square per degree of freedom that one correct model in a thousand exceeds."""
     independent = max(freedom / lines_like_one, 1.0)
     return float(scipy.stats.chi2.isf(_ONE_IN, independent) / independent)

@@ -1,4 +1,4 @@
-"""Smallest and largest values of a long signal, bin by bin: all that a plot of it can show."""
+"""Minimum and maximum of a long signal per bin, for plots."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,7 +9,7 @@ from ..tables import Labelled
 from .arrays import Reals
 
 DEFAULT_BINS = 1500
-"""More than a figure has pixels across."""
+"""More than the horizontal pixels of a figure."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Envelope(Labelled):
     OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}
 
     time_s: Reals
-    """Middle of each stretch."""
+    """Centre of each stretch."""
     lower: Reals
     upper: Reals
 

@@ -12,14 +12,14 @@ from ..errors import InvalidRequest
 from .arrays import Reals
 
 REACH = 32
-"""Samples on either side that one value is made of."""
+"""Samples on each side used for one value."""
 TRUSTED_BAND = 0.4
 """Fraction of the sample rate up to which the interpolation is exact to about 1e-9."""
 
 _KAISER_BETA = 19.9
 """Kaiser's formula for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
 _PHASES = 512
-"""Fractions of a sample with weights of their own; a cubic between four of them errs by 1e-10."""
+"""Number of tabulated fractions of a sample; cubic interpolation between them errs by 1e-10."""
 
 
 def _weights_of_phases() -> Reals:
@@ -28,7 +28,7 @@ def _weights_of_phases() -> Reals:
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
     window = np.where(np.abs(distance) <= REACH, i0(_KAISER_BETA * shape) / i0(_KAISER_BETA), 0.0)
-    # A sample is read exactly: the sine of a whole number of half turns is not quite nothing.
+    # Samples are reproduced exactly: the sine of a multiple of pi is not exactly zero.
     sinc = np.where(distance == np.rint(distance), distance == 0.0, np.sinc(distance))
     return np.asarray(sinc * window)
 
@@ -42,8 +42,8 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
     Parameters
     ----------
     samples
-        Shape (n,), or (channels, n) of channels that are read at the same places; the signal is taken as zero
-        outside, so values within `REACH` of an end are wrong unless the signal is zero there.
+        Shape (n,) or (channels, n). The signal is taken as zero outside, so values within `REACH` of an end
+        are wrong unless it is zero there.
     positions
         Where to evaluate, in samples from the first, shape (m,).
 
@@ -68,13 +68,13 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
 
 _TOGETHER = 8
 _STOP_DB = 100.0
-"""Aliases are this far down: below the noise of a 24-bit converter."""
+"""Attenuation of aliases [dB], below the noise of a 24-bit converter."""
 TRUSTED_FRACTION = 0.4
-"""Part of the decimated rate up to which the gain is 1 within 1e-5."""
+"""Fraction of the decimated rate up to which the gain is 1 within 1e-5."""
 
 
 class Decimator:
-    """Low-passes channels and keeps every n-th sample; sample k of the result lies at sample k n."""
+    """Low-pass filter that keeps every n-th sample; sample k of the result lies at sample k n."""
 
     def __init__(self, channels: int, factor: int) -> None:
         if factor < 1:
@@ -82,15 +82,15 @@ class Decimator:
         self._factor = factor
         taps = _taps(factor)
         self._half = (taps.size - 1) // 2
-        # The engine sums eight products at a time: the oldest weigh nothing.
+        # The engine sums eight products at a time; padding gets zero weight.
         self._taps = np.concatenate([np.zeros(-taps.size % _TOGETHER), taps])
-        # The filter looks half its length ahead: zeros stand for the time before the record.
+        # The filter uses half its length ahead; zeros stand for the time before the record.
         self._pending = np.zeros((channels, self._taps.size - 1 - self._half if factor > 1 else 0))
         self._received = 0
         self._given = 0
 
     def add(self, block: Reals) -> Reals:
-        """Take samples of shape (channels, n) and give those that are complete, shape (channels, m)."""
+        """Add samples of shape (channels, n) and return the finished ones, shape (channels, m)."""
         self._received += block.shape[1]
         if self._factor == 1:
             return block
@@ -111,7 +111,7 @@ class Decimator:
             self._pending = data
             return data[:, :0]
         engine, result = native_engine(), np.empty((data.shape[0], count))
-        # The first sample begins where the data do.
+        # The first output sample coincides with the first input sample.
         first = {"ratio": self._factor, "origin": -self._factor}
         for means, samples in zip(data, result, strict=True):
             fields = {"table": self._taps, "reach": self._taps.size, "means": means, "samples": samples}
@@ -122,7 +122,7 @@ class Decimator:
 
 
 def _taps(factor: int) -> Reals:
-    """Kaiser low-pass from 0.4 to 0.6 of the new rate, its half length a multiple of the factor."""
+    """Kaiser low-pass from 0.4 to 0.6 of the new rate; its half length is a multiple of the factor."""
     if factor == 1:
         return np.ones(1)
     width = 2 * (1 - 2 * TRUSTED_FRACTION) / factor
@@ -132,5 +132,5 @@ def _taps(factor: int) -> Reals:
 
 
 def decimation_factor(sample_rate_hz: float, least_rate_hz: float) -> int:
-    """Largest factor that leaves at least the given rate."""
+    """Return the largest factor that leaves at least the given rate."""
     return max(1, int(sample_rate_hz / least_rate_hz))

@@ -13,7 +13,7 @@ from .arrays import Complexes, Reals
 
 
 class Quantity(StrEnum):
-    """A motion, by how often it is the derivative of the displacement."""
+    """Displacement, velocity or acceleration."""
 
     DISPLACEMENT = "displacement"
     VELOCITY = "velocity"
@@ -27,7 +27,7 @@ class Quantity(StrEnum):
 
 @dataclass(frozen=True)
 class ConvertedSignal:
-    """A signal turned into another quantity, and how much of its ends to distrust."""
+    """A converted signal, with the number of disturbed samples at its ends."""
 
     OWN_UNITS: ClassVar = {"samples": "{unit}", "settled": "{unit}"}
 
@@ -37,9 +37,9 @@ class ConvertedSignal:
     quantity: Quantity
     low_hz: float
     high_hz: float
-    """The band that was kept: outside it the samples hold nothing."""
+    """The band that was kept."""
     edge_samples: int
-    """Samples at each end that the missing past and future disturb."""
+    """Number of disturbed samples at each end."""
 
     @property
     def settled(self) -> Reals:
@@ -56,7 +56,7 @@ _EDGE_PERIODS = 6
 def derivative_factor(frequency_hz: Reals, given: Quantity, wanted: Quantity) -> Complexes:
     """(i w)^n that turns a spectrum of the given quantity into the wanted one.
 
-    At 0 Hz an integral does not exist: the factor is NaN there, so that no one mistakes it for zero.
+    For integrals the factor at 0 Hz is NaN.
     """
     omega = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
     power = wanted.derivatives - given.derivatives
@@ -79,7 +79,7 @@ def converted_signal(
 
     The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges, each half
     an octave wide on the outer side of its limit; the band itself passes unchanged. A straight line is
-    taken off first, so that offset and slow drift do not ring at the ends.
+    subtracted first, so that offset and slow drift do not ring at the ends.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def converted_signal(
 
 
 def disturbed_samples(sample_rate_hz: float, low_hz: float) -> int:
-    """Count the samples at an end that `converted_signal` gets wrong for want of what is beyond."""
+    """Return the number of samples at each end that `converted_signal` disturbs."""
     return int(np.ceil(_EDGE_PERIODS * sample_rate_hz / low_hz))
 
 

@@ -1,4 +1,4 @@
-"""Windows (tapers) of a segment, and what overlapping them costs in independent averages."""
+"""Windows (tapers) of segments, and the number of independent averages with overlap."""
 
 from enum import StrEnum
 
@@ -9,12 +9,12 @@ from .arrays import Flags, Reals
 
 
 class Window(StrEnum):
-    """The taper that a segment is multiplied by before its Fourier transform."""
+    """Window applied to a segment before its Fourier transform."""
 
     HANN = "hann"
     """The default for noise: side lobes fall fast, 1.5 bins of noise bandwidth."""
     BOXCAR = "boxcar"
-    """No taper: right for whole periods, and only for them."""
+    """No taper; correct only for an integer number of periods."""
     FLAT_TOP = "flattop"
     """Reads the amplitude of a sine between bins within 0.01 dB."""
     BLACKMAN_HARRIS = "blackmanharris"
@@ -46,7 +46,7 @@ def cosine_weights(window: Window | str) -> tuple[float, ...]:
 
 
 def window_by_name(window: Window | str) -> Window:
-    """Turn a name into a window; raises InvalidRequest when no window has that name."""
+    """Return the window of a name; raises InvalidRequest for unknown names."""
     try:
         return Window(window)
     except ValueError as unknown:
@@ -55,19 +55,19 @@ def window_by_name(window: Window | str) -> Window:
 
 
 def hop_samples(segment_samples: int, overlap: float) -> int:
-    """Distance between the starts of neighbouring segments; ``overlap`` is a fraction from 0 to below 1."""
+    """Return the distance between the starts of segments; ``overlap`` is a fraction in [0, 1)."""
     if not 0 <= overlap < 1:
         raise InvalidRequest(f"overlap is {overlap:g}; it is a fraction, from 0 to below 1")
     return segment_samples - int(overlap * segment_samples)
 
 
 def effective_averages(values: Reals, hop: int, used: Flags) -> float:
-    """Count the independent averages that overlapping, partly missing segments are worth.
+    """Return the number of independent averages of overlapping, partly missing segments.
 
     n_eff = K / (1 + 2 sum_j (N_j / K) rho_j^2),  rho_j = sum_n w(n) w(n + jD) / sum_n w(n)^2
 
     (Welch 1967, IEEE Trans. Audio Electroacoust. 15, 70-73, with K - j replaced by N_j, the number of
-    pairs of *used* segments that lie j hops apart, so that gaps are counted as they fell).
+    pairs of *used* segments that lie j hops apart, to account for gaps).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
     hop
         Distance D between the starts of neighbouring segments [samples].
     used
-        Which segments of the record were averaged, in the order of time.
+        Which segments were averaged, in the order of time.
     """
     count = int(np.count_nonzero(used))
     if count == 0:
@@ -91,7 +91,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
 
 
 def line_correlation(window: Window | str) -> tuple[float, float]:
-    """How many neighbouring lines of a windowed spectrum say what one would, of values and of their squares.
+    """Return the number of correlated neighbouring lines of a windowed spectrum, for values and squares.
 
     Errors of lines k apart correlate as the transform of the squared window at k does over that at 0.
     """

@@ -16,14 +16,14 @@ from ..signals.window import Window, effective_averages, hop_samples, taper, win
 from ..tables import Labelled
 
 _BATCH_SAMPLES = 1 << 19
-"""Samples (all channels) transformed at once: 4 MB, so that a batch stays near the processor."""
+"""Samples (all channels) transformed at once: 4 MB, so that a batch fits into the cache."""
 _PIECE_SAMPLES = 1 << 19
-"""Samples per channel that `pieces` hands over at once."""
+"""Samples per channel of each block of `pieces`."""
 
 
 @dataclass(frozen=True)
 class SpectralAverages:
-    """Averaged products of the channels' segment spectra, and how many averages they are worth."""
+    """Averaged products of the channels' segment spectra, with the number of independent averages."""
 
     products: Complexes
     """Mean of conj(X_i) X_j over the used segments, shape (channels, channels, lines); not scaled."""
@@ -39,7 +39,7 @@ class SpectralAverages:
     window_energy: float
 
     def frequency_hz(self, sample_rate_hz: float) -> Reals:
-        """Frequencies of the lines that there are, from 0 Hz on [Hz]."""
+        """Frequencies of the lines, from 0 Hz [Hz]."""
         return np.asarray(fft.rfftfreq(self.segment_samples, 1 / sample_rate_hz)[: self.products.shape[-1]])
 
     def density(self, first: int, second: int, sample_rate_hz: float) -> Complexes:
@@ -52,11 +52,11 @@ class SpectralAverages:
 
 
 class SegmentSpectra:
-    """Cuts blocks of samples into overlapping segments and sums the products of their spectra.
+    """Sum of the products of segment spectra over blocks of samples.
 
-    The FFT of each segment is computed once and shared by all pairs of channels. Nothing is
-    subtracted from a segment: with a Hann window an offset reaches lines 0 and 1 only, with a
-    boxcar line 0 only, and a mean removed per segment would disturb the lowest lines instead.
+    The FFT of each segment is computed once and shared by all pairs of channels. The mean is not removed:
+    with a Hann window an offset reaches lines 0 and 1 only, with a boxcar line 0 only, whereas removing it
+    per segment would disturb the lowest lines.
     """
 
     def __init__(
@@ -74,14 +74,14 @@ class SegmentSpectra:
         self._used: list[Flags] = []
 
     def add(self, block: Reals, valid: Flags | None = None) -> None:
-        """Take the next samples of all channels.
+        """Add the next samples of all channels.
 
         Parameters
         ----------
         block
-            Shape (channels, samples), following the block before without a gap.
+            Shape (channels, samples), contiguous with the previous block.
         valid
-            Which samples may be used, shape (samples,); a segment that touches an invalid one is left out.
+            Validity of the samples, shape (samples,); segments with invalid samples are left out.
         """
         marks = np.ones(block.shape[1], dtype=np.bool_) if valid is None else valid
         data = np.concatenate((self._carry, block), axis=1) if self._carry.shape[1] else block
@@ -145,7 +145,7 @@ class SegmentSpectra:
 
 
 def pieces(signals: tuple[Reals, ...], valid: Flags | None) -> Iterator[tuple[Reals, Flags | None]]:
-    """Hand over long signals in short blocks, so that stacking them never copies the whole record."""
+    """Yield long signals in short blocks, so that the whole record is never copied."""
     length = signals[0].size
     if any(signal.shape != (length,) for signal in signals) or (
         valid is not None and valid.shape != (length,)
@@ -175,11 +175,11 @@ class SpectralDensity(Labelled):
     """[unit^2 / Hz]."""
     lower: Reals
     upper: Reals
-    """Bounds that hold the truth with probability ``confidence``, one line at a time."""
+    """Bounds of each line that contain the true value with probability ``confidence``."""
     n_eff: float
     """Independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float
-    """Density times this is the power a line shows of a sine on it."""
+    """Equivalent noise bandwidth: density times this is the power of a sine on a line."""
     segments_used: int
     segments_excluded: int
     sample_rate_hz: float
@@ -200,18 +200,18 @@ class SpectralDensity(Labelled):
 
 
 class DensitySums:
-    """Takes a long signal block by block and gives its spectral density at any moment."""
+    """Spectral density of a long signal that arrives in blocks."""
 
     def __init__(self, sample_rate_hz: float, *, segment_samples: int, overlap: float = 0.5) -> None:
         self._sample_rate_hz = sample_rate_hz
         self._spectra = SegmentSpectra(1, segment_samples, overlap=overlap)
 
     def add(self, samples: Reals, valid: Flags | None = None) -> None:
-        """Take the next samples, shape (samples,)."""
+        """Add the next samples, shape (samples,)."""
         self._spectra.add(samples[np.newaxis], valid)
 
     def density(self) -> SpectralDensity:
-        """Return the spectral density of everything added so far."""
+        """Return the spectral density of all samples so far."""
         averages = self._spectra.averages()
         density = averages.density(0, 0, self._sample_rate_hz).real
         lower, upper = chi_square_bounds(density, averages.n_eff, DEFAULT_CONFIDENCE)
@@ -248,7 +248,7 @@ def spectral_density(
 
 @dataclass(frozen=True)
 class AmplitudeSpectrum(Labelled):
-    """Spectrum of one stretch of signal, scaled so that a sine of amplitude 1 reads 1."""
+    """Amplitude spectrum: a sine of amplitude 1 reads 1."""
 
     OWN_UNITS: ClassVar = {"value": "{unit}", "amplitude": "{unit}"}
 
@@ -267,7 +267,7 @@ class AmplitudeSpectrum(Labelled):
 
     @property
     def spacing_hz(self) -> float:
-        """Distance of the lines [Hz]."""
+        """Spacing of the lines [Hz]."""
         return self.sample_rate_hz / self.samples
 
     def converted(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
@@ -278,14 +278,14 @@ class AmplitudeSpectrum(Labelled):
 def amplitude_spectrum(
     samples: Reals, sample_rate_hz: float, *, window: Window | str = Window.HANN
 ) -> AmplitudeSpectrum:
-    """Spectrum of a signal in amplitudes of sines.
+    """Return the amplitude spectrum of a signal.
 
     Parameters
     ----------
     samples
         Shape (samples,); the mean is removed, so that an offset does not hide the lowest lines.
     window
-        Hann by default; between lines it reads up to 15 % low, where flat top stays within 0.1 %.
+        Hann by default, which reads up to 15 % low between lines; flat top stays within 0.1 %.
     """
     count = samples.size
     if count < 2:
@@ -308,13 +308,13 @@ def amplitude_spectrum(
 
 
 MOST_COLUMNS = 600
-"""A figure has no more pixels to show."""
+"""Maximum number of columns, since a figure has no more pixels."""
 _TAPER = Window.HANN
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrogram(Labelled):
-    """Root mean square amplitude of each frequency in each stretch of time."""
+    """Amplitude over time and frequency."""
 
     OWN_UNITS: ClassVar = {"amplitude": "{unit}", "density": "({unit})2 Hz-1"}
 
@@ -323,11 +323,11 @@ class Spectrogram(Labelled):
     frequency_hz: Reals
     """Shape (rows,)."""
     amplitude: Reals
-    """Peak amplitude of a sine that would give this power, shape (rows, columns)."""
+    """Peak amplitude of a sine with the same power, shape (rows, columns)."""
     resolution_hz: float
     """Width of the window's main lobe at half power."""
     noise_bandwidth_hz: float
-    """Width of a rectangle that lets as much noise through."""
+    """Equivalent noise bandwidth."""
 
     @property
     def density(self) -> Reals:
@@ -336,18 +336,15 @@ class Spectrogram(Labelled):
 
 
 class SpectrogramSums:
-    """Takes a signal block by block; memory holds the picture and one segment, not the record.
+    """Spectrogram of a signal that arrives in blocks; memory holds one segment and the picture.
 
     Parameters
     ----------
-    sample_rate_hz
-        Of the blocks.
-    samples
-        Of the whole record: decides how much time one column stands for.
+    samples Length of the whole record, which sets the time per column.
     highest_hz
-        Rows end here.
+        Frequency of the last row.
     segment_s
-        Length of one Fourier transform; half of it overlaps the next.
+        Length of a segment; segments overlap by half.
     """
 
     def __init__(
@@ -376,7 +373,7 @@ class SpectrogramSums:
         self._carry = np.empty(0)
 
     def add(self, block: Reals) -> None:
-        """Take the next samples, shape (samples,)."""
+        """Add the next samples, shape (samples,)."""
         data = np.concatenate((self._carry, block))
         first = 0
         while first + self._length <= data.size and self._done < self._segments:
@@ -389,7 +386,7 @@ class SpectrogramSums:
         self._carry = data[first:].copy()
 
     def spectrogram(self) -> Spectrogram:
-        """Return the picture of everything added."""
+        """Return the spectrogram of all samples so far."""
         filled = self._count > 0
         mean = self._power[:, filled] / self._count[filled]
         starts = np.arange(self._segments) * self._columns // self._segments

@@ -13,21 +13,21 @@ from ..signals.arrays import Complexes, Reals
 from ..tables import Labelled
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
-"""Impacting systems answer at half orders as well as at whole ones."""
+"""Impacting systems respond at half orders too."""
 ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
-"""With thirds and high harmonics: they need intervals of twelve drive cycles."""
+"""With thirds and high harmonics; they need intervals of twelve drive cycles."""
 _LARGEST_DENOMINATOR = 12
 _BATCH_INTERVALS = 256
-"""Intervals solved at once: some ten megabytes."""
+"""Intervals solved at once, about 10 MB."""
 
 
 def order_label(order: float) -> str:
-    """Write an order as a reader says it: ``"order 1/3"``, ``"order 2"``."""
+    """Return the name of an order, such as ``"order 1/3"`` or ``"order 2"``."""
     return f"order {Fraction(order).limit_denominator(_LARGEST_DENOMINATOR)}"
 
 
 def cycles_needed(orders: tuple[float, ...]) -> float:
-    """Drive cycles that an interval must hold to tell these orders apart."""
+    """Return the drive cycles per interval that separate these orders."""
     return 2 / float(min(np.diff((0.0, *sorted(orders)))))
 
 
@@ -41,9 +41,9 @@ class TrackedOrders(Labelled):
     value: Complexes
     """Complex amplitude (peak) at the middle of each interval, shape (orders, intervals)."""
     sd: Reals
-    """Standard deviation of the magnitude from the residual, taken as white; shape (orders, intervals)."""
+    """Standard deviation of the magnitude for a white residual; shape (orders, intervals)."""
     residual_rms: Reals
-    """Root mean square of what no order explains, shape (intervals,)."""
+    """RMS of the residual, shape (intervals,)."""
 
     @property
     def amplitude(self) -> Reals:
@@ -66,7 +66,7 @@ class TrackedOrders(Labelled):
 def tracked_orders(
     samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
 ) -> TrackedOrders:
-    """Track one signal as `tracked_together` tracks several."""
+    """Track one signal; see `tracked_together`."""
     (tracked,) = tracked_together((samples,), phase_rad, interval_samples=interval_samples, orders=orders)
     return tracked
 
@@ -87,7 +87,7 @@ def tracked_together(
     Parameters
     ----------
     signals, phase_rad
-        The signals and the drive's phase at the same instants, each of shape (samples,); what is left over
+        The signals and the drive phase at the same instants, each of shape (samples,); a remainder
         after the last whole interval is not used.
     interval_samples
         Must hold at least two periods of the smallest distance between orders.
@@ -118,7 +118,7 @@ def tracked_together(
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
     """Return exp(i order phase) for each order.
 
-    Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
+    Rational orders are powers of one phasor: a product costs a tenth of
     a sine and a cosine.
     """
     fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
@@ -130,7 +130,7 @@ def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
 
 
 def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
-    """Return a power of ``powers[1]``, by its halves; what was made is kept."""
+    """Return a power of ``powers[1]`` by repeated halving, with a cache."""
     if exponent not in powers:
         half = exponent // 2
         powers[exponent] = _power(half, powers) * _power(exponent - half, powers)

@@ -1,4 +1,4 @@
-"""Frequency, amplitude and phase of a steady sine, as well as its noise allows."""
+"""Frequency, amplitude and phase of a steady sine in noise."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,16 +18,16 @@ from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spec
 from .order_tracking import tracked_orders
 
 _NOISE_NEIGHBOURS = 50
-"""Lines on either side whose median is taken as the floor around a peak."""
+"""Lines on each side whose median is the noise floor around a peak."""
 _LEAST_RATIO = 5.0
-"""A peak stands at least this many times above that floor."""
+"""Least ratio of a peak to that floor."""
 _MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
 """Median of the magnitude of complex noise, in standard deviations of one component."""
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A line of a spectrum that stands above its neighbourhood."""
+    """A peak of a spectrum."""
 
     frequency_hz: float
     sd_frequency_hz: float
@@ -91,7 +91,7 @@ def _peak_at(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
 _ITERATIONS = 10
 _CONVERGED = 1e-13
 _SEARCH = 0.2
-"""The sine is looked for within this fraction of where it should be."""
+"""Relative search range around the expected frequency."""
 
 
 @dataclass(frozen=True)
@@ -117,20 +117,20 @@ def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSin
     samples
         Shape (samples,), some ten cycles or more.
     near_hz
-        Where the sine should be, within 20 %.
+        Expected frequency, within 20 %.
     """
     return _kept_sine(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), sample_rate_hz, near_hz)
 
 
 @lru_cache(maxsize=4)
 def _kept_sine(recorded: bytes, sample_rate_hz: float, near_hz: float) -> FittedSine:
-    """Fit once what all draws of a recording share: its drive, in the window and in the whole dwell."""
+    """Fit a sine, with a cache, because all draws of a recording share its drive."""
     samples = np.frombuffer(recorded)
     spectrum = amplitude_spectrum(samples, sample_rate_hz)
     found = peaks(spectrum, low_hz=near_hz * (1 - _SEARCH), high_hz=near_hz * (1 + _SEARCH), count=1)
     if not found:
         raise UnusableData(f"no sine was found near {near_hz:g} Hz; check the channel and the frequency")
-    # Centred time makes frequency and phase independent of each other, and the fit well conditioned.
+    # Centred time decorrelates frequency and phase, so that the fit is well conditioned.
     time = (np.arange(samples.size) - (samples.size - 1) / 2) / sample_rate_hz
     omega = 2 * np.pi * found[0].frequency_hz
     for _ in range(_ITERATIONS):
@@ -168,17 +168,17 @@ def steady_phase(samples: int, cycles_per_sample: float, phase_rad: float) -> Re
 
 
 _SCATTER_BLOCKS = 10
-"""Parts of the window whose scatter gives the uncertainty: it holds whatever moves, not only noise."""
+"""Parts of the window whose scatter gives the uncertainty, which includes slow changes."""
 _ORDERS = (1.0, 2.0, 3.0)
 
 
 @dataclass(frozen=True)
 class DriveLevel:
-    """How hard the base was driven by a sine."""
+    """Level of a sine drive."""
 
     frequency_hz: float
     sd_frequency_hz: float
-    """Standard deviation by the converter's clock, measured on the drive channel."""
+    """Standard deviation by the converter clock, from the drive channel."""
     phase_rad: float
     """Phase of the drive voltage, as a cosine, at the first sample."""
     amplitude_m: float
@@ -190,7 +190,7 @@ class DriveLevel:
 
 @dataclass(frozen=True)
 class NoiseDriveLevel:
-    """How hard the base was driven by noise, within a band."""
+    """Level of a noise drive within a band."""
 
     OWN_UNITS: ClassVar = {"rms_acceleration": "m s-2"}
 
@@ -200,7 +200,7 @@ class NoiseDriveLevel:
     """[m/s2]."""
     rms_displacement_m: float
     relative_sd: float
-    """Relative standard deviation of both, from the number of independent averages and lines."""
+    """Relative standard deviation of both, from independent averages and lines."""
 
 
 def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: float) -> DriveLevel:
@@ -223,7 +223,7 @@ def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: fl
 
 
 def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float) -> NoiseDriveLevel:
-    """Measure how hard noise drove the base: rms of acceleration and displacement in a band.
+    """Return the rms base acceleration and displacement in a band.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
     )
     spacing_hz = density.sample_rate_hz / density.segment_samples
     power = density.density[kept] * spacing_hz
-    # Lines within one noise bandwidth say the same; the rms has half the relative spread of the power.
+    # Lines within one noise bandwidth are not independent; the rms has half the relative spread of the power.
     lines = np.count_nonzero(kept) / (density.noise_bandwidth_hz / spacing_hz)
     return NoiseDriveLevel(
         low_hz=low_hz,
@@ -250,35 +250,35 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
 
 
 _REACH_SD = 7.0
-"""Noise beyond this many standard deviations does not decide a maximum (1e-12 a sample)."""
+"""Noise beyond this many standard deviations is neglected (1e-12 per sample)."""
 _GRID = 141
 """Ten points per standard deviation: the integral is then good to 1e-3 of one."""
 
 
 class NoiseLift(NamedTuple):
-    """What noise does to a maximum; never negative, and NaN where the noise is not known."""
+    """Bias of a maximum by noise; never negative, NaN if the noise is unknown."""
 
     bias: float
     """E[max |x_j + n_j|] - max |x_j|."""
     error: float
-    """Root mean square of max |x_j + n_j| - max |x_j|: the bias, and the scatter about it."""
+    """Root mean square of max |x_j + n_j| - max |x_j|: bias and scatter together."""
 
 
 def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift:
-    """Return the rise of max|x| by Gaussian noise, as it is expected, and as root mean square.
+    """Return the rise of max|x| by Gaussian noise, expected and root mean square.
 
-    From the distribution of the largest, P(max < z) = prod_j P(|x_j + n_j| < z), where x_j is the largest
-    of each run of samples that share one noise value; of noise alone over 51 200 samples it comes to 4.4
-    standard deviations. The samples stand for the true motion although they may hold the noise already.
+    From the distribution of the maximum, P(max < z) = prod_j P(|x_j + n_j| < z), where x_j is the largest
+    sample that shares one noise value. Noise alone over 51 200 samples gives 4.4 standard deviations. The
+    samples stand for the true motion, although they may contain the noise.
 
     Parameters
     ----------
     samples
         The motion x, shape (samples,).
     noise_sd
-        Standard deviation of the noise on it [same unit]; NaN where it is not known.
+        Standard deviation of its noise [same unit]; NaN if unknown.
     independent
-        Independent noise values in the window, at most the number of samples; for coloured noise
+        Number of independent noise values in the window; for coloured noise
         twice its rms frequency times the duration.
     """
     if np.isnan(noise_sd):
@@ -300,13 +300,13 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     rise = level - top
     bias = float(rise[0] + np.trapezoid(left, level))
     square = float(rise[0] ** 2 + np.trapezoid(2 * rise * left, level))
-    # The integrals are good to 1e-3 of the noise; no maximum is lowered by it, or is surer than its bias.
+    # The integrals are accurate to 1e-3 of the noise; the bias is not negative, nor above the rms.
     bias = max(bias, 0.0)
     return NoiseLift(bias, float(np.sqrt(max(square, bias**2))))
 
 
 def _merge_close_values(values: Reals, noise_sd: float) -> tuple[Reals, Reals]:
-    """Merge values much closer together than the noise, so that long windows cost no more than short ones."""
+    """Merge values much closer than the noise, so that long windows are as fast as short ones."""
     step = noise_sd / 20
     places, counts = np.unique(np.round(values / step), return_counts=True)
     return places * step, counts.astype(np.float64)

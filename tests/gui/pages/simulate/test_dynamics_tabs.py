@@ -127,7 +127,7 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
     asked(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
     waited(lambda: not view.simulator.is_busy, 280.0)
     page.refresh()
-    assert view.summary.startswith("Complete. Gaps of the endless chain: 96.07 to 110.4 Hz")
+    assert view.summary.startswith("Complete. Band gaps of the infinite chain: 96.07 to 110.4 Hz")
     assert "1 runs in" in view.summary
     (run,) = view.answer.runs
     across, motion, energies = view.picture.plots
