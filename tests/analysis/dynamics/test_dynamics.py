@@ -80,7 +80,7 @@ def computed():
     ("options", "said"),
     [
         ({"start": 600.0, "stop": 50.0}, "does not ascend"),
-        ({"method": "balance", "model": "rigid:0.8"}, "no finite force"),
+        ({"method": "balance", "model": "rigid:0.8"}, "needs a finite contact force"),
         ({"method": "first-order"}, "one harmonic cannot describe hertz"),
         ({"model": "hurtz"}, "Contact 'hurtz' is not known"),
         ({"recorded_level": ((100.0, 1e-6),)}, "two or more ascending"),

@@ -60,7 +60,7 @@ def test_steps_are_counted_by_what_they_do():
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
     assert said == [
         "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",
-        "The base was off its level in 1 of them.",
+        "The base level was out of tolerance in 1 of them.",
     ]
 
 

@@ -19,8 +19,7 @@ _REPEATED = 0.25
 """Largest share of the points' variance that may remain for a period above one."""
 _BLOCKS = 10
 _DRIFT = 5.0
-"""Standard errors of a slope that one settled record in 250 exceeds (four quantities, eight independent
-blocks)."""
+"""Standard errors of a slope that one settled record in 250 exceeds (four quantities, eight blocks)."""
 
 _STEADY_SCATTER = 0.9
 """Ratio of the scatter of the two halves of a record, above which it does not decay."""
@@ -116,9 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the scatter about the mean point changes by a tenth, also below the tolerance of the
-    drive.
-    """
+    """Return whether the scatter about the mean point changes by a tenth, however small it is."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

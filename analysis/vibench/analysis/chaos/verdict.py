@@ -138,8 +138,7 @@ _LOW_PERIOD = 4
 """Longest period of interest; a drive at twice the mains frequency makes hum repeat as soon."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40 series of
-noise."""
+"""Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
 _ASYMMETRIC = 2.5
 """The same for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0

@@ -24,8 +24,7 @@ class CurveOrigin(StrEnum):
 
     MEASURED = "measured"
     SIMULATED = "simulated"
-    """Simulation under the recorded voltage or base motion, analysed with
-    the same estimator."""
+    """Simulation under the recorded voltage or base motion, analysed with the same estimator."""
     PREDICTED = "predicted"
     """Prediction for the specimen under sines."""
     STABLE = "stable branches"
@@ -81,9 +80,7 @@ class Curve(Labelled):
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies and bounds, reduced to at most ``columns`` points, since areas are slow to
-        draw.
-        """
+        """Return frequencies and bounds at no more than ``columns`` points: areas are slow to draw."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)

@@ -238,9 +238,7 @@ class BranchDiagram(Labelled):
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of m0 over frequency, stable and unstable separately; empty along
-        amplitude.
-        """
+        """Return Responses I and II of m0, stable and unstable separately; empty along amplitude."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []

@@ -26,8 +26,7 @@ from ..signals.arrays import Reals
 from ._specimen_choice import SpecimenChoice
 
 EXACT_ENOUGH = 1e-4
-"""Largest relative change of the fundamental of p by neglected harmonics, unless one harmonic is
-requested."""
+"""Largest relative change of the fundamental of p by neglected harmonics."""
 
 
 class BranchMethod(StrEnum):

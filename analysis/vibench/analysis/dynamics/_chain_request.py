@@ -59,8 +59,8 @@ class ChainRequest(SpecimenChoice):
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every level."""
     error: TargetError | None = None
-    """Requested relative error of every cell's transmission under a steady sine, 0.01 or "1 %"; sets
-    accuracy, settling and duration."""
+    """Requested relative error of transmissions under a steady sine, 0.01 or "1 %"; sets accuracy and
+    times."""
     time_s: TargetTime | None = None
     """Time for each run under a steady sine, 2 or "2 s"; one minute by default."""
 

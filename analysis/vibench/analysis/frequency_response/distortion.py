@@ -1,4 +1,4 @@
-"""How nonlinear the specimen was under noise that repeats: what its scatter and its quiet lines say."""
+"""Nonlinear distortion under periodic noise, from the scatter and the undriven lines."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,7 +13,7 @@ from .periodic import DetectionLines, Drift, PeriodicFrequencyResponse
 
 @dataclass(frozen=True)
 class Distortion(Labelled):
-    """Noise and nonlinear distortion of a transmission, each in parts of it; medians over the lines."""
+    """Noise and nonlinear distortion relative to a transmission; medians over the lines."""
 
     DOCUMENT: ClassVar = (
         "realisations median_not_repeating_over_magnitude=noise_share "
@@ -25,23 +25,21 @@ class Distortion(Labelled):
     realisations: int
     drift: Drift | None
     noise_share: float
-    """Standard deviation that what does not repeat from period to period (noise of the channels, or chaos of
-    the specimen) gives one realisation, over the transmission's magnitude."""
+    """Relative standard deviation of one realisation by channel noise or chaos, from its periods."""
     distortion_share: float | None
-    """What realisations scatter beyond it; None when there was one only."""
+    """Relative scatter of realisations beyond it; None for a single one."""
     odd_m_per_s: float | None
-    """Rms response on the odd lines that were not driven, noise taken off; None when there are none."""
+    """Rms response on undriven odd lines, without noise; None if there are none."""
     even_m_per_s: float | None
-    """The same on even lines."""
+    """The same for even lines."""
     detection_noise_m_per_s: float | None
-    """Rms of what noise leaves on the quiet lines."""
+    """Rms noise on the undriven lines."""
 
 
 def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
-    """Sum up what a periodic transmission says of noise and of distortion.
+    """Return noise and distortion of a periodic transmission.
 
-    The quiet lines hold whatever is not linear between the drive voltage and the response: amplifier and
-    shaker as well as the specimen.
+    Undriven lines include nonlinearity of amplifier and shaker as well as of the specimen.
     """
     magnitude = periodic.frequency_response.magnitude
     varied = periodic.distortion_variance
@@ -59,14 +57,13 @@ def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
 
 
 _SURELY = 5.0
-"""Standard deviations by which scatter must exceed noise before it is called distortion."""
+"""Standard deviations by which scatter must exceed noise to count as distortion."""
 
 
 def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
-    """Return whether realisations scatter more than their periods do; None when there was one of either only.
+    """Return whether realisations scatter more than their periods; None for one of either only.
 
-    The logarithm of a ratio of two variances has the mean and variance of that of Fisher's F; of a linear
-    specimen, over many lines, its average stays within some standard deviations.
+    For a linear specimen, the mean logarithm of the variance ratio follows Fisher's F.
     """
     count, periods = periodic.realisations, min(each.periods for each in periodic.repetitions)
     if count < 2 or periods < 2:
@@ -82,7 +79,7 @@ def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
 
 
 def is_even_line(lines: DetectionLines) -> Flags:
-    """Lines on which only even distortion can lie."""
+    """Return the lines that only even distortion reaches."""
     return np.asarray(lines.order % 2 == 0)
 
 

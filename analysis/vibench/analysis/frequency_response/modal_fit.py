@@ -1,4 +1,4 @@
-"""Modes fitted to lines: poles by variable projection, after their errors were made independent."""
+"""Modes fitted to lines by variable projection, with decorrelated errors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from ..signals.window import Window, cosine_weights, hop_samples, taper
 from .results import FrequencyResponse
 
 SMALLEST_RELATIVE_SD = 1e-6
-"""Keeps the weights finite where a noise-free simulation states no spread at all."""
+"""Keeps the weights finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
-"""Noise bandwidths that a half-power bandwidth must hold to be resolved."""
+"""Least half-power bandwidth in noise bandwidths to be resolved."""
 WELL_FITTED = 1.2
-"""Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
+"""Reduced chi-square at which the background is good enough; a higher degree would only add uncertainty."""
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """One resonance, from the fit of all modes of a band, or of this one on a smooth background."""
+    """One resonance, from a fit of all modes of a band or of this mode on a smooth background."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz sd_frequency_hz damping_ratio sd_damping_ratio peak_frequency_hz peak_magnitude "
@@ -37,16 +37,16 @@ class Resonance:
     damping_ratio: float
     sd_damping_ratio: float
     peak_frequency_hz: float
-    """Where the fitted magnitude is largest."""
+    """Frequency of the largest fitted magnitude."""
     peak_magnitude: float
     sd_peak_magnitude: float
     reduced_chi_square: float
-    """Misfit about the mode over what the lines' scatter explains; spreads are widened when it is above 1."""
+    """Reduced chi-square about the mode; standard deviations are widened if it is above 1."""
     chi_square_limit: float
-    """What one right fit in a thousand exceeds."""
+    """Value that one correct fit in a thousand exceeds."""
     lines_used: int
     is_resolved: bool
-    """Whether the lines are fine enough for this bandwidth."""
+    """Whether the resolution is fine enough for this bandwidth."""
     overlap: float
     """Factor by which a neighbour that overlaps widens the spread of the damping; 1 without one."""
 
@@ -88,21 +88,21 @@ class Resonance:
         return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
 
 
-# What the window of averaged segments does to lines: it smears a mode, and neighbouring errors correlate.
+# The window of averaged segments smears modes and correlates the errors of neighbouring lines.
 #
 # Segments of w(t) r(t), w(t) x(t) and w(t) y(t) with y = h * x, and G the density of r and x, average to
 # the quotient of the convolutions of |W|^2 with G H and with G. Its error is R* V / (R* X), with the
-# residual V = Y - H X of a segment: noise n of the sensors, windowed by w, and what a segment lacks of
-# ringing, dH/df times x windowed by w' / (2 pi i).
+# residual V = Y - H X of a segment: sensor noise n windowed by w, and cut-off ringing, dH/df times x
+# windowed by w' / (2 pi i).
 
 _PROXY_SAMPLES = 1024
-"""Length of the window that correlations are computed on; they do not depend on it."""
+"""Window length for computing correlations, which do not depend on it."""
 _FAR_LINES = 12
-"""Lines apart at which errors of cosine windows, overlapping or not, have nothing in common."""
+"""Distance in lines beyond which errors under cosine windows are uncorrelated."""
 _NEAR = 0.05
-"""Size of an exponent below which a series is more exact than the closed form."""
+"""Exponent below which a series is more accurate than the closed form."""
 _LEAST_NOISE = 0.02
-"""Of a line's variance that is taken as noise: the correlations of ringing alone may be singular."""
+"""Least noise share of a line's variance: correlations of ringing alone may be singular."""
 
 
 @dataclass(frozen=True)
@@ -112,19 +112,19 @@ class Leakage:
     segment_s: float
     window: Window
     noise: Reals
-    """Correlation of the errors that the sensors' noise makes k lines apart, shape (far lines,)."""
+    """Correlation of errors by sensor noise k lines apart, shape (far lines,)."""
     ringing: Reals
-    """Covariance of those that cut-off ringing makes, per |dH/df|^2 and relative variance [Hz^2]."""
+    """Covariance of errors by cut-off ringing, per |dH/df|^2 and relative variance [Hz^2]."""
 
     def smeared_pole(self, frequency_hz: Reals, pole: complex, slope_per_hz: Reals | Complexes) -> Complexes:
-        """Return what averages show of 1 / (i w - s), s = `pole` [rad/s].
+        """Return the averaged estimate of 1 / (i w - s), s = `pole` [rad/s].
 
         With the autocorrelation r of the window over its segment T, T I(z), z = (s - i w) T and
         I(z) = integral of r(t) exp(z t) over 0 to 1, where the base's density is level; its relative slope
         g [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
-        # Lines are whole turns apart in a segment, and so are the orders of a window.
+        # Lines are a whole number of turns apart in a segment, like the terms of a window.
         rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
@@ -142,14 +142,14 @@ class Leakage:
         line
             Numbers of the lines, rising.
         value, spread
-            Of the transmission there; the standard deviation of either part of it bounds the result.
+            Transmission there, and the standard deviation of either part, which bounds the result.
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
         return np.asarray(ringing * np.divide(most, size, out=np.ones_like(size), where=size > most))
 
     def covariance(self, line: Integers, rung: Complexes, spread: Reals) -> Complexes:
-        """Give the covariance of either part of the lines' errors, lower bands, shape (far lines, lines)."""
+        """Return the covariance of either part of the errors, lower bands, shape (far lines, lines)."""
         noise = np.sqrt(spread**2 - np.abs(rung) ** 2)
         alike = self.ringing / (self.ringing[0] or 1.0)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
@@ -164,7 +164,7 @@ class Leakage:
 
 
 def leakage_of(found: FrequencyResponse) -> Leakage | None:
-    """Return that of a transmission; None where whole periods leave none."""
+    """Return the leakage of a transmission; None for whole periods."""
     if found.resolution_hz == 0.0:
         return None
     how = found.settings
@@ -177,7 +177,7 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
 
 @lru_cache(maxsize=16)
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
-    """Sum what segments j hops apart share of errors k lines apart.
+    """Sum the correlations of errors k lines apart over segments j hops apart.
 
     Sum over j of (1 - |j| / K) conj(c_j(k)) d_j(k): c_j(k), of the reference, transforms w(n) w(n + j D);
     d_j(k) is the same for noise, and that of w' for ringing.
@@ -228,30 +228,30 @@ def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Comple
 
 
 Background = Callable[[Reals], Complexes]
-"""Shapes with real factors that are added to modes, shape (lines, factors)."""
+"""Shapes with real factors to add to modes, shape (lines, factors)."""
 _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
-"""Most steps of a fit; one that takes more is of lines that no such modes describe."""
+"""Maximum steps of a fit."""
 _STEADY_AVERAGES = 49.0
-"""Averages that scatter steadied by neighbouring lines is worth."""
+"""Equivalent averages of a scatter that is smoothed over neighbouring lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
 """Half-power bandwidths between two modes up to which their bounds allow for one more between them."""
 _EDGE = 1e-3
-"""Part of its reach within which a fit ends at a bound: it has found no minimum."""
+"""Relative distance to a bound at which a fit counts as having found no minimum."""
 
 
 class Lines:
-    """Lines of a transmission, weighted; neighbours whose errors correlate are made independent.
+    """Weighted lines of a transmission with decorrelated errors.
 
     Parameters
     ----------
     band
-        Their transmission; its spread is the standard deviation that weights them.
+        Their transmission; weights follow from its standard deviation.
     chosen
-        Which of its lines are fitted, where they are known at all.
+        Which of its known lines are fitted.
     """
 
     def __init__(self, band: FrequencyResponse, chosen: Flags) -> None:
@@ -262,11 +262,11 @@ class Lines:
         self._leakage = leakage_of(band)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
-        # Scatter of few averages is steadied, elsewhere it is each line's own.
+        # The scatter of few averages is smoothed over lines.
         self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
         self._root: Complexes | None = None
         self.ringing_share = np.zeros(self.value.size)
-        """Of the variance of each line's error, what cut-off ringing makes; all of it with a boxcar."""
+        """Share of each line's variance by cut-off ringing; all of it with a boxcar."""
         if self._leakage is not None and self.value.size:
             number = np.rint(self.frequency_hz * self._leakage.segment_s).astype(np.int64)
             rung = self._leakage.rung(number, self.value, self._spread)
@@ -276,12 +276,12 @@ class Lines:
 
     @property
     def narrowest_hz(self) -> float:
-        """Half-power bandwidth [Hz] below which a boxcar tells no damping: its leakage is not local."""
+        """Least half-power bandwidth [Hz] to determine damping with a boxcar: its leakage is not local."""
         leakage = self._leakage
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 
     def independent(self, columns: Complexes) -> Reals:
-        """Turn complex values of the lines into real ones of variance one, shape (2 lines, ...)."""
+        """Convert complex values of the lines to real ones of variance one, shape (2 lines, ...)."""
         if self._root is None:
             shape = (-1,) + (1,) * (columns.ndim - 1)
             scaled = columns / self._spread.reshape(shape)
@@ -300,7 +300,7 @@ class Lines:
         return chi_square_of(real**2 + imaginary**2, self._averages)
 
     def modes(self, poles: Reals) -> Complexes:
-        """Return the shapes of modes as the averages show them; see `mode_shapes`."""
+        """Return the shapes of modes including leakage; see `mode_shapes`."""
         if self._leakage is None:
             return mode_shapes(self.frequency_hz, poles)
         columns = []
@@ -336,12 +336,12 @@ class ModalFit:
 
     resonances: tuple[Resonance, ...]
     chi_square: float
-    """Per degree of freedom, of all lines."""
+    """Chi square per degree of freedom of all lines."""
     freedom: int
 
     @property
     def explains(self) -> bool:
-        """Whether what is left, of all lines and of those about each mode, is no more than their scatter."""
+        """Return whether the residuals, overall and about each mode, are within the scatter."""
         return self.chi_square < max(WELL_FITTED, chi_square_limit(self.freedom)) and all(
             each.is_explained for each in self.resonances
         )
@@ -350,21 +350,21 @@ class ModalFit:
 def modal_fit(
     band: FrequencyResponse, lines: Lines, start: Reals, reach: Reals, background: Background
 ) -> ModalFit | None:
-    """Fit poles from a start, within a reach of it; None where the lines do not determine them.
+    """Fit poles near a start; None if the lines do not determine them.
 
     Variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432).
 
     Parameters
     ----------
     band
-        What the lines are of.
+        Transmission of the lines.
     lines
-        What is fitted.
+        Lines to fit.
     start, reach
-        Logarithms of natural frequency [Hz] and damping ratio of each mode, and how far they may go, shape
+        Logarithms of natural frequency [Hz] and damping ratio of each mode, and their largest changes, shape
         (2 modes,).
     background
-        What is added to the modes.
+        Shapes to add to the modes.
     """
     target, behind = lines.independent(lines.value), lines.independent(background(lines.frequency_hz))
 
@@ -396,7 +396,7 @@ def modal_fit(
     if not result.success or np.any(np.minimum(poles - low, high - poles) < _EDGE * reach):
         return None
     found, left = factors(poles)
-    # How the lines follow poles and factors together, and with what covariance.
+    # Joint Jacobian and covariance of poles and factors.
     follows = np.hstack((_rates(lambda moved: basis(moved) @ found, poles), basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
@@ -426,8 +426,8 @@ def modal_fit(
         share = freedom / left.size
         beside = 2 * float(np.count_nonzero(about)) * share
         nearby = float(np.sum(squares[about])) / beside
-        # Ringing is the drive's own: its errors correlate with the conjugates of others too, by so much that
-        # the variance of a fitted number is up to twice what covariances of the lines give.
+        # Errors by ringing also correlate with the conjugates of others, which at most doubles the variance
+        # of a fitted value.
         widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
@@ -476,6 +476,6 @@ def _condition(curvature: Reals) -> float:
 
 
 def _rates(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
-    """Return how a shape follows each pole, by central differences."""
+    """Return the derivatives of a shape by each pole, by central differences."""
     steps = _STEP * np.eye(poles.size)
     return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)

@@ -1,4 +1,4 @@
-"""What a noise measurement shows: the transmission from base to m0, with bounds and resonances."""
+"""Results of a noise measurement: the transmission from base to m0, with bounds and resonances."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -28,21 +28,21 @@ from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
-"""The transmission, and what finds the rest in the same samples, resonances above all: that costs more."""
+"""The transmission, and a function that finds the rest, such as resonances, which takes longer."""
 _BLOCK = 1 << 19
-"""Samples of a record that are looked at together."""
+"""Samples per block."""
 _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Standard deviations of a mean difference between estimators that is bias."""
+"""Standard deviations of a mean difference between estimators that counts as bias."""
 _ALIKE_LINES = 4
-"""Neighbouring lines under a window that are worth one, and a median for a mean."""
+"""Variance factor for correlated lines under a window and a median instead of a mean."""
 
 
 @dataclass(frozen=True)
 class NoiseResponse(Labelled):
-    """Transmission of base displacement to m0's displacement, and what was found in it."""
+    """Transmission from base displacement to m0's displacement, with the findings."""
 
     OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
     DOCUMENT: ClassVar = (
@@ -52,27 +52,27 @@ class NoiseResponse(Labelled):
     )
 
     frequency_response: FrequencyResponse
-    """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
+    """The estimate to use; by default referenced to the drive voltage, which avoids bias by noise."""
     h1: FrequencyResponse
     h2: FrequencyResponse
     resonances: tuple[Resonance, ...]
     base_level: NoiseDriveLevel
     bias: str
-    """Sentence on an estimator that noise biases; empty where it does not."""
+    """Remark on an estimator with bias by noise; otherwise empty."""
     periodic: PeriodicFrequencyResponse | None
-    """Where the scatter comes from; None for noise that does not repeat."""
+    """Sources of the scatter; None for noise that does not repeat."""
     used_s: float
-    """Length of what was averaged [s]."""
+    """Averaged time [s]."""
     left_out: int
-    """Realisations or segments that were cut short or touch lost or overloaded samples."""
+    """Number of incomplete realisations or segments, or with lost or overloaded samples."""
     lost_samples: int
-    """Samples inside the noise that were lost."""
+    """Lost samples during the noise."""
     overloaded_samples: int
-    """Samples inside the noise at which a channel was near its full scale."""
+    """Samples during the noise with a channel near full scale."""
 
     @property
     def median_coherence(self) -> float:
-        """Over all lines."""
+        """Median coherence over all lines."""
         return float(np.median(self.frequency_response.coherence))
 
 
@@ -83,7 +83,7 @@ def repeated_response(
     *,
     repetitions: Sequence[Repetition] = (),
 ) -> Estimated:
-    """Estimate the transmission of noise that repeats from everything usable in it.
+    """Estimate the transmission from all usable periodic noise.
 
     Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
     are the segments.
@@ -91,10 +91,10 @@ def repeated_response(
     Parameters
     ----------
     channels, noise, request
-        What was recorded, how it was driven, and what is asked.
+        Record, excitation and request.
     repetitions
-        Of every realisation, where they were measured on the same drive before; measured if absent. A draw
-        of a measurement has them: how its resonances scatter among realisations is not asked again.
+        Repetition of every realisation, if known from the same drive; measured by default. Draws pass it,
+        and then the scatter of resonances among realisations is not computed.
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -121,7 +121,7 @@ def repeated_response(
         taken += 1
     if not taken:
         raise NotEnoughData(
-            f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
+            f"none of the {noise.realisations} planned realisations of noise contains two whole periods of "
             f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
         )
     periodic = sums.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
@@ -167,13 +167,13 @@ def repeated_response(
 
 @dataclass
 class _Unusable:
-    """Counts samples that no estimate may touch."""
+    """Number of unusable samples."""
 
     lost: int = 0
     overloaded: int = 0
 
     def valid(self, data: Reals, overloaded: Flags) -> Flags:
-        """Which samples may be used; the others are counted."""
+        """Return which samples are usable, and count the others."""
         lost = np.isnan(data).any(axis=0)
         self.lost += int(np.count_nonzero(lost))
         self.overloaded += int(np.count_nonzero(overloaded & ~lost))
@@ -181,14 +181,14 @@ class _Unusable:
 
     @property
     def text(self) -> str:
-        """What was found, to end a sentence with; empty when nothing was."""
+        """Return the counts, to append to a sentence; empty if all samples are usable."""
         found = ((self.lost, "lost"), (self.overloaded, "near full scale"))
         said = " and ".join(f"{count} samples {what}" for count, what in found if count)
         return f" ({said})" if said else ""
 
 
 def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
-    """Read a realisation that holds two whole periods or more and no fault; else None."""
+    """Read a realisation with at least two whole periods and no fault; otherwise None."""
     shortfall = 1e-3
     periods = int(stretch.samples / period_samples + shortfall)
     if periods < _LEAST_PERIODS:
@@ -227,7 +227,7 @@ def _least_squares(
 def streamed_response(
     channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest = DEFAULT_REQUEST
 ) -> NoiseResponse:
-    """Estimate the transmission of noise that does not repeat from everything usable in it.
+    """Estimate the transmission from all usable non-periodic noise. ¶
 
     Raises NotEnoughData when less than two segments are left.
     """
@@ -237,7 +237,8 @@ def streamed_response(
     if segment < round(rate / noise.band_start_hz):
         raise NotEnoughData(
             f"{stretch.samples / rate:.3g} s of noise leave segments of {segment / rate:.3g} s, and one "
-            f"must hold a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure longer"
+            f"must contain a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure "
+            "longer"
         )
     sums = FrequencyResponseSums(
         rate,
@@ -255,7 +256,7 @@ def streamed_response(
         valid = bad.valid(data, channels.overloaded(first, last))
         if not valid.all():
             data = np.where(valid, data, 0.0)
-        # What drives, what stands below and what stands above the fraction bar come in another order here.
+        # Here the order of drive, base and response differs.
         sums.add(data[[1, 2, 0]], valid)
         level.add(data[1], valid)
     band = (noise.band_start_hz, noise.band_stop_hz)
@@ -284,9 +285,9 @@ def streamed_response(
 
 
 def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
-    """Compare an estimate with the one referenced to the drive, which noise of the channels does not bias.
+    """Compare an estimate with the drive-referenced one, which has no bias by channel noise.
 
-    Over the band and about each resonance, their median difference is bias where it exceeds three of its
+    A median difference over the band or about a resonance is bias if it exceeds three of its
     standard deviations and half of a line's.
     """
     sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
@@ -309,7 +310,7 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
 
 
 def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:
-    """Turn m0 velocity over base acceleration into displacement over displacement."""
+    """Convert m0 velocity over base acceleration to displacement over displacement."""
     return converted_frequency_response(
         frequency_response,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
@@ -329,11 +330,11 @@ class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     DOCUMENT: ClassVar = "resonances=response.resonances transmission distortion *response"
 
     request: FrequencyResponseRequest
-    """What was asked for."""
+    """The request."""
 
     @property
     def transmission(self) -> dict[str, Any]:
-        """The transmission in the quantities asked for, as a document has it."""
+        """The transmission in the requested quantities, as JSON."""
         view = self.request.view
         return columns(view, "quantity=name unit") | columns(
             view.shown(self.response.frequency_response),
@@ -346,5 +347,5 @@ class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
 
     @property
     def distortion(self) -> Distortion | None:
-        """What noise that repeats tells of the specimen; None for streamed noise."""
+        """Distortion from periodic noise; None for streamed noise."""
         return None if self.response.periodic is None else distortion(self.response.periodic)

@@ -1,10 +1,8 @@
-"""Transmission from periodic noise: noise told apart from nonlinear distortion, lines without leakage.
+"""Transmission from periodic noise: separates noise from nonlinear distortion, without leakage.
 
 The drive is a multisine played for whole periods, in several realisations of its random phases. The scatter
-between periods is noise; what the scatter between realisations has beyond it is distortion (the
-robust method of Pintelon & Schoukens, System Identification, 2nd ed., section 4.3, the drive as reference).
-
-The best linear approximation over realisations of a periodic drive, its noise and its distortion.
+between periods is noise; additional scatter between realisations is distortion (robust method of Pintelon &
+Schoukens, System Identification, 2nd ed., section 4.3, with the drive as reference).
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,26 +24,26 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Part of a period that may be missing at the end: clocks differ by less, and periodicity fills it in."""
+"""Share of a period that may be missing at the end, more than clocks differ; periodicity fills it in."""
 _WEAKEST_LINE = 1e-3
-"""A line is driven when its amplitude is within 60 dB of the strongest; quantisation lies below."""
+"""A line counts as driven within 60 dB of the strongest, above quantisation."""
 _ITERATIONS = 8
 _CONVERGED = 1e-9
-"""Relative change of the period behind which all further passes move it by less than a tenth of that."""
+"""Relative change of the period at which iteration stops; the rest is less than a tenth of that."""
 _LARGEST_OFFSET = 200e-6
-"""Relative clock offset that is looked for: two oscillators of 50 to 100 ppm each."""
+"""Largest relative clock offset, for two oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
-"""Power of the mean period over the mean power of the periods, below which nothing repeats."""
+"""Least power of the mean period over the mean power of the periods of a repeating drive."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """The period of a drive as the converter saw it."""
+    """Period of a drive by the converter clock."""
 
     period_samples: float
-    """Converter samples in one period; need not be whole."""
+    """Converter samples per period; may be fractional."""
     sd_samples: float
-    """Standard deviation of it, from the drive channel's own noise."""
+    """Its standard deviation by noise of the drive channel."""
     periods: int
     """Whole periods in the record."""
 
@@ -53,9 +51,8 @@ class Repetition:
 def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetition:
     """Measure the true period of a recorded drive from the phase its lines gain per period.
 
-    Weighted least squares of the phases of the driven lines over the periods, repeated on the newly cut
-    periods until nothing moves. The first pass uses only the low lines, whose phase an offset of 200 ppm
-    cannot turn by more than a quarter; high ones (images of a held waveform among them) join after it. Raises
+    Weighted least squares of the phases of driven lines over the periods, repeated until it converges. The
+    first pass uses only low lines, whose phase changes by less than a quarter turn at 200 ppm. Raises
     NotEnoughData for fewer than two periods, and UnusableData when the drive is silent or does not repeat.
     """
     period = nominal_period_samples
@@ -77,24 +74,23 @@ def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetiti
 
 
 def whole_periods(samples: int, period_samples: float) -> int:
-    """Count the periods in a record, a last one that lacks a thousandth included."""
+    """Return the number of periods in a record; a last one may lack a thousandth."""
     return int(np.floor(samples / period_samples + _SHORTFALL))
 
 
 def period_spectra(samples: Reals, period_samples: float, periods: int) -> Complexes:
-    """Fourier coefficients of each period, at exact multiples of the repetition frequency.
+    """Return the Fourier coefficients of each period, at exact multiples of the repetition frequency.
 
-    Of samples of shape (n,), or (channels, n) of channels recorded together. The periods are resampled to a
-    whole number of points, so a transform of each has no leakage (below 1e-8) although a period need not be
-    a whole number of samples.
+    Samples have shape (n,) or (channels, n). Each period is resampled to a whole number of points, so that
+    its transform has no leakage (below 1e-8).
 
     Returns
     -------
-    Amplitudes (a sine of amplitude 1 has magnitude 1), shape (..., periods, lines); line k is k times the
-    repetition frequency; lines past `TRUSTED_BAND` of the sample rate are left out.
+    Amplitudes (a sine of amplitude 1 has magnitude 1), shape (..., periods, lines); line k is at k times
+    the repetition frequency, up to `TRUSTED_BAND` of the sample rate.
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
-    # Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches.
+    # Continue the record periodically by the reach of the interpolation.
     size = samples.shape[-1]
     missing = max(0, int(np.ceil(periods * period_samples)) - size)
     before = interpolate(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)
@@ -107,7 +103,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
 
 
 def driven_lines(spectra: Complexes) -> Flags:
-    """Return which lines carry drive, from its spectra of shape (periods or realisations, lines)."""
+    """Return which lines are driven, from spectra of shape (periods or realisations, lines)."""
     amplitude = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
     amplitude[0] = 0.0
     strongest = float(np.max(amplitude))
@@ -117,7 +113,7 @@ def driven_lines(spectra: Complexes) -> Flags:
 
 
 def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
-    """Relative change of the period that straightens the phases, and its standard deviation."""
+    """Return the relative change of the period that makes the phases constant, and its standard deviation."""
     driven = np.flatnonzero(driven_lines(spectra))
     lines = driven[driven <= max(highest, driven[0])]
     chosen = spectra[:, lines]
@@ -142,38 +138,38 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
 
 
 _OVER_CHANCE = 8.0
-"""Times the scatter that lines share by chance that they share by a drift."""
+"""Least ratio of common scatter of the lines to its chance value for a drift."""
 _MOST = 0.5
-"""Part of the scatter beyond noise that a drift explains at least."""
+"""Least share of the scatter beyond noise that a drift explains."""
 
 
 _SMALL = 0.03
-"""Deviation of a line up to which a drift is found by it; about a narrow mode that moves it is larger."""
+"""Largest deviation of a line used to find a drift; near narrow modes it is larger."""
 
 
 class Scatter(StrEnum):
-    """What the bounds of a periodic transmission were measured from."""
+    """Source of the bounds of a periodic transmission."""
 
     REALISATIONS = "realisations"
     """The full uncertainty: noise and nonlinear distortion."""
     PERIODS = "periods"
-    """One realisation only: noise alone; a nonlinear specimen may lie outside the bounds."""
+    """Noise only, from one realisation; a nonlinear specimen may lie outside the bounds."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """What all lines of a realisation share, and what differs among realisations: no distortion does that."""
+    """Common changes of all lines between realisations, which are no distortion."""
 
     OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1"}
 
     gain_share: float
-    """Relative standard deviation among realisations of a factor of all lines."""
+    """Relative standard deviation of the gain among realisations."""
     frequency_share: float
-    """That of a factor of all frequencies."""
+    """Relative standard deviation of all frequencies among realisations."""
 
     @property
     def text(self) -> str:
-        """What drifted, in words."""
+        """Description of the drift."""
         drifts = (("gain of the channels", self.gain_share), ("specimen's frequencies", self.frequency_share))
         shares = " and ".join(f"the {what} by {100 * share:.2g} %" for what, share in drifts if share)
         return f"realisations differ by a drift of {shares}"
@@ -188,15 +184,15 @@ class BestLinearApproximation:
     relative_sd: Reals
     """Standard deviation of ln(magnitude), equal to that of the phase [rad]."""
     steady_relative_sd: Reals
-    """The same, steadied by neighbouring lines."""
+    """The same, smoothed over neighbouring lines."""
     noise_variance: Reals
-    """Complex variance of one realisation's estimate that noise explains."""
+    """Complex variance of one realisation by noise."""
     distortion_variance: Reals | None
-    """What realisations scatter beyond the noise and their drift; None for a single one."""
+    """Complex variance beyond noise and drift; None for a single realisation."""
     drift: "Drift | None"
     scatter: Scatter
     averages: int
-    """Independent values the scatter was measured from: realisations, or periods of the only one."""
+    """Number of independent values for the scatter: realisations, or periods of a single one."""
 
 
 def best_linear_approximation(
@@ -207,7 +203,7 @@ def best_linear_approximation(
     periods: int,
     frequency_hz: Reals,
 ) -> BestLinearApproximation:
-    """Form response over base, referenced to the drive, and split its scatter.
+    """Estimate response over base, referenced to the drive, and separate noise from distortion.
 
     H = sum Y U* / sum X U*, with residuals v = Y - H X; Var(H) = s_v^2 sum |U|^2 / |sum X U*|^2
     (Pintelon & Schoukens, System Identification, 2nd ed., section 4.3.2, known reference).
@@ -217,7 +213,8 @@ def best_linear_approximation(
     drive, base, response
         Spectra U, X, Y averaged over the periods of each realisation, shape (realisations, lines).
     covariance
-        Of these averages of (X, Y) between periods, averaged over realisations, shape (2, 2, lines).
+        Covariance of these averages of (X, Y) between periods, averaged over realisations, shape (2, 2,
+        lines).
     periods
         Periods per realisation.
     frequency_hz
@@ -274,10 +271,10 @@ def best_linear_approximation(
 def _without_drift(
     off: Complexes, value: Complexes, frequency_hz: Reals, noise_variance: Reals, sd: Reals
 ) -> tuple[Drift | None, Complexes]:
-    """Find a drift of gain and of frequencies; give what it leaves.
+    """Find a drift of gain and of frequencies; return it and the residual.
 
-    Distortion of random phases is independent from line to line, so it has hardly a part in common. A drift
-    is one that explains most of the scatter beyond noise, and far more than chance does.
+    Distortion with random phases is independent between lines, so a common part is a drift. It must explain
+    most of the scatter beyond noise, and far more than chance.
 
     Parameters
     ----------
@@ -287,7 +284,7 @@ def _without_drift(
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
     """
     count, lines = off.shape
-    # The ratio of the displacements moves with the modes; velocity over acceleration has the frequency below.
+    # The ratio of displacements shifts with the modes; velocity over acceleration also has 1 / frequency.
     moved = value * frequency_hz
     stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
@@ -312,14 +309,14 @@ def _without_drift(
 
 
 def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
-    """Return the slope at each line: that of the quotient of two straight lines that one mode is nearby."""
+    """Return the slope at each line, from a local quotient of two straight lines, as of one mode."""
     if value.size == 1:
         return np.zeros_like(value)
     slope = np.gradient(value, frequency_hz)
     steps = np.diff(value) / np.diff(frequency_hz)
     across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
     product = steps[1:] * steps[:-1]
-    # Larger at a smooth extremum, where no such quotient is, and with a mode in the middle of three lines.
+    # Too large at a smooth extremum and with a mode between three lines.
     is_mode = np.abs(product) < np.abs(across) ** 2
     slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
     return np.asarray(slope)
@@ -327,22 +324,22 @@ def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
 
 @dataclass(frozen=True)
 class DetectionLines:
-    """Lines that were not driven, inside the driven band: what is on them, the specimen made."""
+    """Undriven lines inside the driven band, which show distortion."""
 
     OWN_UNITS: ClassVar = {"response_amplitude": "{unit}", "noise_amplitude": "{unit}"}
 
     order: Integers
-    """Multiple of the repetition frequency, shape (lines,): even ones show even, odd ones odd distortion."""
+    """Multiple of the repetition frequency, shape (lines,); even for even distortion, odd for odd."""
     frequency_hz: Reals
     response_amplitude: Reals
     """Rms over realisations of the response's amplitude [unit of the response]."""
     noise_amplitude: Reals
-    """The part of it that noise explains (standard deviation of the mean over periods)."""
+    """Its part by noise (standard deviation of the mean over periods)."""
 
 
 @dataclass(frozen=True)
 class PeriodicFrequencyResponse(Labelled):
-    """Best linear approximation of response over drive, and where its scatter comes from."""
+    """Best linear approximation of response over drive, with the sources of its scatter."""
 
     OWN_UNITS: ClassVar = {
         "frequency_response": "{unit}",
@@ -353,9 +350,9 @@ class PeriodicFrequencyResponse(Labelled):
 
     frequency_response: FrequencyResponse
     noise_variance: Reals
-    """Complex variance of one realisation's estimate that noise explains [(unit of the value)^2]."""
+    """Complex variance of one realisation by noise [(unit of the value)^2]."""
     distortion_variance: Reals | None
-    """What realisations scatter beyond it and their drift; None when there was one realisation only."""
+    """Complex variance beyond it and the drift; None for a single realisation."""
     drift: Drift | None
     scatter: Scatter
     realisations: int
@@ -377,18 +374,18 @@ class _Realisation:
 
 
 class PeriodicSums:
-    """Takes one realisation after the other and keeps their mean spectra only.
+    """Mean spectra of realisations that arrive one by one.
 
     Parameters
     ----------
     sample_rate_hz
-        Nominal rate of the converter; its clock is the one frequencies are stated in.
+        Nominal rate of the converter, whose clock defines all frequencies.
     repetition_hz
         Nominal repetition frequency of the drive; the true one is measured.
     confidence
-        Probability that a pair of bounds holds the truth, one line at a time.
+        Probability that the bounds of a line contain the true value.
     begun_with
-        Realisations of other sums.
+        Realisations to start with.
     """
 
     def __init__(
@@ -412,7 +409,7 @@ class PeriodicSums:
     def add(
         self, drive: Reals, base: Reals, response: Reals, *, repetition: Repetition | None = None
     ) -> None:
-        """Take the settled samples of one realisation, each of shape (samples,).
+        """Add the settled samples of one realisation, each of shape (samples,).
 
         Raises NotEnoughData for fewer than two periods.
 
@@ -421,9 +418,9 @@ class PeriodicSums:
         drive
             The clean reference: the recorded generator voltage.
         base, response
-            What stands below and above the fraction bar.
+            Denominator and numerator.
         repetition
-            Of this drive, where it was measured before.
+            Repetition of this drive, if known.
         """
         if not drive.size == base.size == response.size:
             sizes = f"{drive.size}, {base.size} and {response.size}"
@@ -447,7 +444,7 @@ class PeriodicSums:
         )
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Yield what stays when each realisation in turn is left out; nothing where there is one."""
+        """Yield the sums without each realisation in turn; nothing for a single one."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,
@@ -466,17 +463,16 @@ class PeriodicSums:
     ) -> PeriodicFrequencyResponse:
         """Return the transmission of the realisations added so far, at the driven lines.
 
-        The bounds are Student's with 2 (realisations - 1) degrees of freedom, so that they also hold for two
-        or three realisations.
+        Bounds follow Student's t with 2 (realisations - 1) degrees of freedom, valid from two realisations.
 
         Parameters
         ----------
         delay_s
-            By how much the response channel lags the base channel (vibrometer decoder, filters);
+            Delay of the response channel behind the base channel (vibrometer decoder, filters),
             removed from the phase.
         orders
-            Of the lines that are driven, as multiples of the repetition frequency; where they are not known,
-            those that carry drive: a converter's noise and images of a held waveform may pass for it.
+            Driven lines as multiples of the repetition frequency. By default they are found in the drive,
+            which may include noise and images of a held waveform.
         """
         if not self._realisations:
             raise NotEnoughData("no realisation was added; give at least one")
@@ -539,7 +535,7 @@ class PeriodicSums:
 
 
 def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
-    """Mark the lines of these orders, as far as the sample rate shows them."""
+    """Return the lines of these orders, as far as the sample rate allows."""
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(

@@ -1,7 +1,4 @@
-"""What an analyst asks of a noise measurement: estimator, resolution or averages, and how it is shown.
-
-In which quantities, and on which scale, a transmission is shown.
-"""
+"""Options to analyse noise: estimator, resolution or averages, quantities and scale."""
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -18,7 +15,7 @@ from .results import Estimator, FrequencyResponse, converted_frequency_response
 
 
 class MagnitudeScale(StrEnum):
-    """How magnitudes are drawn."""
+    """Scale of magnitudes."""
 
     LOG = "log"
     """The ratio itself on a logarithmic axis."""
@@ -34,7 +31,7 @@ _UNITS = {-2: "s²", -1: "s", 0: "", 1: "1/s", 2: "1/s²"}
 
 @dataclass(frozen=True)
 class FrequencyResponseView:
-    """The motion of m0 over the motion of the base."""
+    """Quantities and scale of a transmission."""
 
     response: Quantity = Quantity.DISPLACEMENT
     base: Quantity = Quantity.DISPLACEMENT
@@ -42,7 +39,7 @@ class FrequencyResponseView:
 
     @property
     def power(self) -> int:
-        """How often i omega multiplies displacement over displacement."""
+        """Power of i omega relative to displacement over displacement."""
         return self.response.derivatives - self.base.derivatives
 
     @property
@@ -52,7 +49,7 @@ class FrequencyResponseView:
 
     @property
     def name(self) -> str:
-        """``"velocity/acceleration"``: what `quantities_named` reads."""
+        """Name that `quantities_named` reads, such as ``"velocity/acceleration"``."""
         return f"{self.response.value}/{self.base.value}"
 
     @property
@@ -61,7 +58,7 @@ class FrequencyResponseView:
         return f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
 
     def label(self, mass: str = "m0") -> str:
-        """Text of the magnitude axis."""
+        """Return the label of the magnitude axis."""
         unit = self.unit
         match self.scale:
             case MagnitudeScale.LOG:
@@ -70,13 +67,13 @@ class FrequencyResponseView:
                 return f"{self.symbol} [dB re 1{f' {unit}' if unit else ''}]"
 
     def factor(self, frequency_hz: Reals) -> Reals:
-        """Return what turns magnitudes of displacement over displacement into the view's quantities."""
+        """Return the factor from displacement over displacement to the view's quantities."""
         start, stop = (Quantity.DISPLACEMENT, list(Quantity)[abs(self.power)])
         steps = (start, stop) if self.power >= 0 else (stop, start)
         return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
 
     def shown(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
-        """Turn displacement over displacement into the view's quantities, bounds included."""
+        """Convert displacement over displacement to the view's quantities, including bounds."""
         return converted_frequency_response(
             frequency_response,
             drive=(Quantity.DISPLACEMENT, self.base),
@@ -84,7 +81,7 @@ class FrequencyResponseView:
         )
 
     def drawn(self, magnitude: Reals) -> Reals:
-        """Turn magnitudes into the heights that are drawn."""
+        """Convert magnitudes to the drawn scale."""
         match self.scale:
             case MagnitudeScale.LOG:
                 return magnitude
@@ -99,9 +96,9 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
     Parameters
     ----------
     text
-        What m0 and the base are taken as, with a slash between them.
+        Quantities of m0 and the base, separated by a slash.
     scale
-        Of the magnitude in figures.
+        Scale of magnitudes in figures.
 
     Raises
     ------
@@ -120,16 +117,16 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> F
 
 
 _SEGMENT_S = 4.0
-"""Segment of streamed noise: a quarter of a hertz between lines resolves a bandwidth of 1 Hz."""
+"""Default segment of streamed noise [s]: lines 0.25 Hz apart resolve a bandwidth of 1 Hz."""
 _LEAST_SEGMENTS = 8
-"""Nobody asked: a short record gets shorter segments rather than fewer averages than this."""
+"""Default minimum of averages: a short record gets shorter segments instead."""
 _PROXY_SAMPLES = 4096
-"""Length of the window that overlaps are judged on; their correlations do not depend on it."""
+"""Window length for computing overlap correlations, which do not depend on it."""
 
 
 @dataclass(frozen=True)
 class FrequencyResponseRequest:
-    """How to estimate a frequency response; the defaults suit the paper's specimen.
+    """Settings of a frequency response; the defaults suit the paper's specimen.
 
     At most one of resolution, segment length and averages can be chosen: the other two follow.
     """
@@ -140,10 +137,10 @@ class FrequencyResponseRequest:
     noise_ratio: float | None = None
     """For hv: noise density of m0's velocity over that of the base's acceleration [s2]."""
     resolution_hz: float | None = None
-    """Noise bandwidth of a line; the segment becomes as long as that needs."""
+    """Noise bandwidth of a line, which sets the segment length."""
     segment_s: float | None = None
     averages: float | None = None
-    """Independent averages; the segments become as long as they leave."""
+    """Independent averages, which set the segment length."""
     window: Window = Window.HANN
     overlap: float = 0.5
     confidence: float = DEFAULT_CONFIDENCE
@@ -182,7 +179,7 @@ class FrequencyResponseRequest:
 
     @property
     def cuts_segments(self) -> bool:
-        """Whether it asks for something that only averages over segments have."""
+        """Whether it has options that only averages over segments support."""
         chosen = (self.resolution_hz, self.segment_s, self.averages)
         return any(each is not None for each in chosen) or (self.window, self.overlap) != (
             FrequencyResponseRequest.window,
@@ -192,10 +189,10 @@ class FrequencyResponseRequest:
     def segment_samples(self, samples: int, sample_rate_hz: float) -> int:
         """Choose the length of a segment for a record of this many samples.
 
-        Raises NotEnoughData when the record does not hold two segments of the length asked for.
+        Raises NotEnoughData when the record is shorter than two segments of the requested length.
         """
         wished = self._wished(samples, sample_rate_hz)
-        # Beyond the record first: what is beyond all numbers is no whole one.
+        # Compare before rounding: infinity cannot be rounded to an integer.
         if samples < wished or samples < wished + hop_samples(int(wished), self.overlap):
             raise NotEnoughData(
                 f"{samples / sample_rate_hz:.3g} s of noise were recorded, less than two segments of the "
@@ -217,7 +214,7 @@ class FrequencyResponseRequest:
 def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
     """Return the longest segment that still leaves this many independent averages of a whole record.
 
-    K segments are worth at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
+    K segments count as at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
     K segments of N / (1 + (K - 1) (1 - overlap)).
     """
     values = taper(window, _PROXY_SAMPLES)
@@ -230,6 +227,6 @@ def longest_segment(samples: int, averages: float, window: Window, overlap: floa
 
 
 def _bandwidth_lines(window: Window) -> float:
-    """Noise bandwidth of a window in lines: 1.5 for Hann."""
+    """Return the noise bandwidth of a window in lines: 1.5 for Hann."""
     values = taper(window, _PROXY_SAMPLES)
     return float(values.size * (values @ values) / np.sum(values) ** 2)

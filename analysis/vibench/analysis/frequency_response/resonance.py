@@ -24,40 +24,39 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
+"""Eight lines are sixteen real values, for two pole and at most ten linear parameters."""
 _LEAST_RISE = 3.0
-"""A peak stands above the valley beside it by at least this many standard deviations of the difference."""
+"""Least height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3
-"""Taken for one peak."""
+"""Most modes for one peak."""
 _APART = (0.5, 1.5)
-"""Part of a half-width, at which poles side by side start."""
+"""Initial spacing of poles side by side, in half widths."""
 _LEAST_GAIN = 25.0
-"""In chi square, by which a fit is better with one more mode: of its four numbers chance gives 19 once in a
+"""Least reduction of chi square by one more mode; for its four parameters chance gives 19 once in a
 thousand."""
 _REACH_DAMPING = 4.0
-"""In its logarithm."""
+"""Largest change of the logarithm."""
 _USUAL_HZ = 300.0
 """Scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""Believe a peak too narrow for the lines only where its line or its damping is known to a tenth: else it
-is a ripple on top of a broad hill."""
+"""Accept an unresolved peak only if line or damping is known to 10 %: else it is a ripple on a broad one."""
 _BACKGROUND_DEGREES = (1, 2, 3)
-"""Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
+"""Degrees tried in turn: near broad peaks, neighbours are no straight line."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
-"""Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
+"""Relative uncertainty of damping above which a peak is a ripple of noisy lines and no resonance."""
 
 
 def resonances(
     frequency_response: FrequencyResponse, *, low_hz: float, high_hz: float
 ) -> tuple[Resonance, ...]:
-    """Find and fit the resonances of a transmission in a band, in the order of frequency.
+    """Find and fit the resonances of a transmission in a band, sorted by frequency.
 
-    Each significant peak is fitted, weighted by the stated spreads, with
-    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on what
-    its neighbours leave there, a straight line or, where that does not do, up to a cubic. The pole is
-    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). A peak that
-    noise explains is left out. Then all modes are fitted together, and that fit stands where it explains
-    the whole band: no polynomial follows the skirt of a neighbour to the last digit of a fine measurement.
+    Each significant peak is fitted, weighted by the standard deviations, with
+    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on a
+    background of its neighbours, which is a straight line or at most a cubic. The pole is
+    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise
+    explains are left out. Then all modes are fitted together. That fit is used if it explains the whole
+    band, since no polynomial describes a neighbour exactly.
 
     Raises InvalidRequest when fewer than eight lines lie in the band.
     """
@@ -79,16 +78,16 @@ def resonances(
 def scattered_resonances(
     found: Sequence[Resonance], without: Sequence[Sequence[Resonance]]
 ) -> tuple[Resonance, ...]:
-    """Widen what resonances are known to by how they move when each realisation in turn is left out.
+    """Widen the uncertainties of resonances by Tukey's jackknife over realisations.
 
-    Where masses collide, each realisation moves all lines about a resonance together, and a fit that takes
-    lines as independent knows too much: Tukey's jackknife (Miller 1974, Biometrika 61, 1-15) does not. A
-    resonance that is there with one realisation only is none.
+    With collisions, each realisation shifts all lines about a resonance together, so a fit of independent
+    lines is overconfident (Miller 1974, Biometrika 61, 1-15). A resonance that depends on one realisation
+    is dropped.
 
     Parameters
     ----------
     found
-        From all realisations.
+        Resonances from all realisations.
     without
         The same without each of them.
     """
@@ -113,10 +112,10 @@ def scattered_resonances(
 
 
 def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
-    """Return the largest of what the fit says, what realisations move, and what the choice of a fit moves.
+    """Return the largest standard deviation: of the fit, by realisations, or by the choice of fit.
 
-    A fit of all modes together and one of this mode alone differ by more than a realisation moves either:
-    only fits over about as many lines tell the latter, which the jackknife multiplies.
+    Joint and single fits differ more than realisations do, so the jackknife compares only fits over similar
+    numbers of lines.
     """
     alike = [each for each in rest if 0.5 < each.lines_used / found.lines_used < 2.0]
     told, moved = (
@@ -128,16 +127,16 @@ def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, real
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
-    """Lines of peaks, and their half-power widths in lines."""
+    """Return the lines of peaks, and their half-power widths in lines."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
-    # A rise of ln(magnitude) by less than this is noise, whatever the line.
+    # A smaller rise of ln(magnitude) is noise at any line.
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
         width = _half_power_lines(size, int(line))
-        # Peaks as wide as the band are fitted with the same lines: one of them does.
+        # Peaks as wide as the band are fitted with the same lines, so one is enough.
         is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
         if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
             result.append((int(line), width))
@@ -145,7 +144,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
 
 
 def _smooth(size: Reals, spread: Reals) -> Reals:
-    """Average over the few lines that bring typical noise below a hundredth; a noise-free curve stays."""
+    """Smooth over enough lines for typical noise below 1 %; a noise-free curve stays unchanged."""
     lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
     if lines <= 1:
         return size
@@ -154,7 +153,7 @@ def _smooth(size: Reals, spread: Reals) -> Reals:
 
 
 def _half_power_lines(size: Reals, line: int) -> int:
-    """Lines from the peak to where the magnitude has fallen by 3 dB, the nearer side."""
+    """Return the lines from the peak to the nearer -3 dB point."""
     level = size[line] - 0.5 * np.log(2)
     below = np.flatnonzero(size < level)
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
@@ -190,7 +189,7 @@ def _fit_peak(band: FrequencyResponse, line: int, half_width: int, most: int) ->
 
 
 def _powers(centre_hz: float, degree: int) -> Background:
-    """Powers of a background with complex factors."""
+    """Return a polynomial background with complex factors."""
 
     def shapes(frequency_hz: Reals) -> Complexes:
         off = frequency_hz / centre_hz - 1
@@ -200,7 +199,7 @@ def _powers(centre_hz: float, degree: int) -> Background:
 
 
 def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
-    """Start this many poles where one was: side by side, closer and farther, each narrower than it."""
+    """Return starts of several poles for one: side by side, at several spacings, each narrower."""
     ((log_frequency, log_damping),) = poles
     if modes == 1:
         yield poles.ravel()
@@ -212,7 +211,7 @@ def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
 
 
 def _is_told(found: Resonance, lines: Lines) -> bool:
-    """Return whether lines determine a mode: damping above zero, inside of them, and no ripple of noise."""
+    """Return whether lines determine a mode: inside the band, damping above zero, no ripple of noise."""
     natural_hz, damping = found.frequency_hz, found.damping_ratio
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
     if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
@@ -227,10 +226,7 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
 
 
 def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]) -> tuple[Resonance, ...]:
-    """Fit once more over the bandwidth found: the first width was read off single, noisy lines.
-
-    What one mode does not describe is fitted over all its lines: a background follows fewer.
-    """
+    """Fit again over the fitted bandwidth, since the first width came from single noisy lines."""
     if not first:
         return ()
     (one,) = first
@@ -241,11 +237,11 @@ def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...
 
 
 def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
-    """Fit all modes of a band at once, from the single fits; those stand where the modes do not explain it.
+    """Fit all modes of a band at once, starting from the single fits, which are kept if this fails.
 
     H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
-    exact for a linear specimen with any damping. Where these modes do not explain the band, the one about
-    which most is left is taken for two. With impacts nothing explains it, and nothing is gained.
+    exact for a linear specimen with any damping. If these modes do not explain the band, the one with the
+    largest residual is split in two. With impacts no modes explain it.
     """
     if not found:
         return ()
@@ -264,14 +260,14 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        # One pole for two may end beside both: split also where it started.
+        # One pole for two modes may end beside both, so split it also at its start.
         split = (_split_poles(each[worst : worst + 1], 2) for each in (poles, starts[0]))
         starts = [np.vstack((rest, two.reshape(2, 2))) for two in chain.from_iterable(split)]
     return best
 
 
 def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> ModalFit | None:
-    """Fit all modes from each start; the best of these."""
+    """Fit all modes from each start and return the best fit."""
     fits = (
         modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _outside) for each in starts
     )
@@ -279,7 +275,7 @@ def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> Mod
 
 
 def _determined_modes(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
-    """Return the modes of a fit that its lines determine, in the order of frequency."""
+    """Return the modes of a fit that its lines determine, sorted by frequency."""
     told = (each for each in fit.resonances if _is_told(each, lines))
     return tuple(sorted(told, key=lambda one: one.frequency_hz))
 
@@ -290,13 +286,13 @@ def _poles(found: Sequence[Resonance]) -> Reals:
 
 
 def _outside(frequency_hz: Reals) -> Complexes:
-    """Of modes outside of the band, and of what the channels' phases err: 1, i w and w^2."""
+    """Return the background of modes outside the band and of phase errors: 1, i w and w^2."""
     scaled = frequency_hz / _USUAL_HZ
     return np.stack([np.ones_like(frequency_hz), 1j * scaled, scaled**2], axis=1)
 
 
 def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
-    """Keep one fit of each pole: two ripples of one resonance give the same."""
+    """Keep one fit of each pole, because ripples of one resonance give the same pole."""
     kept: list[Resonance] = []
     for together in sorted(filter(None, found), key=lambda fit: min(map(_doubt, fit))):
         known = tuple(kept)

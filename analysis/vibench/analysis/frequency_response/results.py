@@ -1,4 +1,4 @@
-"""Frequency responses: the shape every estimator of response over drive hands on to figures and reports."""
+"""Frequency responses, the common result of all estimators of response over drive."""
 
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
@@ -13,11 +13,11 @@ from ..signals.quantity import Quantity, derivative_factor
 from ..tables import Labelled
 
 LEAST_COHERENCE = 0.1
-"""Below it no line is significant."""
+"""Least coherence of a significant line."""
 
 
 class Estimator(StrEnum):
-    """How response over drive is formed from averaged spectra."""
+    """Estimator of response over drive from averaged spectra."""
 
     H1 = "h1"
     """S_xy / S_xx: unbiased when only the response is noisy."""
@@ -31,7 +31,7 @@ class Estimator(StrEnum):
 
 @dataclass(frozen=True)
 class FrequencyResponseSettings:
-    """What made a frequency response, kept beside it."""
+    """Settings of a frequency response."""
 
     estimator: Estimator
     sample_rate_hz: float
@@ -40,11 +40,11 @@ class FrequencyResponseSettings:
     window: str
     overlap: float
     confidence: float
-    """Probability that a bound pair holds the truth, one line at a time."""
+    """Probability that the bounds of a line contain the true value."""
     noise_ratio: float | None = None
-    """S_nn / S_mm given to hv."""
+    """S_nn / S_mm for hv."""
     delay_s: float = 0.0
-    """Delay of the response channel behind the drive channel that was removed from the phase."""
+    """Delay of the response channel behind the drive channel, removed from the phase."""
 
     @property
     def segment_s(self) -> float:
@@ -66,24 +66,24 @@ class FrequencyResponse(Labelled):
     coherence: Reals
     """Squared coherence between drive and response, 0 to 1."""
     n_eff: float
-    """Independent averages behind every line."""
+    """Independent averages of every line."""
     relative_sd_magnitude: Reals
     """Standard deviation of ln(magnitude)."""
     sd_phase_rad: Reals
     """Standard deviation of the phase [rad]."""
     half_width: Reals
-    """Relative half width of the bounds, from which the four bounds below follow."""
+    """Relative half width of the bounds."""
     coherence_significance: float
     """Coherence that independent noises stay below with probability ``settings.confidence``."""
     resolution_hz: float
-    """Noise bandwidth of a line: finer features are smeared; zero for exactly periodic drive."""
+    """Noise bandwidth of a line, which smears finer features; zero for exactly periodic drive."""
     segments_used: int
     segments_excluded: int
     settings: FrequencyResponseSettings
     steady_relative_sd: Reals | None = None
-    """As `relative_sd_magnitude`, steadied by neighbouring lines: weights of a fit. None: that is steady."""
+    """`relative_sd_magnitude` smoothed over lines, for weights of a fit; None if not needed."""
     drive_slope_per_hz: Complexes | None = None
-    """Relative slope of the density that lines average the transmission with; None where it is level."""
+    """Relative slope of the density that weights the transmission within a line; None if flat."""
     reference_coherence: Reals | None = None
     """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
 
@@ -125,26 +125,26 @@ class FrequencyResponse(Labelled):
 
     @property
     def is_significant(self) -> Flags:
-        """Lines where drive and response have something to do with each other, and their bounds hold.
+        """Lines with significant coherence and valid bounds.
 
-        Where the drive explains less than a tenth of the response, bounds that rest on a linear error hold
-        the truth in 3 to 75 % of all cases, however many averages make the coherence itself significant.
+        If the drive explains less than a tenth of the response, linear bounds cover in only 3 to 75 % of
+        cases, even with significant coherence.
         """
         decisive = self.coherence if self.reference_coherence is None else self.reference_coherence
         return np.asarray(decisive > max(self.coherence_significance, LEAST_COHERENCE))
 
     def without_delay(self, delay_s: float) -> "FrequencyResponse":
-        """Turn the phase back by a delay of the response channel behind the drive channel [s]."""
+        """Correct the phase for a delay of the response channel behind the drive channel [s]."""
         turned = self.value * np.exp(2j * np.pi * self.frequency_hz * delay_s)
         settings = replace(self.settings, delay_s=self.settings.delay_s + delay_s)
         return replace(self, value=turned, settings=settings)
 
     def without_gain(self, gain: Complexes) -> "FrequencyResponse":
-        """Divide by what the sensors did to the response over what they did to the drive, shape (lines,)."""
+        """Divide by the gain ratio of the response sensor to the drive sensor, shape (lines,)."""
         return replace(self, value=self.value / gain)
 
     def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
-        """Keep the lines from ``low_hz`` to ``high_hz``, both included."""
+        """Return the lines from ``low_hz`` to ``high_hz``, inclusive."""
         kept = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
         if not np.any(kept):
             span = f"{self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
@@ -167,8 +167,8 @@ def converted_frequency_response(
     """Express a transmission in other quantities: each pair is (recorded, wanted).
 
     Base acceleration to m0 velocity becomes displacement over displacement by
-    ``drive=(ACCELERATION, DISPLACEMENT), response=(VELOCITY, DISPLACEMENT)``. Relative bounds and the
-    coherence stay what they are; the line at 0 Hz is NaN when the result needs an integral.
+    ``drive=(ACCELERATION, DISPLACEMENT), response=(VELOCITY, DISPLACEMENT)``. Relative bounds and coherence
+    are unchanged; the line at 0 Hz is NaN for integrals.
     """
     power = (response[1].derivatives - response[0].derivatives) - (
         drive[1].derivatives - drive[0].derivatives

@@ -13,38 +13,37 @@ from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 _ENOUGH_FREEDOM = 24.0
-"""Degrees of freedom of a line's variance with which it is known to a third."""
+"""Degrees of freedom at which a line's variance is known to a third."""
 _FREEDOM = 96.0
-"""Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
+"""Number of neighbouring lines for estimating the noises, since a small one shows in some lines only."""
 _FEWEST_FREEDOM = 4.0
-"""Fewest degrees of freedom of all lines together, below which neighbours tell no more than the line."""
+"""Fewest degrees of freedom of all lines together for which neighbours help."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
-"""Part of a variance, or of a shape, over what its neighbours have on average."""
+"""Least variance or shape relative to the mean of its neighbours."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
-    """Return the standard deviation of ln(magnitude) with which lines are weighted in a fit.
+    """Return the standard deviation of ln(magnitude) for weighting lines in a fit.
 
-    One of two realisations is now and then a hundredth of the true one: as a weight it takes a few lines for
-    the whole truth. What is level over neighbouring lines is not the relative scatter, but the noise of both
-    sensors, and that of the base itself: y - H x has a + b |H|^2 + c |dH|^2, with dH from line to line, since
-    what does not repeat leaks by as much as a resonance rings on. They are found over lines enough, by
-    maximum likelihood of variances that are chi-square distributed.
+    From two realisations it can be 100 times too small, so that a few lines would dominate a fit. Smooth
+    over neighbouring lines are instead the noises of both sensors and of the base: y - H x has the variance
+    a + b |H|^2 + c |dH|^2, with dH from line to line for leakage. Their sizes are found by maximum
+    likelihood of chi-square distributed variances.
 
     Parameters
     ----------
     relative_sd
-        As each line tells it for itself, shape (lines,).
+        Estimate from each line alone, shape (lines,).
     value
-        Response over drive H, in the units in which the sensors' noise is level; shape (lines,).
+        Response over drive H, in units in which the sensor noise is white; shape (lines,).
     power
-        Mean square of the drive that the estimates rest on, to any scale, shape (lines,).
+        Mean square of the drive on any scale, shape (lines,).
     freedom
         Degrees of freedom of each line's own variance.
     """
-    # Averages that overlap nearly wholly are worth hardly more than one.
+    # Averages with nearly full overlap count as hardly more than one.
     freedom = max(freedom, 1.0)
     lines = min(ceil(_FREEDOM / freedom), value.size)
     if freedom >= _ENOUGH_FREEDOM or lines * freedom <= _FEWEST_FREEDOM:
@@ -55,7 +54,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         steps = np.nan_to_num(np.abs(np.gradient(value)) ** 2)
     known = np.isfinite(variance)
     shapes = np.where(known, [np.ones_like(gain), gain, steps], 0.0)
-    # Stretches overlap by half; between their middles sizes are interpolated.
+    # Stretches overlap by half; sizes are interpolated between their centres.
     last = value.size - lines
     firsts = np.append(np.arange(0, last, max(lines // 2, 1)), last)
     around = firsts[:, None] + np.arange(lines)
@@ -69,10 +68,10 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
 
 
 def _sizes(variance: Reals, shapes: Reals) -> Reals:
-    """Return how much of each shape a row of variances holds, shape (shapes, rows); none is below zero.
+    """Return the non-negative sizes of each shape in rows of variances, shape (shapes, rows).
 
-    Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): their updates raise the likelihood of
-    chi-square distributed values in every round.
+    Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): each update increases the likelihood of
+    chi-square distributed values.
     """
     level = np.maximum(variance.mean(axis=1), _NOTHING)[:, None]
     heights = np.maximum(shapes.mean(axis=2, keepdims=True), _NOTHING)
@@ -86,7 +85,7 @@ def _sizes(variance: Reals, shapes: Reals) -> Reals:
 
 
 def estimator_by_name(estimator: Estimator | str) -> Estimator:
-    """Turn a name into an estimator; raises InvalidRequest when no estimator has that name."""
+    """Return the estimator of a name; raises InvalidRequest for unknown names."""
     try:
         return Estimator(estimator)
     except ValueError as unknown:
@@ -96,7 +95,7 @@ def estimator_by_name(estimator: Estimator | str) -> Estimator:
 
 
 def coherence(s_xx: Reals, s_yy: Reals, s_xy: Complexes) -> Reals:
-    """|S_xy|^2 / (S_xx S_yy), 0 where a channel is dead."""
+    """|S_xy|^2 / (S_xx S_yy); 0 for a dead channel."""
     power = s_xx * s_yy
     ratio = np.divide(np.abs(s_xy) ** 2, power, out=np.zeros_like(power), where=power > 0)
     return np.asarray(np.clip(ratio, 0.0, 1.0))
@@ -120,7 +119,7 @@ def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complex
     """
     difference = s_yy - noise_ratio * s_xx
     root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
-    # Where the difference is negative the sum cancels; the conjugate form of the quadratic does not.
+    # For a negative difference the sum cancels; the conjugate form does not.
     stable = np.divide(
         4 * noise_ratio * np.abs(s_xy) ** 2,
         root - difference,
@@ -134,7 +133,7 @@ def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complex
 def least_squares(
     estimator: Estimator, s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float | None
 ) -> Complexes:
-    """h1, h2 or hv by its name.
+    """Return h1, h2 or hv by name.
 
     Raises InvalidRequest for the drive-referenced estimator, which needs a third channel, and for hv without
     its ratio.
@@ -148,12 +147,12 @@ def least_squares(
             return hv(s_xx, s_yy, s_xy, ratio)
         case _:
             raise InvalidRequest(
-                f"{estimator.value} is not made of two channels alone; use h1, h2, or hv with a noise ratio"
+                f"{estimator.value} needs a third channel; use h1, h2, or hv with a noise ratio"
             )
 
 
 def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: float) -> Reals:
-    """Relative standard deviation of the drive-referenced estimate.
+    """Return the relative standard deviation of the drive-referenced estimate.
 
     Var(H) = S_vv S_rr / (n |S_rx|^2) with the residual v = y - H x (instrumental variables; Wellstead
     1981, Automatica 17, 669-673), half of it in each of magnitude and phase.
@@ -177,7 +176,7 @@ def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: f
 
 
 def _ratio(numerator: Complexes, denominator: Complexes) -> Complexes:
-    """Divide; a line without any drive has no transmission and gives NaN."""
+    """Return the quotient; NaN for lines without drive."""
     missing = np.full_like(numerator, complex(np.nan, np.nan))
     return np.asarray(np.divide(numerator, denominator, out=missing, where=denominator != 0))
 
@@ -188,9 +187,9 @@ _ROWS = ("drive", "response", "reference")
 
 
 class FrequencyResponseSums:
-    """Takes a long record block by block and gives its transmission at any moment.
+    """Transmission of a long record that arrives in blocks, in constant memory.
 
-    Memory does not grow with the record. Blocks have the rows drive, response and, for the
+    Blocks have the rows drive, response and, for the
     drive-referenced estimator, reference.
     """
 
@@ -219,7 +218,7 @@ class FrequencyResponseSums:
         self._spectra = SegmentSpectra(self._channels, segment_samples, window=window, overlap=overlap)
 
     def add(self, block: Reals, valid: Flags | None = None) -> None:
-        """Take the next samples, shape (2 or 3, samples); see `SegmentSpectra.add` for ``valid``."""
+        """Add the next samples, shape (2 or 3, samples); see `SegmentSpectra.add` for ``valid``."""
         if block.shape[0] != self._channels:
             name, needed = self._settings.estimator.value, _ROWS[: self._channels]
             raise InvalidRequest(
@@ -228,19 +227,20 @@ class FrequencyResponseSums:
         self._spectra.add(block, valid)
 
     def frequency_response(self) -> FrequencyResponse:
-        """Return the transmission of everything added so far.
+        """Return the transmission of all samples so far.
 
-        Raises NotEnoughData when fewer than two valid segments were found: their coherence would be 1
-        whatever they hold.
+        Raises NotEnoughData for fewer than two valid segments, whose coherence would always be 1.
         """
         return self.by(self._settings.estimator, self._settings.noise_ratio)
 
     def by(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
-        """Return what another estimator makes of the same averages; errors as `transmissibility` has them."""
+        """Return another estimate from the same averages; errors as in `transmissibility`."""
         settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
-            raise InvalidRequest("drive was asked for of sums without a reference; begin them for drive")
+            raise InvalidRequest(
+                "the estimator drive needs a reference, and these sums have none; create them for drive"
+            )
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:
             raise NotEnoughData(
@@ -265,7 +265,7 @@ def transmissibility(
     valid: Flags | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
 ) -> FrequencyResponse:
-    """Estimate response y over drive x from a noise record, with bounds on every line.
+    """Estimate response y over drive x from a noise record, with bounds for every line.
 
     Parameters
     ----------
@@ -276,18 +276,18 @@ def transmissibility(
     segment_samples
         Samples per segment; a resonance needs a segment several times longer than its ring time.
     window, overlap
-        The taper, and the fraction by which neighbouring segments overlap (scipy's ``noverlap`` is
+        The window, and the overlap of segments as a fraction (scipy's ``noverlap`` is
         ``int(overlap * segment_samples)``).
     estimator
         ``"h1"``, ``"h2"``, ``"hv"`` (needs ``noise_ratio``) or ``"drive"`` (needs ``reference``).
     reference
-        A clean record of what drives both, such as the generator's voltage.
+        A clean record of the common drive, such as the generator voltage.
     noise_ratio
         Noise density of y over that of x [(unit of y / unit of x)^2].
     valid
-        Which samples may be used; segments that touch others are left out and counted.
+        Validity of the samples; segments with invalid samples are left out and counted.
     confidence
-        Probability that a pair of bounds holds the truth, one line at a time.
+        Probability that the bounds of a line contain the true value.
 
     Raises
     ------
@@ -334,7 +334,7 @@ def _check(settings: FrequencyResponseSettings) -> None:
 def frequency_response_of(
     averages: SpectralAverages, settings: FrequencyResponseSettings
 ) -> FrequencyResponse:
-    """Form the transmission of averaged products, rows drive, response and perhaps reference, with bounds."""
+    """Return the transmission with bounds from averaged products of drive, response and any reference."""
     products = averages.products
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     s_xy = products[_DRIVE, _RESPONSE]
@@ -373,18 +373,18 @@ def frequency_response_of(
 
 def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexes:
     if settings.estimator is Estimator.DRIVE:
-        # The reference is an instrument: noise on x and y averages out.
+        # The reference is an instrumental variable: noise on x and y averages out.
         return _ratio(products[_REFERENCE, _RESPONSE], products[_REFERENCE, _DRIVE])
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     return least_squares(settings.estimator, s_xx, s_yy, products[_DRIVE, _RESPONSE], settings.noise_ratio)
 
 
 def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:
-    """Return the relative change from line to line of the density P that value = (H P) / P is averaged with.
+    """Return the relative change between lines of the density P that weights the estimate, (H P) / P.
 
     The estimator weights lines by the drive and by its instrument: the reference, x for h1, y for h2, and
-    r x + H* y for hv with the noise ratio r. The instrument is compared with the reference, or with x where
-    there is none; both are assumed level.
+    r x + H* y for hv with the noise ratio r. It is compared with the reference, or with x without one; both
+    are assumed flat.
     """
     s_xx, s_yx = products[_DRIVE, _DRIVE], products[_RESPONSE, _DRIVE]
     level = products[-1, -1].real if len(products) > _REFERENCE else s_xx.real

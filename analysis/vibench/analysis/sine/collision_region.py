@@ -1,4 +1,4 @@
-"""Where in a sweep the masses collide: found from what no order of the drive explains."""
+"""Collision regions of a sweep, found from the residual that no order of the drive explains."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,40 +12,39 @@ from ..tables import Labelled
 from .sweep import SweptMotion
 
 _NOISE_FACTOR = 4.0
-"""Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
+"""Least ratio of residual to noise; the rms of hundreds of samples scatters by a few percent only."""
 _DISTORTION = 0.02
-"""Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
+"""Largest residual over order 1 of a smooth motion, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
-"""Residual over that of the specimen without contact in the same sweep, which its description may miss."""
+"""Least ratio of the residual to that of the specimen without contact in the same sweep."""
 _TOO_FAST = 0.5
-"""Residual over order 1 that collisions exceed in most intervals: ringing that may be more can hide them."""
+"""Residual over order 1 that collisions usually exceed; stronger ringing can hide them."""
 _IMPACTS = 0.1
 """Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05 where neither meets a mode."""
 _RING_CYCLES = 5_000.0
-"""After which a mode with a damping ratio of 0.02 % has faded to a five-hundredth."""
+"""Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
 _ENOUGH = 0.25
-"""Part of a run in which impacts show themselves so, where no specimen tells how it rings."""
+"""Least share of a run with such orders, if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1
-"""A tenth of order 1 unexplained is no smooth motion, whatever the quietest intervals of a sweep show."""
+"""Residual over order 1 that excludes a smooth motion in any case."""
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
-"""Residual over threshold that leaves no doubt."""
+"""Residual over threshold that is certain."""
 _VOTE_S = 1.0
-"""A collision lasts: an interval counts when most of its neighbourhood of this length agrees."""
+"""Length of the neighbourhood that votes on an interval, because collisions last."""
 _MERGE_S = 3.0
-"""Quiet stretches shorter than this do not part a region: motion between impacts may settle briefly."""
+"""Shorter quiet stretches do not split a region: motion between impacts may settle briefly."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """One end of a collision region, between two bounds."""
+    """One end of a collision region, with bounds."""
 
     frequency_hz: float
     time_s: float
     lower_hz: float
     upper_hz: float
-    """The edge lies between these: between the last interval that is clearly the one and the first
-    that is clearly the other. Ring-down after the last impact widens it."""
+    """Bounds: the nearest interval clearly without and clearly with collisions; ring-down widens them."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +54,10 @@ class CollisionRegion:
     DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
 
     start: Edge
-    """In the order of time; its frequency is the higher one in a sweep downwards."""
+    """In the order of time; the higher frequency in a downward sweep."""
     stop: Edge
     reaches_start: bool
-    """Whether the sweep began inside the region, so that ``start`` is the sweep's end and no edge."""
+    """Whether the sweep started inside the region, so that ``start`` is the start of the sweep."""
     reaches_stop: bool
 
     @property
@@ -74,38 +73,37 @@ class CollisionRegion:
 
 @dataclass(frozen=True)
 class Collisions(Labelled):
-    """All collision regions of a sweep, in the order of time, and what they were judged by."""
+    """All collision regions of a sweep in the order of time, with the residual and thresholds."""
 
     OWN_UNITS: ClassVar = {"residual_rms": "m s-1", "threshold": "m s-1", "noise_rms": "m s-1"}
 
     regions: tuple[CollisionRegion, ...]
     residual_rms: Reals
-    """Velocity that no order explains, shape (intervals,) [m/s]."""
+    """Residual velocity without all orders, shape (intervals,) [m/s]."""
     threshold: Reals
-    """What a smooth motion may leave, shape (intervals,) [m/s]."""
+    """Largest residual of a smooth motion, shape (intervals,) [m/s]."""
     is_colliding: Flags
-    """Intervals that lie in a region, shape (intervals,)."""
+    """Intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
-    """Intervals that leave more than the sensors' noise and distortion explain, shape (intervals,): what
-    rattles from a sweep's beginning to its end passes for the bench's own noise."""
+    """Intervals with a residual above the noise and distortion of the sensors, shape (intervals,). Rattling
+    during a whole sweep counts as noise of the bench."""
     too_fast_hz: tuple[tuple[float, float], ...]
-    """Ends of stretches, in the order of time, in which the specimen may ring as much as collisions would:
-    whether the masses collide there is not determined."""
+    """Ends of stretches where ringing may hide collisions, which are not determined there."""
     noise_rms: float
-    """Noise that the threshold allows for [m/s]."""
+    """Noise in the threshold [m/s]."""
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find where the motion stops being a smooth, slowly varying sine.
+    """Find where the motion is not a smooth, slowly varying sine.
 
-    Impacts break the motion: they leave velocity that no order of the drive explains. So does a fast sweep,
-    because resonances that it has passed ring on. An interval collides when this residual is above 4 times
-    the noise, above 2 % of order 1, and above twice that of the specimen without contact under the recorded
-    base motion. The noise is the larger of what the sixth difference of the samples shows and of the quietest
-    tenth of the sweep (as far as that may be smooth at all). Single intervals are outvoted by their
-    neighbourhood, and those with drop-outs of the laser are taken as their neighbours. Orders 2 and 3 above
-    a tenth of order 1, and above twice those without contact, show impacts. Where no specimen is known, they
-    must be seen, at frequencies whose double and triple the sweep has not just left.
+    Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
+    sweep. An interval counts as colliding when this residual exceeds 4 times the noise, 2 % of order 1, and
+    twice the residual of the specimen without contact under the recorded base motion. The noise is the
+    larger of two estimates: the sixth difference of the samples, and the quietest tenth of the sweep if it
+    can be smooth. Single intervals follow their neighbourhood, as do those with drop-outs of the laser.
+    Orders 2 and 3 above a tenth of order 1, and above twice those without contact, also show impacts. If no
+    specimen is known, they are required, at frequencies whose double and triple the sweep has not just
+    passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -146,10 +144,10 @@ def collisions(sweep: SweptMotion) -> Collisions:
 
 
 def _seen_impacts(sweep: SweptMotion) -> Flags:
-    """Return where order 2 or 3 shows impacts of a specimen that is not known.
+    """Return where order 2 or 3 shows impacts of an unknown specimen.
 
-    A mode that the drive has passed may still ring at the double or triple of its frequency, and what rings
-    louder than order 1 leaks into all orders.
+    A mode that the drive has passed may still ring at twice or three times its frequency; ringing above
+    order 1 leaks into all orders.
     """
     hz, time_s = sweep.frequency_hz, sweep.time_s
     least = _IMPACTS * np.maximum(np.abs(sweep.velocity.order(1.0)), sweep.velocity.residual_rms)
@@ -169,7 +167,7 @@ def _noise(sweep: SweptMotion, residual: Reals, fundamental: Reals) -> float:
 
 
 def _majority(above: Flags, votes: int) -> Flags:
-    """Ask each interval's neighbourhood; at the ends of the sweep it is one-sided."""
+    """Return the majority in each interval's neighbourhood, one-sided at the ends of the sweep."""
     total = np.concatenate(([0], np.cumsum(above)))
     place = np.arange(above.size)
     low, high = np.maximum(place - votes // 2, 0), np.minimum(place + votes // 2 + 1, above.size)
@@ -192,7 +190,7 @@ def _merge_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
-    """Move the ends of a run, which the vote blurs, to the split that misjudges the fewest intervals."""
+    """Move the ends of a run, which the vote blurs, to the split with the fewest misclassified intervals."""
     half = votes // 2 + 1
     begin = _best_split(above, max(0, first - half), min(first + half, last))
     end = (
@@ -208,7 +206,7 @@ def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int
 
 
 def _best_split(above: Flags, low: int, high: int) -> int:
-    """First interval of a region: as few flags before it and as few gaps after it as possible."""
+    """Return the first interval of a region: fewest flags before it and fewest gaps after it."""
     part = above[low : high + 1]
     before = np.concatenate(([0], np.cumsum(part)[:-1]))
     after = np.cumsum(~part[::-1])[::-1]
@@ -229,7 +227,7 @@ def _region(sweep: SweptMotion, excess: Reals, first: int, last: int) -> Collisi
 
 
 def _edge(sweep: SweptMotion, edge: int, outside: int, inside: int) -> Edge:
-    """Bounds from the middle of the nearest quiet interval to that of the nearest clearly colliding one."""
+    """Return an edge, bounded by the nearest quiet and the nearest clearly colliding interval."""
     end = sweep.frequency_hz.size - 1
     quiet_hz = float(sweep.frequency_hz[min(max(outside, 0), end)])
     clear_hz = float(sweep.frequency_hz[inside])

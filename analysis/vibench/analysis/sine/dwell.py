@@ -1,4 +1,4 @@
-"""What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
+"""Results of a dwell at one frequency: Responses I and II, spectrum, lines and noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,16 +30,16 @@ from ..tones.sine_fit import DriveLevel, drive_level, noise_lift, peaks, steady_
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
-"""What is left of a motion over the vibrometer's noise, up to which that is all of it."""
+"""Largest ratio of the residual motion to the vibrometer noise that counts as noise only."""
 _SILENT = 3.0
-"""... and over what the silence held, which is shorter than the memory of a mode."""
+"""... and to the noise in the silence, which is shorter than the ring time of a mode."""
 OVERHEARD = 20.0
-"""What is left over what was heard, up to which it may be noise all the same.
+"""Largest ratio of the residual to the noise in the silence that may still be noise.
 
-A mode that noise rings is as faint in one silence of 400 that is shorter than its memory, and a
-generator's own noise is not heard at all.
+In one short silence of 400, a mode excited by noise is as faint as that; noise of the generator is missing
+there.
 """
-BETWEEN = "what the motion holds between its lines"
+BETWEEN = "what the motion contains between its lines"
 
 
 @dataclass(frozen=True)
@@ -47,25 +47,25 @@ class Background:
     """Noise in a window of displacement."""
 
     rms_m: float
-    """Root mean square; NaN where nothing tells it from motion."""
+    """RMS; NaN if it cannot be distinguished from motion."""
     frequency_hz: float
-    """Its rms frequency: a window holds twice as many independent values as turns of it."""
+    """Its rms frequency; a window has two independent values per cycle of it."""
     source: str
-    """What tells it, or why nothing does."""
+    """Source of the estimate, or the reason for none."""
 
     @property
     def is_rest(self) -> bool:
-        """Whether it is all that does not repeat, so that what repeats is the motion."""
+        """Return whether it is everything that does not repeat, so that the motion is what repeats."""
         return self.source == BETWEEN
 
     @property
     def is_known(self) -> bool:
-        """Whether anything tells it."""
+        """Return whether it is known."""
         return bool(np.isfinite(self.rms_m))
 
 
 def silence_before(channels: Channels) -> Reals:
-    """Return the response while the check listened before anything played [m/s]; empty without a check."""
+    """Return the response during the silence of the check [m/s]; empty without a check."""
     for stretch in channels.stretches(SegmentLabel.CHECK):
         stop = stretch.start + round(CHECK_QUIET_S * channels.sample_rate_hz)
         heard: Reals = channels.read(stretch.start, min(stop, stretch.stop))[-1]
@@ -74,7 +74,7 @@ def silence_before(channels: Channels) -> Reals:
 
 
 def background_in_silence(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:
-    """Return what a silence holds in a band, as displacement; NaN where it is too short for its low end."""
+    """Return the noise of a silence in a band as displacement; NaN if it is too short for the band."""
     source = "silence before the check"
     if 2 * velocity.size < rate_hz / band_hz[0]:
         return Background(np.nan, np.nan, source)
@@ -87,30 +87,29 @@ def background_in_silence(velocity: Reals, band_hz: tuple[float, float], rate_hz
 
 
 def background_between_lines(rest: Reals, rate_hz: float) -> Background:
-    """Return what a displacement holds without all that repeats with the drive."""
+    """Return the noise of a displacement after removing everything that repeats with the drive."""
     rms_m = float(np.std(rest))
     turns = float(np.std(np.diff(rest))) * rate_hz / (2 * np.pi)
     return Background(rms_m, turns / rms_m if rms_m else 0.0, BETWEEN)
 
 
 def background_of(rest: Background, motion_m: float, sensor: Background, silent: Background) -> Background:
-    """Return how much of what does not repeat with the drive is noise, and how fast that is.
+    """Return how much of the non-repeating part is noise, and its rms frequency.
 
-    Chaos does not repeat either. What is left between the lines is noise where the vibrometer's own explains
-    it, or what was heard before anything played, or where it is so small a part that a motion with it counts
-    as periodic. Larger, it may be motion: then the silence alone tells the noise, and nothing where none was
-    recorded.
+    Chaos does not repeat either. The residual between the lines is noise if the vibrometer noise or the
+    silence before the test explains it, or if it is too small to matter for a periodic motion. Otherwise it
+    may be motion, and only the silence shows the noise; without one it is unknown.
 
     Parameters
     ----------
     rest
-        What is left between the lines.
+        The residual between the lines.
     motion_m
-        The whole motion, root mean square.
+        RMS of the whole motion.
     sensor
-        The vibrometer's noise, as if it were white.
+        Vibrometer noise, taken as white.
     silent
-        What was heard before anything played.
+        Noise in the silence before the test.
     """
     heard_m = silent.rms_m if silent.is_known else 0.0
     if rest.rms_m <= max(_EXPLAINED * sensor.rms_m, _SILENT * heard_m, SMALL * motion_m):
@@ -126,27 +125,27 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
 
 
 def louder(silent: Background, sensor: Background) -> Background:
-    """Return the louder of what was heard and what the sensor makes by itself."""
+    """Return the larger of the noise in the silence and the sensor noise."""
     return silent if silent.rms_m > sensor.rms_m else sensor
 
 
 _BLOCKS_OF_WINDOW = 10
 _LEAST_CYCLES = 4.0
-"""Least cycles of the drive in a block: its Hann window then holds no other order of interest."""
+"""Fewest drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks, which ten that scatter at random exceed once in a hundred records."""
+"""Correlation of neighbouring blocks that ten random ones exceed once in a hundred records."""
 _ONCE = 0.5
-"""Part of the variance within one turn a record: nothing tells how far such a change goes."""
+"""Share of the variance with a period of a whole record, whose further course is unknown."""
 _BEYOND = 3.0
-"""What a decay leaves, over the scatter that it shows, where a tenth of it fades within the record."""
+"""Remaining decay over the observed scatter, if a tenth of it occurs within the record."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    0 where the parts scatter at random: their standard error is enough then. NaN where a change of more than
-    0.2 % has not come to an end within the record, so that another record may show any other value.
+    0 if the parts scatter at random, because their standard error is enough then. NaN if a change of more
+    than 0.2 % is incomplete, because another record could have any value.
 
     Parameters
     ----------
@@ -158,7 +157,7 @@ def slow_change(parts: Complexes | Reals) -> float:
     power = float(np.sum(np.abs(off) ** 2))
     if count < _FEWEST_BLOCKS or power == 0.0:
         return 0.0
-    # A straight line in few parts correlates less than one in many.
+    # A straight line through few parts correlates less than through many.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
     if float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) <= min(limit, _SLOW) * power:
         return 0.0
@@ -187,15 +186,15 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
 
 
 _LOWEST_ORDER = 0.1
-"""Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
+"""High-pass for displacement relative to the drive frequency, above drift and hum."""
 _BAND_ABOVE = 0.33
-"""... and up to this part of the sample rate."""
+"""... and low-pass relative to the sample rate."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
-"""Part of the sample rate where a vibrometer shows its own noise: no mode and no impact reaches there."""
+"""Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
 _NOISE_SEGMENT = 4096
 LEAST_CLEAR = 0.2
-"""Part of a window that must lie clear of drop-outs."""
+"""Least share of a window without drop-outs."""
 _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
@@ -210,9 +209,9 @@ class Line:
     frequency_hz: float
     amplitude_m: float
     sd_amplitude_m: float
-    """Spread over tenths of the window for orders, floor of the spectrum for peaks."""
+    """Scatter over tenths of the window for orders, noise floor of the spectrum for peaks."""
     decibel: float
-    """Re the line at the drive frequency."""
+    """Level relative to the line at the drive frequency."""
 
 
 @dataclass(frozen=True)
@@ -237,22 +236,22 @@ class DwellResponse(Labelled):
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
     noise_bias_i: float
-    """Expected bias by noise; NaN where the noise is not determined."""
+    """Expected bias by noise; NaN if the noise is unknown."""
     noise_error_i: float
-    """Root mean square error that noise makes of it, the lift included; NaN likewise."""
+    """RMS error by noise, including the bias; NaN likewise."""
     noise_source: str
-    """What tells that noise, or why it is not determined."""
+    """Source of that noise, or the reason why it is unknown."""
     rest_bias_i: float
-    """The same lift, if all that does not repeat with the drive were noise; NaN where more moves."""
+    """The same bias if everything non-repeating were noise; NaN if other changes are present."""
     rest_error_i: float
     rest_displacement_m: float
-    """Root mean square of what does not repeat with the drive [m]."""
+    """RMS of the part that does not repeat with the drive [m]."""
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
-    """NaN where the response still changes and nothing tells how far."""
+    """NaN if the response still changes by an unknown amount."""
     slow_change: float
-    """Relative standard uncertainty that slow change of base or response adds to Response I; NaN likewise."""
+    """Relative standard uncertainty of Response I by slow change of base or response; NaN likewise."""
     phase_rad: float
     """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
     sd_phase_rad: float
@@ -262,19 +261,20 @@ class DwellResponse(Labelled):
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """What that is in displacement, root mean square within its band; or what was heard in silence [m]."""
+    """RMS of the same in displacement within its band, or the noise in the silence [m]."""
     displacement: ConvertedSignal
-    """x over the record [m]; its settled part holds the window."""
+    """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags
-    """Samples of the window that are far from any drop-out, shape (samples,)."""
+    """Samples of the window away from drop-outs, shape (samples,)."""
     spectrum: AmplitudeSpectrum
     """Displacement amplitudes over the window [m]."""
     lines: tuple[Line, ...]
 
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
-        """Give the same, what does not repeat taken as noise, for a motion that is not known to be irregular.
+        """Return a copy with the non-repeating part as noise, for motions not known to be irregular.
 
-        Of one that is not known to repeat either it is, up to `OVERHEARD` times what was heard.
+        If the motion is not known to repeat either, up to `OVERHEARD` times the noise in the silence
+        counts.
         """
         heard_m = self.noise_displacement_m
         if not (is_known_to_repeat or self.rest_displacement_m <= OVERHEARD * heard_m):
@@ -309,10 +309,10 @@ def dwell_response(
     Parameters
     ----------
     drive, base, response
-        Drive voltage, base acceleration [m/s2], response velocity [m/s], shape (samples,). Give more than
-        the window, if there is more: integration disturbs about a quarter of a second at each end.
+        Drive voltage, base acceleration [m/s2], response velocity [m/s], shape (samples,). Pass more than
+        the window if possible: integration disturbs about 0.25 s at each end.
     near_hz
-        Drive frequency, within 20 %; the true one is measured on the drive.
+        Drive frequency, within 20 %; the exact one is measured.
     window_s
         Length of the window, ending where the settled part of the displacement ends [s].
     towards_hz
@@ -320,11 +320,11 @@ def dwell_response(
     delay_s
         By how much the response channel lags the base channel [s].
     sensors
-        Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
+        Gain ratio of the response sensor to the base sensor at the drive frequency, without delays.
     silence
-        Response velocity before anything played, where it was recorded [m/s].
+        Response velocity in the silence before the test, if recorded [m/s].
     bridged
-        Samples at which the response is a bridge over a drop-out; empty where there is none.
+        Whether each sample of the response bridges a drop-out; empty if there is none.
     """
     displacement = converted_signal(
         response,
@@ -404,25 +404,26 @@ def _window(displacement: ConvertedSignal, window_s: float) -> slice:
 
 
 def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
-    """Return which samples no bridge reaches: what it misses decays within the slowest period kept."""
+    """Return which samples are unaffected by bridges, whose error decays within the slowest period kept."""
     return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
 
 
 def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
-    """Return which samples of the window no bridge reaches; raises UnusableData where they are too few."""
+    """Return which samples of the window are unaffected by bridges; raises UnusableData if too few."""
     if not bridged.any():
         return np.ones(window.stop - window.start, dtype=np.bool_)
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
     if np.mean(clear) < LEAST_CLEAR:
         raise UnusableData(
-            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the window is clear "
+            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the "
+            "window is clear "
             f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear
 
 
 def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -> tuple[TrackedOrders, ...]:
-    """Fit over tenths of the window, whose scatter holds all that moves, chaos included.
+    """Fit over tenths of the window, whose scatter includes all changes and chaos.
 
     A window that is too short for ten parts is cut into fewer.
     """
@@ -434,7 +435,7 @@ def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -
 def _slow_changes(
     base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
 ) -> tuple[float, float]:
-    """Return what slow change of the base, and of the response over it, adds over the whole record."""
+    """Return the uncertainties by slow change of the base and of the response over it."""
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (
@@ -444,7 +445,7 @@ def _slow_changes(
 
 
 def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float, Background]:
-    """Density of the velocity's noise, where nothing else reaches, and what it is in displacement."""
+    """Return the velocity noise density, from a band with noise only, and its rms in displacement."""
     rate = displacement.sample_rate_hz
     density = spectral_density(response, rate, segment_samples=min(_NOISE_SEGMENT, response.size // 2))
     quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)

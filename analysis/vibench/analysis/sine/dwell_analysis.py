@@ -23,32 +23,30 @@ from ..tables import Labelled
 from ..tones.sine_fit import fit_sine
 from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
-# How the motion of a dwell repeats: its points at the drive's phase, and the verdict on them.
-#
-# The motion once per drive period: Poincare points, and the orbit they lie on.
+# Repetition of the motion of a dwell: Poincaré points and their verdict.
 
 _LOWEST_ORDER = 0.1
-"""Both signals are kept down to this part of the drive frequency."""
+"""High-pass for both signals relative to the drive frequency."""
 BAND_ABOVE = 0.25
-"""... and up to this part of the sample rate, whose cosine edge ends within what interpolation trusts."""
+"""... and low-pass relative to the sample rate; its edge ends within the band of the interpolation."""
 
 
 _CLEAR_MOTION = 0.8
-"""Part of a dwell that must lie clear of drop-outs where its motion does not repeat."""
+"""Least share of a dwell without drop-outs if its motion does not repeat."""
 
 BURST = 15.0
-"""Median deviations by which the largest of many maxima of noise does not lie above their median."""
+"""Median deviations above the median that the largest of many noise maxima stays below."""
 _LEAST_RISE = 0.01
-"""Part of its usual maximum by which |x| rises in a burst."""
+"""Least relative rise of |x| above its usual maximum in a burst."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """Displacement and velocity at one phase of every drive period, and between."""
+    """Displacement and velocity at one phase of every drive period, with the orbit."""
 
     drive_hz: float
     phase_rad: float
-    """Drive phase at which the points were taken; the drive is a cosine."""
+    """Drive phase of the points; the drive is a cosine."""
     displacement_m: Reals
     velocity_m_per_s: Reals
     """Shape (periods,)."""
@@ -58,7 +56,7 @@ class Section:
     time_s: Reals
     """Time of the points, from the first sample of the record; shape (periods,)."""
     sd_timing_s: float
-    """How far the phase clock may be off at the ends of the record."""
+    """Bound on the phase error at the ends of the record."""
 
 
 def stroboscope(
@@ -70,10 +68,10 @@ def stroboscope(
     phase_rad: float = 0.0,
     delay_s: float = 0.0,
 ) -> Section:
-    """Sample the motion at one phase of the recorded drive, between its samples.
+    """Interpolate the motion at one phase of the recorded drive.
 
-    A nominal drive frequency would not do: 50 ppm between the clocks slide by half a period of 100 Hz
-    in 100 s and smear the points.
+    The nominal drive frequency is not accurate enough: 50 ppm between the clocks shift the phase by half a
+    period of 100 Hz in 100 s.
 
     Parameters
     ----------
@@ -82,7 +80,7 @@ def stroboscope(
     near_hz
         Drive frequency, within 20 %.
     phase_rad
-        Where in the period to look.
+        Phase of the points.
     delay_s
         By how much the response channel lags the drive channel [s].
     """
@@ -126,14 +124,14 @@ def stroboscope(
 
 @dataclass(frozen=True, eq=False)
 class DwellMotion(Labelled):
-    """A dwell once a drive period."""
+    """Poincaré points of a dwell, with the verdict."""
 
     section: Section
     verdict: MotionVerdict
 
 
 def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
-    """Sample a dwell at the phase of its recorded drive and judge how it repeats.
+    """Take the Poincaré points of a dwell and classify its motion.
 
     Raises UnusableData when samples were lost inside the dwell.
     """
@@ -143,12 +141,12 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     bridged = channels.bridged(stretch.start, stretch.stop)
     is_clear = clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz)
     clear = np.mean(is_clear)
-    # Few points of a short burst look like noise, and its maximum may lie outside of the window.
+    # The few points of a short burst look like noise, and its maximum may lie outside the window.
     rise = _largest_rise(response, is_clear, verdict.evidence.periods)
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
         why = f"|x| rises {100 * rise:.2g} % above its usual maximum in a burst; find its cause, dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
-    # Bridges make no motion repeat, but one that repeats irregular.
+    # Bridges can make a repeating motion look irregular, not the reverse.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
             f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make it "
@@ -159,7 +157,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
 
 
 def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> float:
-    """Return the rise of |x| over the median of its maxima, relative to it; 0 where scatter explains it."""
+    """Return the relative rise of |x| over the median of its maxima; 0 if scatter explains it."""
     motion = response.displacement
     size = np.where(is_clear, np.abs(motion.samples), 0.0)[motion.edge_samples : -motion.edge_samples]
     block = round(LONGEST_PERIOD * motion.sample_rate_hz / response.drive.frequency_hz)
@@ -174,17 +172,17 @@ def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> flo
 
 @dataclass(frozen=True)
 class IrregularMotion:
-    """Motion of a dwell that does not repeat, from the dwell's first clear period on."""
+    """Non-repeating motion of a dwell, from its first undisturbed period."""
 
     start_s: float
     stop_s: float
-    """End, from the dwell's first sample."""
+    """End, from the first sample of the dwell."""
     ended: bool
-    """Whether a motion that repeats followed it."""
+    """Whether a repeating motion followed."""
 
 
 def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
-    """Return how long the motion of a dwell did not repeat; None where all of it does."""
+    """Return how long the motion of a dwell did not repeat; None if all of it repeats."""
     section = _section(channels, response)
     points = _points(section, response, channels.sample_rate_hz)
     begin = begin_of_last_motion(points)
@@ -209,7 +207,7 @@ def _section(channels: Channels, response: DwellResponse) -> Section:
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:
-    """Points over the size of the orbit, and the noise in the same measure."""
+    """Points and noise relative to the size of the orbit."""
     sizes = np.array(
         [
             np.sqrt(2 * np.mean(section.orbit_displacement_m**2)),
@@ -237,15 +235,15 @@ class TerminalLevel:
     low_hz: float
     high_hz: float
     peak_hz: float
-    """Where the displacement's density is largest in the band; a rising or falling edge puts it at an end."""
+    """Frequency of the largest displacement density in the band; possibly an end of the band."""
     rms_m: float
     relative_sd: float
     decibel: float
-    """Band's rms re the rms of the line at the drive frequency."""
+    """RMS of the band relative to that of the line at the drive frequency."""
 
 
 def terminal_levels(response: DwellResponse, towards_hz: tuple[float, ...]) -> tuple[TerminalLevel, ...]:
-    """Measure the bands around the given frequencies; one that holds the drive's own line is left out."""
+    """Measure the bands around the given frequencies; bands with the drive's line are left out."""
     motion = response.displacement
     window = round(response.window_s * motion.sample_rate_hz)
     segment = min(round(_SEGMENT_S * motion.sample_rate_hz), window // 4)
@@ -278,7 +276,7 @@ DwellPlan = Dwell | HeldDwell
 WINDOW_S = 5.0
 """The paper's window: the last 5 s of a dwell."""
 _DWELL_EDGE_PERIODS = 121
-"""Drive periods that integration disturbs, both ends together."""
+"""Drive periods that integration disturbs, at both ends together."""
 _SHORTEST_WINDOW_PERIODS = 50
 _TIME_BINS = 1200
 
@@ -293,22 +291,22 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""
     terminal: tuple[TerminalLevel, ...]
-    """How much of the motion went to the bands of the bound modes."""
+    """Levels in the bands of the bound modes."""
     motion: DwellMotion
-    """How it repeats."""
+    """Poincaré points and verdict."""
     irregular: IrregularMotion | None
-    """How long it did not repeat; None where all of it does."""
+    """How long it did not repeat; None if all of it repeats."""
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
-    """Frequencies of the specimen with m1 stuck to m2: where strong collisions move the motion to."""
+    """Return the frequencies of the specimen with m1 bound to m2, which strong collisions excite."""
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
 
 
 def measured_dwell(
     channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...], longest_s: float = WINDOW_S
 ) -> DwellResponse:
-    """Analyse the last ``longest_s`` of a dwell, or what there is of them."""
+    """Analyse the last ``longest_s`` of a dwell, or all of a shorter one."""
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, base, response = read_whole(channels, stretch)
     rate = channels.sample_rate_hz
@@ -334,20 +332,20 @@ def measured_dwell(
 
 
 def settled_envelope(response: DwellResponse) -> Envelope:
-    """Return x over the dwell as a plot shows it."""
+    """Return the envelope of x over the dwell, for plots."""
     motion = response.displacement
     start_s = motion.edge_samples / motion.sample_rate_hz
     return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)
 
 
 _HIGHEST_ORDER = 2.4
-"""A spectrum is shown up to this multiple of the drive frequency."""
+"""Upper end of a shown spectrum relative to the drive frequency."""
 COLUMN_HZ = 1.0
-"""A spectrum is drawn as its largest line in each column of this width: a figure has no more pixels."""
+"""Width of a column [Hz], drawn as its largest line: a figure has no more pixels."""
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Middle [Hz] and largest amplitude over A0 of each column of the spectrum."""
+    """Return centre [Hz] and largest amplitude over A0 of each column of the spectrum."""
     spectrum = response.spectrum
     width = max(1, round(COLUMN_HZ / spectrum.spacing_hz))
     first = max(1, round(5.0 / spectrum.spacing_hz))

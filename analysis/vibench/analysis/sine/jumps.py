@@ -1,4 +1,4 @@
-"""Where a response jumps along a sweep, up or down, and how well its frequency is known."""
+"""Jumps of a response along a sweep, with bounds on their frequency."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,14 +14,14 @@ from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
 
 _SIDE = 12
-"""Intervals on either side that a straight line is laid through."""
+"""Intervals on each side for a straight line."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""A step of this many standard errors stands out among thousands of candidates, with rough errors too."""
+"""Standard errors of a significant step among thousands of candidates, even with rough errors."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
-"""Intervals that the motion may take from one state to the other; they belong to neither side."""
+"""Intervals of the transition, which belong to neither side."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -34,17 +34,17 @@ class Jump:
     frequency_hz: float
     lower_hz: float
     upper_hz: float
-    """It lies between these at 95 %, the neighbouring intervals included."""
+    """95 % bounds, including the neighbouring intervals."""
     time_s: float
     before: float
     after: float
-    """Response on either side of it, in the order of time."""
+    """Response before and after, in the order of time."""
     standard_errors: float
-    """Size of the step over its uncertainty."""
+    """Step over its uncertainty."""
 
     @property
     def decibel(self) -> float:
-        """Size of the step; positive where the response grows in time."""
+        """Size of the step; positive if the response grows with time."""
         return float(20 * np.log10(self.after / self.before))
 
 
@@ -53,9 +53,9 @@ def jumps(
 ) -> tuple[Jump, ...]:
     """Find the jumps of a response against time.
 
-    At each interval a straight line is laid through the logarithm of the response before, and another
-    through that after; a jump is where the two miss each other by at least 1.5 dB and 8 standard errors, more
-    than at any place nearby. The place of a jump is the one with the largest likelihood, its bounds those of
+    At each interval straight lines are fitted to the logarithm of the response before and after. A jump is
+    a local maximum of their difference of at least 1.5 dB and 8 standard errors. Its place maximises the
+    likelihood; its bounds come from
     the likelihood ratio.
 
     Parameters
@@ -63,8 +63,8 @@ def jumps(
     time_s, frequency_hz, response
         In the order of time, shape (intervals,); the response positive.
     smooth
-        Where the motion is smooth: a jump has one such side at least. A chaotic response leaps about
-        without jumping from one state to another. All, when absent.
+        Intervals with smooth motion, by default all. At least one side of a jump must be smooth, because a
+        chaotic response fluctuates without jumps.
     """
     if not time_s.shape == frequency_hz.shape == response.shape:
         raise InvalidRequest(
@@ -89,7 +89,7 @@ def jumps(
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Step at each boundary before interval i, between lines through both sides, and its standard error."""
+    """Return the step before each interval, between lines on both sides, and its standard error."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
@@ -110,7 +110,7 @@ def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
 
 
 def _peaks(size: Reals) -> list[int]:
-    """Largest place of each neighbourhood in which a step was seen."""
+    """Return the largest step of each neighbourhood."""
     left = size.copy()
     found = []
     while left.max(initial=0.0) > 0.0:
@@ -121,7 +121,7 @@ def _peaks(size: Reals) -> list[int]:
 
 
 def _likely(logarithm: Reals) -> tuple[int, int, int]:
-    """Lowest, best and highest boundary of one step in a short row, by the likelihood of two levels."""
+    """Return the lowest, best and highest boundary of one step, by the likelihood of two levels."""
     count = logarithm.size
     misfit = np.full(count, np.inf)
     for place in range(2, count - 1):
@@ -136,7 +136,7 @@ def _likely(logarithm: Reals) -> tuple[int, int, int]:
 def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, logarithm: Reals) -> Jump:
     best = places[1]
     between = [0.5 * float(frequency_hz[each - 1] + frequency_hz[each]) for each in places]
-    # The step lies somewhere within the interval before or after its boundary.
+    # The step lies within the interval before or after its boundary.
     half = 0.5 * abs(float(frequency_hz[best] - frequency_hz[best - 1]))
     size, error = _steps(logarithm[max(0, best - 2 * _SIDE) : best + 2 * _SIDE])
     at = best - max(0, best - 2 * _SIDE)
@@ -154,32 +154,32 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
 
 
 JUMP_FACTOR = 2.0
-"""Response II that changes by more than this between two levels has jumped: a linear one does not change."""
+"""Change of Response II between two levels that counts as a jump; a linear one does not change."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may hold two motions; NaN is above it too."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN too."""
 
 
 @dataclass(frozen=True)
 class LevelJump:
-    """Response II changed by a factor between two levels that follow each other."""
+    """Jump of Response II between two consecutive levels."""
 
     direction: str
-    """``"up"`` or ``"down"``: which way the level went."""
+    """``"up"`` or ``"down"``: direction of the level."""
     before_vpp: float
     after_vpp: float
     before_m: float
-    """Amplitude of the base there [m]."""
+    """Base amplitude there [m]."""
     after_m: float
     factor: float
     """Response II after over before."""
 
 
 def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple[LevelJump, ...]:
-    """Find the jumps of a stepped level, in the order of time; none is looked for across a turning point.
+    """Find the jumps of a stepped level, in the order of time, but not across a turning point.
 
-    A step during which the motion jumped shows a mean of both: the jump is that from the step before it to
-    the one after it.
+    A step during which the motion jumps shows a mean of both, so the steps before and after it are
+    compared.
     """
     steps = list(
         zip(
@@ -203,9 +203,9 @@ def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple
 
 
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
-    """Return how far the level of the jump up lies above that of the fall back, at least and at most [V].
+    """Return the least and largest difference between the levels of the jumps up and down [V].
 
-    None when the motion did not jump up going up and fall going down.
+    None without both jumps.
     """
     rises = [each for each in jumps if each.direction == "up" and each.factor > 1]
     falls = [each for each in jumps if each.direction == "down" and each.factor < 1]
@@ -217,7 +217,7 @@ def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
 
 @dataclass(frozen=True, eq=False)
 class SteppedLevelAnalysis(SteppedSineAnalysis):
-    """A stepped level, and where its response jumps."""
+    """Results of a stepped level, with the jumps of its response."""
 
     DOCUMENT: ClassVar = (
         f"{SteppedSineAnalysis.DOCUMENT} amplitude_vpp=response.amplitude_vpp jumps hysteresis_vpp"
@@ -225,38 +225,38 @@ class SteppedLevelAnalysis(SteppedSineAnalysis):
 
     @property
     def jumps(self) -> tuple[LevelJump, ...]:
-        """In the order of time."""
+        """Jumps in the order of time."""
         return level_jumps(self.response)
 
     @property
     def hysteresis_vpp(self) -> tuple[float, float] | None:
-        """How far the jump up lies above the fall back [V]."""
+        """Bounds on the difference between the levels of the jumps up and down [V]."""
         return hysteresis_vpp(self.jumps)
 
 
 _POINTS = 1000
 _APART_DB = 1.5
 _SMOOTHED_POINTS = 21
-"""Two per cent of the band: chaos scatters from point to point, and that is no hysteresis."""
+"""Averaging width relative to the band: the scatter of chaos is no hysteresis."""
 _PER_BEL_DB = 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class Hysteresis(Labelled):
-    """What depends on the direction of a sweep; arrays of shape (points,)."""
+    """Dependence on the direction of a sweep; arrays of shape (points,)."""
 
     frequency_hz: Reals
     up: Reals
     down: Reals
     """Response II."""
     differs: Flags
-    """Where the two lie more than 1.5 dB apart on average over two per cent of the band."""
+    """Where both differ by more than 1.5 dB, averaged over 2 % of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]
-    """Each jump upwards with the nearest one downwards of the opposite step: (up sweep, down sweep)."""
+    """Pairs of opposite jumps: (up sweep, nearest in the down sweep)."""
 
     @property
     def widths_hz(self) -> tuple[tuple[float, float, float], ...]:
-        """Width of each pair, with its lower and upper bound: jump of the up sweep minus that of the down."""
+        """Width of each pair with bounds: frequency in the up sweep minus that in the down sweep."""
         return tuple(
             (
                 up.frequency_hz - down.frequency_hz,
@@ -270,16 +270,16 @@ class Hysteresis(Labelled):
 def hysteresis(
     up: SweepResponse, down: SweepResponse, up_jumps: tuple[Jump, ...], down_jumps: tuple[Jump, ...]
 ) -> Hysteresis:
-    """Compare an up with a down sweep where both have been.
+    """Compare an up sweep with a down sweep in their common range.
 
-    Raises InvalidRequest when the directions are not up and down, or the two share no frequency.
+    Raises InvalidRequest when the directions are not up and down, or there is no common range.
     """
     if not (up.sweep_rate_hz_per_s > 0 > down.sweep_rate_hz_per_s):
         raise InvalidRequest("hysteresis needs an up sweep and a down sweep, in this order")
     low = max(float(up.frequency_hz.min()), float(down.frequency_hz.min()))
     high = min(float(up.frequency_hz.max()), float(down.frequency_hz.max()))
     if low >= high:
-        raise InvalidRequest("the two sweeps share no frequency; compare sweeps of the same range")
+        raise InvalidRequest("the two sweeps have no frequency in common; compare sweeps of the same range")
     frequency_hz = np.linspace(low, high, _POINTS)
     curves = [_response_near(each, frequency_hz) for each in (up, down)]
     apart_db = _PER_BEL_DB * np.log10(curves[0] / curves[1])
@@ -294,7 +294,7 @@ def _response_near(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
 
 
 def _pairs(up: tuple[Jump, ...], down: tuple[Jump, ...]) -> tuple[tuple[Jump, Jump], ...]:
-    """Pair jumps of opposite sign: what steps up in time going up steps down in time coming back."""
+    """Pair jumps of opposite sign: a step up in the up sweep is a step down in the down sweep."""
     pairs, free = [], list(down)
     for jump in up:
         opposite = [each for each in free if each.decibel * jump.decibel < 0]

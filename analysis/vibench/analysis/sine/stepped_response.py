@@ -38,7 +38,7 @@ from ..tables import Labelled, columns, plus_minus
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
-"""What is recorded frequency by frequency, or level by level."""
+"""Plans that are recorded by frequency or by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end."""
 _OF_A_STEP = (
@@ -50,7 +50,7 @@ _OF_A_STEP = (
 
 @dataclass(frozen=True)
 class SteppedResponse(Labelled):
-    """One value for each step, in the order played; arrays of shape (steps,)."""
+    """One value per step in the order of playing; arrays of shape (steps,)."""
 
     DOCUMENT: ClassVar = (
         "frequency_hz direction drive_amplitude_m response_i noise_bias_i noise_error_i response_ii "
@@ -62,44 +62,43 @@ class SteppedResponse(Labelled):
     direction: tuple[str, ...]
     """``"up"`` or ``"down"``."""
     amplitude_vpp: Reals
-    """Setting of the generator [V]; NaN where it was not a plan's but feedback's."""
+    """Setting of the generator [V]; NaN if feedback set it."""
     drive_amplitude_m: Reals
     sd_drive_amplitude_m: Reals
     response_i: Reals
     noise_bias_i: Reals
     noise_error_i: Reals
-    """Root mean square error that noise makes of Response I; NaN, as its lift is, where not determined."""
+    """RMS error of Response I by noise; NaN if unknown, like its bias."""
     response_ii: Reals
     sd_response_ii: Reals
-    """NaN where the response still changed during the step."""
+    """NaN if the response still changed during the step."""
     slow_change: Reals
-    """Relative standard uncertainty that slow change adds to Response I; NaN likewise."""
+    """Relative standard uncertainty of Response I by slow change; NaN likewise."""
     phase_rad: Reals
     left_out: int
-    """Steps that were cut short, or lost samples or light."""
+    """Number of steps that were incomplete, lost samples or had drop-outs."""
 
 
 def stepped_response(
     channels: Channels, plan: Steps, label: SegmentLabel, setting_vpp: Callable[[Steps, Stretch], float]
 ) -> SteppedResponse:
-    """Analyse every whole step as a dwell of its own.
+    """Analyse every complete step as a dwell.
 
-    Raises NotEnoughData when no step was recorded whole.
+    Raises NotEnoughData when no step is complete.
 
     Parameters
     ----------
     label
-        Of the segments that the steps were recorded as.
+        Label of the segments of the steps.
     setting_vpp
-        Tells the generator's setting during a step [V].
+        Returns the setting of the generator during a step [V].
     """
     stretches = channels.stretches(label)
     whole = [each for each in stretches if each.is_complete]
     pairs = [(each, found) for each in whole if (found := _step(channels, each, plan)) is not None]
     if not pairs:
         raise NotEnoughData(
-            f"none of the steps of {plan.record_s:g} s was recorded whole, so there is no response to show; "
-            "measure again"
+            f"none of the steps of {plan.record_s:g} s is complete, so there is no result; measure again"
         )
     steps = [columns(found, _OF_A_STEP) for _, found in pairs]
     return SteppedResponse(
@@ -114,12 +113,12 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     data = channels.read(stretch.start, stretch.stop)
     if np.isnan(data).any():
         return None
-    # Where the record is continued, a drift of the sensor would be a jump, which integration makes a swing.
+    # Sensor drift would be a jump where the record is continued, and integration amplifies it.
     data[-1] = scipy.signal.detrend(data[-1])
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
-    # What came before and after was at another frequency or level, and integration would bring it in.
+    # Before and after, frequency or level differed; integration would mix them in.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     bridged = channels.bridged(stretch.start, stretch.stop)[places]
@@ -140,9 +139,9 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 
 
 def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
-    """Return the samples with which to go on at both ends, shape (samples + 2 edge,).
+    """Return the indices that continue a record at both ends, shape (samples + 2 edge,).
 
-    The last row, the response, tells how far: whole drive periods, those after which it repeats best.
+    It is continued by whole drive periods, after which the response (last row) repeats best.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
@@ -153,7 +152,7 @@ def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Inte
 
 
 def _repeats_after(motion: Reals, period_samples: float) -> int:
-    """Find after how many samples the first period of a motion comes again most nearly."""
+    """Return the number of samples after which the first period of a motion repeats best."""
     period = round(period_samples)
     shifts = np.rint(np.arange(1.0, motion.size / period_samples - 1.0) * period_samples).astype(int)
     apart = [np.sum((motion[shift : shift + period] - motion[:period]) ** 2) for shift in shifts]
@@ -161,7 +160,7 @@ def _repeats_after(motion: Reals, period_samples: float) -> int:
 
 
 def settled_check(response: SteppedResponse) -> Check:
-    """Warn of steps whose response still changed while they were recorded."""
+    """Warn of steps whose response still changed during the record."""
     changing_hz = response.frequency_hz[np.isnan(response.slow_change)]
     if not changing_hz.size:
         return Check("Steps settled", Verdict.PASSED, "no response changed steadily during its step")
@@ -179,9 +178,9 @@ class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
     DOCUMENT: ClassVar = "*response"
 
 
-# A mode's resonance at every level at which it was tracked: its backbone.
+# Backbone: the resonance of a mode at every tracked level.
 #
-# What feedback found, in sentences: jumps, motions that do not repeat, resonances, missed levels.
+# Sentences on the findings of feedback: jumps, irregular motions, resonances, missed levels.
 
 
 @dataclass(frozen=True)
@@ -194,7 +193,7 @@ class NotedJump:
 
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Return the jumps that were bracketed as closely as the plan asks."""
+    """Return the jumps that were bracketed as closely as requested."""
     return tuple(
         NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
         for each in notes
@@ -203,7 +202,7 @@ def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
 
 
 def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
-    """Yield what feedback found; nothing for a measurement without it."""
+    """Yield sentences on the findings of feedback; none without feedback."""
     jumps = noted_jumps(notes)
     if jumps:
         said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
@@ -214,7 +213,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
 
 
 def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
-    """Count recorded motions by what they do; a plain period of one is not worth a word."""
+    """Return a sentence on the kinds of recorded motions; period one is not mentioned."""
     count = Counter((each.motion, each.period) for each in steps)
     kinds = [
         f"period {period}: {count[Steadiness.PERIODIC, period]}"
@@ -228,24 +227,24 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
         yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
     outside = sum(each.level is Held.OUTSIDE for each in steps)
     if outside:
-        yield f"The base was off its level in {outside} of them."
+        yield f"The base level was out of tolerance in {outside} of them."
 
 
 def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
-    """Yield how near the base came to the spectrum that was asked for, over what was kept."""
+    """Yield sentences on the error of the base spectrum."""
     if not kept:
         return
     worst = max(kept, key=lambda each: abs(each.worst_db))
     rms = sqrt(fmean(each.base_rms**2 for each in kept))
     asked = sqrt(fmean(each.asked_rms**2 for each in kept))
     yield (
-        f"The base moved with {rms:.3g} m/s² rms, asked for were {asked:.3g}; "
+        f"The base moved with {rms:.3g} m/s² rms, requested was {asked:.3g}; "
         f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance, the worst "
         f"{worst.worst_db:+.1f} dB at {worst.worst_hz:g} Hz; kurtosis "
         f"{fmean(each.kurtosis for each in kept):.2f}."
     )
     if (notched := fmean(each.notched for each in kept)) > 0:
-        yield f"{notched:.1%} of the lines were lowered for the response's sake."
+        yield f"{notched:.1%} of the lines were lowered to limit the response."
 
 
 def _resonance(note: ResonanceNote) -> str:
@@ -274,24 +273,24 @@ def _resonance(note: ResonanceNote) -> str:
 
 @dataclass(frozen=True)
 class TrackedResonance:
-    """What was found of a mode at one level of the base."""
+    """Resonance of a mode at one level of the base."""
 
     number: int
-    """Number of the level, in the order played, from 0."""
+    """Number of the level in the order of playing, from 0."""
     base_m_per_s2: float
-    """Fundamental of the base's acceleration, peak."""
+    """Peak of the fundamental of the base acceleration."""
     frequency_hz: float
-    """Where m0 lags the base by the phase asked for."""
+    """Frequency at which m0 lags the base by the requested phase."""
     u_frequency_hz: float
-    """Standard uncertainty, with that of the sensors' phase, which all levels share."""
+    """Standard uncertainty, including the sensors' phase, which is common to all levels."""
     amplitude_m: float
-    """Amplitude of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
+    """Amplitude of m0 at the drive frequency, or at the resonant harmonic or subharmonic."""
     harmonic: int
     """Harmonic of the drive, at which m0 resonates."""
     subharmonic: int
     """Drives in a period of m0."""
     mode_hz: float | None
-    """Natural frequency, fitted to both flanks; None where they do not tell it."""
+    """Natural frequency, fitted to both flanks; None if undetermined."""
     u_mode_hz: float | None
     damping_ratio: float | None
 
@@ -302,12 +301,12 @@ class TrackedResonance:
 
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
-    """Return the levels at which the resonance was found, weakest first; where it was lost is left out."""
+    """Return the levels at which the resonance was found, weakest first."""
     return tuple(sorted(_found_levels(notes), key=lambda each: each.base_m_per_s2))
 
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
-    """Return the levels [m/s²] that were asked for and at which no resonance was found."""
+    """Return the requested levels [m/s²] at which no resonance was found."""
     lost = (each for each in notes if isinstance(each, ResonanceNote) and each.frequency_hz is None)
     return tuple(sorted(each.asked_m_per_s2 for each in lost))
 
@@ -332,7 +331,7 @@ def _found_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
 
 
 def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
-    """Return whether a mode softens or hardens from its weakest level to its strongest."""
+    """Return a sentence on softening or hardening from the weakest to the strongest level."""
     if len(levels) < 2:
         return ""
     first, last = levels[0], levels[-1]

@@ -1,6 +1,6 @@
-"""What a sine sweep shows: envelope, responses and phase against the frequency really played.
+"""Results of a sine sweep: envelope, responses and phase against the measured drive frequency.
 
-The phase of a recorded sine drive: the clock that a sweep and a dwell are analysed by.
+The phase of the recorded drive is the time base of sweeps and dwells.
 """
 
 from collections.abc import Callable
@@ -30,12 +30,12 @@ from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
-"""Kept around the drive's band, as a fraction of its ends; the outer half is the filter's edge."""
+"""Margin around the drive's band relative to its ends; the outer half is the filter's edge."""
 _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
 _LEAST_SHARE = 0.5
-"""Part of the channel's power that the drive's band must hold to be a drive."""
+"""Least share of the channel's power within the drive's band."""
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class DrivePhase:
 
     phase_rad: Reals
     frequency_hz: Reals
-    """Instantaneous, by the converter's clock."""
+    """Instantaneous frequency by the converter clock."""
 
 
 def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: float) -> DrivePhase:
     """Measure the phase of a sine drive, steady or sweeping, from its analytic signal.
 
-    Nothing nominal enters: 10 ppm between the clocks of generator and converter would turn the phase
+    No nominal value is used: 10 ppm between the clocks of generator and converter would shift the phase
     of a nominal 150 to 350 Hz sweep by 250 degrees at its end.
 
     Parameters
@@ -58,7 +58,7 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
     drive
         The recorded generator voltage, shape (samples,).
     low_hz, high_hz
-        Between these the drive frequency stays; components well outside are ignored.
+        Range of the drive frequency; components well outside are ignored.
     """
     if drive.size < _LEAST_CYCLES * sample_rate_hz / low_hz:
         raise NotEnoughData(
@@ -85,14 +85,14 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
 
 
 def _band(frequency_hz: Reals, low_hz: float, high_hz: float) -> Reals:
-    """Positive frequencies around the drive, with cosine edges: their ringing dies within a few cycles."""
+    """Band of positive frequencies around the drive; cosine edges limit the ringing to a few cycles."""
     rise = (frequency_hz / low_hz - (1 - _MARGIN)) / (_MARGIN / 2)
     fall = ((1 + _MARGIN) - frequency_hz / high_hz) / (_MARGIN / 2)
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(np.minimum(rise, fall), 0.0, 1.0)))
 
 
 def _continue_phase(phase: Reals, edge: int) -> Reals:
-    """Replace the ends, where the filter misses past or future, by the parabola of what lies next to them."""
+    """Replace the disturbed ends by a parabola fitted to their neighbours."""
     if edge == 0:
         return phase
     place = np.arange(3 * edge, dtype=np.float64) / edge - 2
@@ -105,31 +105,31 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 
 
 _SAMPLES_PER_CYCLE = 24
-"""At the highest drive frequency: a maximum read from samples is then at most 0.9 % low in one cycle."""
+"""Least samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
 _BAND_BELOW = 0.25
-"""Displacement is kept down to this part of the lowest drive frequency: half orders pass, drift does not."""
+"""High-pass for displacement relative to the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
-"""... and up to this part of the decimated rate, where the decimation is still flat at the band's edge."""
+"""... and low-pass relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
-"""Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
+"""Upper limit of the linear motion relative to the highest drive frequency, above order 5."""
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Difference of the largest Response II from that of the linear run, above which it is another motion."""
+"""Relative difference of the largest Response II from the linear run, above which the motion differs."""
 _LINES = 1 << 15
-"""At which linear motion is computed together."""
+"""Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge after which a bridge of three times the motion's size is below 2 %."""
+"""Periods of the band's lower edge after which a bridge of three times the motion errs by 2 %."""
 _ROOM = 1.1
-"""Intervals are longer than orders need by this much: the first one may begin a little below the band."""
+"""Relative margin of the interval length, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
-"""Sixth difference, of unit gain for white noise: it removes what is smooth and leaves the noise."""
+"""Sixth difference with unit gain for white noise, which removes the smooth motion."""
 
 
 @dataclass(frozen=True)
 class SweptMotion(Labelled):
-    """What draws of a sweep are compared by; arrays of shape (intervals,) unless said otherwise."""
+    """Quantities to compare draws of a sweep; arrays of shape (intervals,) unless stated otherwise."""
 
     OWN_UNITS: ClassVar = {
         "upper": "m s-1",
@@ -145,9 +145,9 @@ class SweptMotion(Labelled):
     )
 
     time_s: Reals
-    """Middle of each interval, from the first sample of the sweep."""
+    """Centre of each interval, from the first sample of the sweep."""
     frequency_hz: Reals
-    """Instantaneous drive frequency there, measured on the recorded drive."""
+    """Instantaneous frequency of the recorded drive there."""
     upper: Reals
     lower: Reals
     """Largest and smallest value of the recorded response at the full sample rate [m/s]."""
@@ -159,7 +159,7 @@ class SweptMotion(Labelled):
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
-    """Largest |x| over the drive amplitude, clear of drop-outs; NaN where they leave too little."""
+    """Largest |x| over the drive amplitude without drop-outs; NaN if they leave too little."""
     response_ii: Reals
     """Amplitude of x at the drive frequency over the drive amplitude."""
     sd_response_ii: Reals
@@ -170,16 +170,16 @@ class SweptMotion(Labelled):
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
-    """Residual over order 1 of the specimen without contact in this sweep, NaN where no specimen is known."""
+    """Residual over order 1 of the specimen without contact in this sweep; NaN without a specimen."""
     linear_impacts: Reals
-    """Orders 2 and 3 over order 1 of the same: a mode that rings on while the drive passes half of it."""
+    """Orders 2 and 3 over order 1 of the same, from modes that still ring at twice the drive."""
     steady_over_swept: float
-    """Largest Response II of the specimen without contact, under steady sines over in this sweep; NaN where
-    the sweep's own is another one, as where the specimen still rings of an earlier motion."""
+    """Ratio of the largest Response II without contact under steady sines to that in this sweep; NaN if the
+    measured one differs, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
-        """Return the place of the largest value among the intervals without a drop-out."""
+        """Return the index of the largest value among the intervals without a drop-out."""
         return int(np.nanargmax(np.where(self.is_clear, response, np.nan)))
 
     @property
@@ -201,14 +201,14 @@ class SweptMotion(Labelled):
 
 @dataclass(frozen=True)
 class SweepResponse(SweptMotion):
-    """A measured sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+    """A measured sweep; arrays of shape (intervals,) unless stated otherwise."""
 
     OWN_UNITS: ClassVar = {**SweptMotion.OWN_UNITS, "harmonics": "m"}
 
     harmonics: TrackedOrders
-    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
+    """Displacement at orders 1/3 to 5 [m] in longer intervals at `harmonics_hz`."""
     harmonics_hz: Reals
-    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
+    """Drive frequency at the centre of each longer interval, shape (longer intervals,)."""
     noise_bias_i: Reals
     noise_error_i: Reals
     """Expected bias of Response I by noise."""
@@ -219,18 +219,18 @@ Transmission = Callable[[Reals], Complexes]
 
 
 class SweepSums:
-    """Takes a sweep block by block; keeps decimated channels and extremes, a sixth or so of the record.
+    """Sums of a sweep that arrives in blocks; keeps about a sixth of the record.
 
     Parameters
     ----------
     sample_rate_hz
         Of the blocks.
     low_hz, high_hz
-        Ends of the sweep, in this order whichever way it ran.
+        Lower and upper end of the sweep, for both directions.
     interval_s
         Length of one interval; half orders need two cycles of half the drive frequency.
     clock
-        Of the drive, where it was measured before: blocks need no drive then.
+        Phase of the drive, if known; blocks need no drive then.
     """
 
     def __init__(
@@ -252,7 +252,7 @@ class SweepSums:
         self._interval = max(1, round(interval_s * self._rate_hz))
         self._low_hz, self._high_hz = low_hz, high_hz
         self._before = self._after = 0
-        """Samples that were added beside the sweep."""
+        """Number of samples added beside the sweep."""
         self._clock = clock
         self._first_row = _DRIVE if clock is None else _BASE
         self._decimator = Decimator(3 - self._first_row, self._factor)
@@ -263,15 +263,15 @@ class SweepSums:
 
     @property
     def neighbour_samples(self) -> int:
-        """Samples, whole intervals, before and after the sweep that its displacement wants."""
+        """Number of samples before and after the sweep needed for its displacement, in whole intervals."""
         disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
         return self._factor * self._interval * ceil(disturbed / self._interval)
 
     def add_neighbour(self, block: Reals, bridged: Flags | None = None) -> None:
-        """Take what was recorded right before the sweep, or right after it.
+        """Add the record directly before or after the sweep.
 
-        Velocity becomes displacement with what was before it and came after it: without them the largest |x|
-        of the first and of the last intervals is off by up to a third.
+        Without it, integration of velocity makes the largest |x| of the first and last intervals wrong by
+        up to a third.
         """
         if self._extremes:
             self._after += block.shape[1]
@@ -281,9 +281,9 @@ class SweepSums:
         self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
 
     def add(self, block: Reals, bridged: Flags | None = None) -> None:
-        """Take the next samples of the sweep: rows drive voltage, base acceleration, response velocity.
+        """Add the next samples of the sweep: rows drive voltage, base acceleration, response velocity.
 
-        ``bridged`` are those at which the response is a bridge over a drop-out; none by default.
+        ``bridged`` marks samples that bridge a drop-out; none by default.
         """
         if block.shape[0] != 3:
             raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
@@ -303,14 +303,14 @@ class SweepSums:
         self._carry = data[:, count * full :].copy()
 
     def response(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweepResponse:
-        """Analyse everything added; the sums take no more blocks afterwards.
+        """Analyse all samples; no more blocks can be added afterwards.
 
         Parameters
         ----------
         delay_s
             By how much the response channel lags the base channel [s].
         linear
-            Transmission of the specimen without contact, which is swept in the same way for comparison.
+            Transmission of the specimen without contact, for comparison in the same sweep.
         """
         motion, swept, velocity, phase = self._analysed(delay_s, linear)
         harmonics, harmonics_hz = self._harmonics(velocity, phase)
@@ -328,7 +328,7 @@ class SweepSums:
         )
 
     def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
-        """Analyse everything added as far as draws are compared, like `response`."""
+        """Return the quantities for comparing draws; see `response`."""
         return self._analysed(delay_s, linear)[0]
 
     @property
@@ -339,13 +339,13 @@ class SweepSums:
 
     @property
     def _band_hz(self) -> tuple[float, float]:
-        """In which displacement is kept."""
+        """Band of the displacement."""
         return _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
 
     def _analysed(
         self, delay_s: float, linear: Transmission | None
     ) -> tuple[SweptMotion, Reals, Reals, DrivePhase]:
-        """Give the motion, x of shape (intervals, samples) [m], the velocity [m/s] and the drive's phase."""
+        """Return the motion, x of shape (intervals, samples) [m], the velocity [m/s] and the drive phase."""
         self._parts.append(self._decimator.finish())
         whole = np.concatenate(self._parts, axis=1)
         self._parts.clear()
@@ -366,7 +366,7 @@ class SweepSums:
         residual = impacts = np.full(upper.size, np.nan)
         steady_over_swept = np.nan
         if linear is not None:
-            # Order 1 alone: noise of the accelerometer would ring in a linear specimen too.
+            # Order 1 only, because accelerometer noise would ring in a linear specimen too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
             place = np.arange(data.shape[1])
             at_middles = base.order(1.0)
@@ -428,14 +428,14 @@ class SweepSums:
         return motion, intervals, data[-1], phase
 
     def _bridges(self) -> Flags:
-        """Return which decimated samples hold some of a bridge over a drop-out."""
+        """Return which decimated samples include a bridge over a drop-out."""
         bridged = np.concatenate(self._bridged)
         bridged = np.append(bridged, np.zeros(-bridged.size % self._factor, dtype=np.bool_))
         return np.asarray(bridged.reshape(-1, self._factor).any(axis=1))
 
     def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
         """Return the velocity [m/s] without contact under the recorded acceleration of the base [m/s2]."""
-        # Padded, so that what rings after the end does not come before the beginning.
+        # Padded, so that ringing after the end does not wrap around to the start.
         padded = fft.next_fast_len(2 * base.size, real=True)
         frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
         low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz
@@ -447,7 +447,7 @@ class SweepSums:
         return np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: base.size])
 
     def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
-        """Displacement at many orders, in intervals that are long enough to tell them apart."""
+        """Return displacement at many orders, in intervals long enough to separate them."""
         cycles = self._low_hz * self._interval / self._rate_hz
         longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
         longer = min(longer, response.size)
@@ -460,7 +460,7 @@ class SweepSums:
 
 
 def _largest_steady(linear: Transmission, low_hz: float, high_hz: float) -> float:
-    """Return the largest magnitude between two frequencies, narrow modes included."""
+    """Return the largest magnitude between two frequencies, including narrow modes."""
     hz, step_hz = np.linspace(low_hz, high_hz, _STEADY_POINTS, retstep=True)
     steady = np.abs(linear(hz))
     rising = np.diff(steady) > 0

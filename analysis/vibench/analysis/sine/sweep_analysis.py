@@ -26,12 +26,12 @@ _BLOCK = 1 << 17
 _RESPONSE = 2
 _LEAD_S = 5.0
 _SPECTROGRAM_ORDER = 3.2
-"""A spectrogram shows the drive's third harmonic at the sweep's end."""
+"""Upper limit of the spectrogram relative to the end of the sweep: the third harmonic."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
-    """A sweep: envelope, responses and where the masses collide."""
+    """A sweep: envelope, responses and collision regions."""
 
     OWN_UNITS: ClassVar = {"spectrogram": "m s-1"}
     DOCUMENT: ClassVar = (
@@ -41,13 +41,13 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 
     collisions: Collisions
     jumps: tuple[Jump, ...]
-    """Jumps of Response II, between a smooth motion and another."""
+    """Jumps of Response II with a smooth motion on at least one side."""
     spectrogram: Spectrogram
     """Spectrogram of the recorded velocity."""
 
     @property
     def rate_text(self) -> str:
-        """How fast the sweep was, and how far its responses are from steady ones where that is known."""
+        """Return the sweep rate, and the difference from steady responses if known."""
         text = f"swept at {abs(self.response.sweep_rate_hz_per_s):.3g} Hz/s"
         more = self.response.steady_over_swept - 1
         if np.isnan(more) or self.collisions.regions:
@@ -62,23 +62,23 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
 
 
 _BEHIND_STEPS = 1.5
-"""A sweep in steps is behind its ideal course by half a step at most, and measured to within as much."""
+"""Tolerance in steps: a stepped sweep lags by at most half a step, and is measured within another half."""
 _LAST = 5
-"""Intervals at the end that are looked at."""
+"""Number of intervals checked at the end."""
 
 
 def played_check(response: SweepResponse, sweep: Sweep) -> Check:
-    """Compare the end of a sweep, as its drive was recorded, with the plan at that time."""
+    """Compare the recorded drive at the end of a sweep with the plan."""
     last = slice(-_LAST, None)
     found_hz, time_s = float(np.median(response.frequency_hz[last])), float(np.median(response.time_s[last]))
     half_s = 0.5 * sweep.step_s
     planned_hz = (sweep.cycles(time_s + half_s) - sweep.cycles(time_s - half_s)) / sweep.step_s
     behind_s = (planned_hz - found_hz) / response.sweep_rate_hz_per_s
     if abs(behind_s) <= _BEHIND_STEPS * sweep.step_s + response.interval_s:
-        return Check("Sweep as planned", Verdict.PASSED, "the drive kept to the course of the plan")
+        return Check("Sweep as planned", Verdict.PASSED, "the drive followed the plan")
     text = (
         f"the drive was at {found_hz:.4g} Hz where {planned_hz:.4g} Hz were planned, {abs(behind_s):.2g} s "
-        f"{'behind' if behind_s > 0 else 'ahead'}; frequencies below are those that were played"
+        f"{'behind' if behind_s > 0 else 'ahead'}; frequencies below are the played ones"
     )
     return Check("Sweep as planned", Verdict.WARNING, text)
 
@@ -91,9 +91,9 @@ def _is_whole(channels: Channels, first: int, last: int) -> bool:
 def measured_sweep(
     channels: Channels, sweep: Sweep, specimen: Specimen | None = None
 ) -> tuple[SweepResponse, Spectrogram]:
-    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity.
+    """Analyse the recorded part of a sweep in either direction, with a spectrogram of its velocity.
 
-    The ``specimen``, where one is known, is swept without contact for comparison.
+    A known ``specimen`` is simulated without contact for comparison.
     """
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     highest_hz = min(_SPECTROGRAM_ORDER * max(sweep.start_hz, sweep.stop_hz), 0.5 * channels.sample_rate_hz)
@@ -105,14 +105,14 @@ def measured_sweep(
 
 
 class SweepDraws:
-    """Analyses draws of one recorded sweep as far as they are compared; their drive is the same."""
+    """Analysis of draws of one recorded sweep, which share its drive."""
 
     def __init__(self, sweep: Sweep, specimen: Specimen | None) -> None:
         self._sweep, self._specimen = sweep, specimen
         self._clock: DrivePhase | None = None
 
     def motion(self, channels: Channels) -> SweptMotion:
-        """Analyse a draw like `measured_sweep`; the first one measures the drive."""
+        """Analyse a draw like `measured_sweep`; the first measures the drive."""
         sums = _sums(self._sweep, channels, self._clock)
         first = _read_sweep(channels, sums, lambda _: None)
         found = sums.motion(delay_s=channels.response_delay_s, linear=_without_contact(self._specimen))
@@ -130,14 +130,14 @@ def _without_contact(specimen: Specimen | None) -> Transmission | None:
 
 
 def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
-    """Add the sweep and what lies beside it, and show its velocity; gives where the sums begin [s]."""
+    """Add the sweep and the record beside it, and return the start of the sums [s]."""
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     rate = channels.sample_rate_hz
-    # Where nothing whole was recorded beside the sweep, its own end stands for it.
+    # If the record beside the sweep is incomplete, the end of the sweep replaces it.
     reach = min(sums.neighbour_samples, stretch.samples // 4)
     start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
     stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
-    # What the specimen still rings of began before the sweep.
+    # The specimen may still ring from before the sweep.
     lead = reach * max(1, min(round(_LEAD_S * rate), start) // max(reach, 1))
     lead = lead if _is_whole(channels, start - lead, start - reach) else reach
     for begin, end, add in (
@@ -159,10 +159,11 @@ def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], Non
 
 
 def _corrected(found: M, channels: Channels, first_s: float) -> M:
-    """Count time from the sweep's first sample, and take the sensors' gains out."""
+    """Count time from the first sample of the sweep, and correct for the sensors' gains."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(
-            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
+            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of "
+            "the sweep's "
             f"intervals are without a drop-out, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
             "and measure again"
         )
@@ -177,11 +178,11 @@ def _corrected(found: M, channels: Channels, first_s: float) -> M:
 
 
 _SAME = 1e-3
-"""Part of a frequency; two clocks differ by a tenth of it."""
+"""Relative tolerance of a frequency; two clocks differ by a tenth of it."""
 
 
 def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:
-    """Compare each frequency, as measured on the drive, with the nearest of the plan [Hz]."""
+    """Compare each measured drive frequency with the nearest of the plan [Hz]."""
     nearest = planned_hz[np.argmin(np.abs(found_hz[:, np.newaxis] - planned_hz), axis=1)]
     off = np.abs(found_hz / nearest - 1)
     worst = int(np.argmax(off))
@@ -189,6 +190,6 @@ def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:
         return Check("Drive frequency", Verdict.PASSED, "as planned")
     text = (
         f"the drive was at {found_hz[worst]:.6g} Hz, which the plan does not have; nearest is "
-        f"{nearest[worst]:.6g} Hz. Results are of what was played"
+        f"{nearest[worst]:.6g} Hz. Results are for the played frequencies"
     )
     return Check("Drive frequency", Verdict.WARNING, text)
