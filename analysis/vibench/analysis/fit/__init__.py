@@ -1,6 +1,6 @@
-"""The specimen that is really on the shaker, fitted to the recordings of one campaign.
+"""Fit the specimen on the shaker to the recordings of one campaign.
 
-Damping and frequencies come from the weakest noise, the gap of each side from tracking a motion that
-collides. A model that the recordings contradict is refused, and the assumptions that would mend it are
-ranked. Every value has its bounds; what could not be told is said.
+Damping and frequencies come from the weakest noise, the gap of each side from tracking a colliding motion.
+A model that the recordings contradict is refused, and assumptions that may be wrong are ranked. Every value
+has bounds; undetermined ones are reported.
 """

@@ -1,6 +1,6 @@
-"""What collisions tell of a specimen: the gap of each side, m1, c1 and the contact law.
+"""Parameters from collisions: the gap of each side, m1, c1 and the contact law.
 
-Tracked where the motion can be followed; else from statistics of its chaos.
+They are found by tracking if possible, otherwise from statistics of chaos.
 """
 
 from collections.abc import Iterator
@@ -24,9 +24,9 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Response I over Response II: 1 for a sine; between the two nothing is said."""
+"""Limits of Response I over Response II, which is 1 for a sine; in between is undecided."""
 _LENGTH_S = 3.0
-"""Length of a tracked stretch: the bounds of what is found are those of four restarts over it."""
+"""Length of a tracked stretch [s], with four restarts."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,
@@ -38,12 +38,12 @@ _JUDGED = (
     Hidden.EXPONENT,
     Hidden.LOSS,
 )
-"""What noise does not tell."""
+"""Parameters that noise does not determine."""
 _SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
 
 
 class Way(StrEnum):
-    """How collisions tell numbers."""
+    """Method for parameters from collisions."""
 
     TRACKED = "tracked"
     STATISTICS = "statistics"
@@ -51,27 +51,27 @@ class Way(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class CollisionNumbers:
-    """Numbers of a specimen from one recording that collides."""
+    """Parameters of a specimen from one colliding recording."""
 
     way: Way
     recording: str
     parameters: tuple[FoundParameter, ...]
     misfit: float
-    """Mean squared innovation of the track, or squared distance of the statistics: about 1."""
+    """Mean squared innovation of the track, or squared distance of the statistics; about 1."""
 
     @property
     def told(self) -> tuple[FoundParameter, ...]:
-        """Those that the motion determines."""
+        """Parameters that the motion determines."""
         return tuple(each for each in self.parameters if each.is_determined)
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
-        """Gaps of the lower and the upper side; empty unless both are determined."""
+        """Lower and upper gap; empty unless both are determined."""
         found = tuple(each for each in self.told if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Return the specimen with the determined gaps; a better known mean keeps their ratio."""
+        """Return the specimen with the determined gaps; a more accurate mean keeps their ratio."""
         mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
@@ -83,7 +83,7 @@ class CollisionNumbers:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Say each number."""
+        """Return a sentence for each parameter."""
         how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics,"}[self.way]
         rows = (each.row for each in self.parameters)
         return tuple(f"{how} {label}: {said}; described as {known}." for label, said, known in rows)
@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradicted(self) -> tuple[str, ...]:
-        """What of the description lies outside of its bounds by more than they are wide, worst first."""
+        """Return described values that lie outside the bounds by more than their width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.told
@@ -106,18 +106,16 @@ class CollisionNumbers:
 
 
 def peakedness(dwell: DwellAnalysis) -> float:
-    """Response I without its noise, where that is determined, over Response II: 1 for a sine."""
+    """Return Response I, without its bias if known, over Response II; 1 for a sine."""
     found = dwell.response
     lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
     return (found.response_i - lift) / found.response_ii
 
 
 def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
-    """Track the colliding recordings, and give the numbers of the one that tells the gaps best.
+    """Track the colliding recordings; return the parameters of the one with the best gaps.
 
-    Returns
-    -------
-    The numbers, or None and a sentence that says why no recording tells them.
+    Returns ------- The parameters, or None and the reason.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -145,11 +143,9 @@ def numbers_from_statistics(
     linear: SpecimenFit | None,
     observer: Observer,
 ) -> tuple[CollisionNumbers | None, str]:
-    """Compare statistics of the recording that tells most with those of simulated specimens.
+    """Compare statistics of the best recording with those of simulated specimens.
 
-    Returns
-    -------
-    The numbers, or None and a sentence that says why they are not determined.
+    Returns ------- The parameters, or None and the reason.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
@@ -183,24 +179,24 @@ def _width(found: CollisionNumbers) -> float:
 
 
 def _refusal(motion: HiddenMotion) -> str:
-    """Return why a motion's numbers are none, or nothing."""
+    """Return the reason why the parameters of a motion are invalid, if there is one."""
     missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""
 
 
 @dataclass(frozen=True)
 class _Colliding:
-    """A stretch of a recording in which m1 strikes its stops."""
+    """A stretch of a recording with collisions."""
 
     name: str
     path: Path
     label: SegmentLabel
     middle: float
-    """Middle of the stretch within the longest segment of that name, 0 to 1."""
+    """Centre of the stretch within the longest segment of that name, 0 to 1."""
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:
-        """Return its begin and end [s]."""
+        """Return its start and end [s]."""
         rate = recording.sample_rate_hz
         start_s, stop_s = max(
             (
@@ -218,7 +214,7 @@ class _Colliding:
 
 
 def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
-    """Yield what collides: dwells first, which stay where they are; the strongest of them first."""
+    """Yield colliding stretches: dwells first, since they are stationary, the strongest first."""
     for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
         if peakedness(dwell.analysis) >= COLLIDING:
             facts, drive = dwell.analysis.facts, dwell.analysis.response.drive

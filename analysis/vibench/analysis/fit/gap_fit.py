@@ -1,4 +1,4 @@
-"""The gap, from where collisions begin: there the relative motion of the linear specimen fills it."""
+"""The gap from the onset of collisions, where it equals the linear relative motion."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,18 +22,18 @@ from .specimen_fit import SpecimenFit
 _RELATIVE = 3
 """Column of p in `base_transmissibility`."""
 _STEP_HZ = 0.02
-"""For the curvature of the transmissibility: a hundredth of the narrowest resonance, far above rounding."""
+"""Frequency step for the curvature of the transmissibility: 1 % of the narrowest resonance."""
 _STEP = 1e-4
-"""Step of a logarithm, for how the relative motion depends on the linear parameters."""
+"""Logarithmic step for derivatives of the relative motion by the linear parameters."""
 _EDGE_POINTS = 41
 _APPROACH_S = 1.0
 _LEAST_INTERVALS = 3
-"""For a line through A0 with something left to judge it by."""
+"""Fewest intervals for a line through A0 with a residual."""
 
 
 @dataclass(frozen=True)
 class Onset:
-    """Where collisions began in a sweep, and the gap that follows."""
+    """Onset of collisions in a sweep, and the gap from it."""
 
     recording: str
     frequency_hz: float
@@ -56,20 +56,20 @@ def fit_gap(
     Parameters
     ----------
     sweeps
-        Measured sweeps; only a region that a sweep enters is an onset, for motion that collides goes on
-        colliding beyond where it would begin.
+        Measured sweeps. Only a region that a sweep enters has an onset, because collisions persist beyond
+        it.
     linear
-        Specimen whose linear motion is taken; its own gap plays no part but to be named as nominal.
+        Specimen for the linear motion; its gap is only reported as nominal.
     fit
-        Where the linear specimen comes from, for its covariance.
+        Fit of the linear specimen, for its covariance.
     confidence
         Of drive and linear specimen within the bounds.
     """
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]
     if not found:
         raise NotEnoughData(
-            "no sweep enters a region in which the masses collide, so the gap cannot be told; sweep with "
-            "more drive, or begin outside of the region"
+            "no sweep enters a region in which the masses collide, so the gap is undetermined; sweep with "
+            "more drive, or start outside the region"
         )
     best = min(found, key=lambda each: each.high_m / each.low_m)
     return FittedValue(
@@ -111,7 +111,7 @@ def onsets(
 
 @dataclass(frozen=True)
 class _Approach:
-    """A0 on the way to an onset, as a line over frequency: what collides pushes the base off its course."""
+    """A0 before an onset, as a line over frequency, because collisions disturb the base."""
 
     slope: float
     offset_m: float
@@ -122,7 +122,7 @@ class _Approach:
 
 
 def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
-    """Take A0 from the last intervals before an onset, the very last one left out."""
+    """Return A0 from the intervals before an onset, without the last one."""
     last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
     first = max(0, last - round(_APPROACH_S / measured.interval_s))
     if last - first < _LEAST_INTERVALS:
@@ -137,10 +137,9 @@ def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
 
 
 def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
-    """Phasor of p over the base's under a linear sweep, without contact, shape of ``frequency_hz``.
+    """Return the phasor of p over the base under a linear sweep without contact, shape of ``frequency_hz``.
 
-    H - (i / 4 pi) (df/dt) d2H/df2: the steady answer and its lag, to the first order in the rate. (The
-    answer to exp(i phi(t)) is H at the rate of phi plus a series in its derivatives.)
+    H - (i / 4 pi) (df/dt) d2H/df2: the steady response and its lag, to first order in the sweep rate.
     """
 
     def at(shift_hz: float) -> Complexes:
@@ -151,7 +150,7 @@ def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float
 
 
 def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate_hz_per_s: float) -> float:
-    """Relative standard deviation of the relative amplitude that the linear fit's covariance leaves."""
+    """Return the relative standard deviation of the relative amplitude by the linear fit."""
     if fit is None:
         return 0.0
     slopes = []
@@ -171,7 +170,7 @@ def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate
 
 
 _SAME_HZ = 0.5
-"""Dwells whose frequencies differ by less were played at one frequency."""
+"""Dwells closer than this [Hz] have the same frequency."""
 
 
 @dataclass(frozen=True)
@@ -182,19 +181,19 @@ class Bracket:
     low_m: float
     """Largest relative motion without collisions."""
     high_m: float
-    """Smallest relative motion, had there been no stops, that collided."""
+    """Smallest linear relative motion with collisions."""
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Return the gap from the narrowest bracket; its value is the geometric mean of the bounds.
+    """Return the gap from the narrowest bracket, the geometric mean of its bounds.
 
-    Raises NotEnoughData when no frequency has a dwell on either side of the onset.
+    Raises NotEnoughData when no frequency has dwells on both sides of the onset.
     """
     found = list(brackets(dwells, linear))
     if not found:
         raise NotEnoughData(
-            "no frequency has both a dwell that does not collide and one that does, so the gap cannot be "
-            "told from dwells; add one below and one above the onset"
+            "no frequency has both a dwell that does not collide and one that does, so dwells do not "
+            "determine the gap; add one below and one above the onset"
         )
     best = min(found, key=lambda each: each.high_m / each.low_m)
     return FittedValue(
@@ -210,8 +209,10 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Bracket]:
     """Yield a bracket for every frequency with dwells on both sides.
 
-    Collisions push the base off its course, so the motion that a colliding dwell would have without them is
-    taken from the generator's setting and from what a volt did to the base in the largest calm dwell.
+
+
+    Collisions disturb the base, so its linear motion in a colliding dwell is scaled from the largest dwell
+    without collisions by the generator's setting.
     """
     rest = list(dwells)
     while rest:

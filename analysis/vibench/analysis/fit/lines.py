@@ -1,4 +1,4 @@
-"""The lines of a measured transmission, and how far a described specimen lies from them."""
+"""Lines of a measured transmission, and the fit of a specimen to them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,31 +17,31 @@ from ..signals.window import line_correlation
 from .parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
-"""No line counts for more than this scatter says: calibrations and clocks are no better."""
+"""Least relative scatter of a line, because calibrations and clocks are no better."""
 _LEAST_CLEAR = 10.0
-"""Magnitude of a line over the scatter usual among its neighbours: the logarithm of less is not normal.
+"""Least magnitude of a line over the usual scatter of its neighbours, for a normal logarithm.
 
-Not over its own scatter, of few averages: lines whose scatter seems small by chance would be chosen, and a
-right model refused.
+Its own scatter, from few averages, would select lines with small scatter by chance, and a correct model
+would be refused.
 """
 _NEIGHBOURS = 31
-"""Lines whose median scatter is what is usual."""
+"""Number of lines for the median scatter."""
 _MOST_OFF = np.log(1e4)
-"""Largest distance of a parameter from where the search begins, as a logarithm: further it runs away."""
+"""Largest logarithmic distance of a parameter from the start of the search."""
 LEAST_DAMPING_TIME_S = 1e-8
-"""Where the search begins for a specimen that is described without damping."""
+"""Start of the damping time for a specimen described without damping."""
 CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
-"""Where the phases of the channels are named."""
+"""Reference frequency of the channels' phases."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
 """Scale factors of all frequencies."""
 _STEP = 1e-6
-"""Of a logarithm, for a central difference: far above rounding, and far less than a resonance is wide."""
+"""Logarithmic step of central differences: far above rounding, far below a resonance's width."""
 
 _HOPELESS = 5.0
-"""Times the limit of chi square, beyond which no line's weight mends a fit."""
+"""Multiple of the limit of chi square, beyond which no weighting can make a fit valid."""
 _MOST_STEPS = 60
-"""A further mode that nothing asks for has no place where a search would end."""
+"""Step limit: a further mode without evidence has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """m0 over base at frequencies, of a specimen and of further numbers."""
@@ -50,10 +50,10 @@ Model = Callable[[Specimen, Reals, Reals], Complexes]
 def loaded_response(
     specimen: Specimen, frequency_hz: Reals, extra_n_per_m: tuple[Complexes | float, ...]
 ) -> Complexes:
-    """m0 over base of a specimen with more hung on its masses, shape (lines,).
+    """Return m0 over base of a specimen with additional loads, shape (lines,).
 
-    m2 hangs on m0 and m1 on m2, so that each link is two springs in series: a dynamic stiffness P, and that
-    of all behind it, A, make P A / (P + A). ``extra_n_per_m`` is what else pulls at m0 and at m2.
+    m2 hangs on m0 and m1 on m2. A link of dynamic stiffness P with everything behind it, A, gives P A / (P
+    + A). ``extra_n_per_m`` are additional dynamic stiffnesses at m0 and at m2.
     """
     s = 2j * np.pi * frequency_hz
     (m0, m1, m2), springs, dampers = specimen.masses, specimen.stiffnesses, specimen.dampings
@@ -70,7 +70,7 @@ def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes
 
 @dataclass(frozen=True)
 class Freedom:
-    """What beside the usual parameters a fit may change."""
+    """Additional parameters of a fit."""
 
     parameters: tuple[Parameter, ...] = ()
     model: Model = own_response
@@ -82,15 +82,15 @@ class Freedom:
 
 @dataclass(frozen=True, eq=False)
 class Descended:
-    """Where a fit ended."""
+    """Result of a fit."""
 
     specimen: Specimen
     logarithms: Reals
     """Logarithms of the free parameters."""
     covariance: Reals
-    """Covariance of these, where the model is right."""
+    """Their covariance, for a correct model."""
     freedoms: Reals
-    """Of the scatter that each of their uncertainties rests on: few where few lines tell it."""
+    """Degrees of freedom of each uncertainty; few if few lines determine it."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -98,50 +98,50 @@ class Descended:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """The lines that are fitted, and what they are fitted by: logarithms of parameters, phases, a scale."""
+    """Lines to fit, with the logarithms of parameters, the phases and a scale."""
 
     frequency_hz: Reals
     measured: Complexes
     weights: Reals
     """Weights of the magnitudes, then of the phases."""
     averages: float
-    """Independent ones, from which each line's scatter was estimated."""
+    """Independent averages for each line's scatter."""
     correlation: tuple[float, float]
-    """How many lines tell what one would, if all told it alone; of parameters, and of chi square."""
+    """Number of correlated lines per independent one, for parameters and for chi square."""
     nominal: Specimen
     free: tuple[Parameter, ...]
     scale_sd: float
-    """Stated sd of ln(response's sensitivity over the base's); 0 where it is taken as exact."""
+    """Stated standard deviation of ln(response sensitivity over base sensitivity); 0 if exact."""
 
     @property
     def start(self) -> Reals:
-        """Where the search begins."""
+        """Start of the search."""
         named = [max(parameter_value(self.nominal, each), LEAST_DAMPING_TIME_S) for each in self.free]
         return np.concatenate([np.log(named), np.zeros(CHANNEL_PHASES + (self.scale_sd > 0.0))])
 
     @property
     def freedom(self) -> int:
-        """Reals less what is fitted."""
+        """Degrees of freedom."""
         return 2 * self.frequency_hz.size - len(self.free) - CHANNEL_PHASES
 
     @property
     def limit(self) -> float:
-        """Reduced chi square that one right model in a thousand exceeds."""
+        """Reduced chi square that one correct model in a thousand exceeds."""
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Return the specimen of these parameters, which are not taken beyond `_MOST_OFF`."""
+        """Return the specimen of these parameters, limited to `_MOST_OFF`."""
         begun = self.start[: len(self.free)]
         values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
 
     def is_away(self, at: Reals) -> bool:
-        """Whether a search has run away with a parameter that the lines do not tell."""
+        """Return whether a search ran away along an undetermined parameter."""
         count = len(self.free)
         return bool(np.any(np.abs(at[:count] - self.start[:count]) > _MOST_OFF))
 
     def residuals(self, at: Reals, model: Model) -> Reals:
-        """Measured less model in standard deviations: magnitudes, phases, and a stated scale's."""
+        """Return measured minus model in standard deviations: magnitudes, phases, and a stated scale."""
         count = len(self.free)
         high_pass, delay = at[count : count + CHANNEL_PHASES]
         rest = at[count + CHANNEL_PHASES :]
@@ -162,7 +162,7 @@ class Lines:
         return np.asarray(magnitudes**2 + phases**2)
 
     def students(self, residuals: Reals) -> Reals:
-        """Turn residuals so that their squares follow chi square although the scatter was estimated too."""
+        """Transform residuals so that their squares follow chi square despite the estimated scatter."""
         count, squared = 2 * self.frequency_hz.size, self.squared(residuals)
         factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
         return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])
@@ -175,9 +175,9 @@ def lines_of(
     scale_sd: float,
     fitted: Specimen | None = None,
 ) -> Lines:
-    """Take the lines that stand clear of the scatter; NotEnoughData where they are too few.
+    """Select the lines clear of the scatter; raises NotEnoughData for too few.
 
-    By what was measured, or by what a fitted specimen shows there: noise then has no part in the choice.
+    The criterion uses the measurement, or a fitted specimen, so that noise does not affect the choice.
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz
@@ -207,11 +207,11 @@ def lines_of(
 
 
 def fit_lines(lines: Lines) -> Descended:
-    """Fit from the description, and from stiffer and softer ones where that does not do."""
+    """Fit from the description, and if that fails from stiffer and softer ones."""
     usual = Freedom()
     best = _from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
-        # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
+        # A phase may lie on another branch: restart from stiffer or softer specimens.
         others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):
@@ -223,7 +223,7 @@ def fit_lines(lines: Lines) -> Descended:
 
 
 def fit_lines_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
-    """Fit with more freedom, from where a fit without it ended and from the description."""
+    """Fit with additional parameters, from the previous result and from the description."""
     opened = replace(lines, free=(*lines.free, *allowed.parameters))
     begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
     ways = [(start, further) for start in begun for further in allowed.starts]
@@ -243,7 +243,7 @@ class _Ended:
 
 
 def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
-    """Least squares first, which finds its way from afar; then the likelihood."""
+    """Fit by least squares, which converges from afar, then by likelihood."""
     open_ended = np.full(start.size - len(allowed.low), np.inf)
     bounds = (np.concatenate([-open_ended, allowed.low]), np.concatenate([open_ended, allowed.high]))
 
@@ -282,8 +282,8 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Desc
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
-    # Student's likelihood, of scatters that were estimated: its curvature as it is, and the variance of its
-    # slope, which is (spread + 2) / spread times as large (Huber 1967; for 8 degrees of freedom 1.25 times).
+    # Student's likelihood for estimated scatter: the variance of its slope is (spread + 2) / spread times
+    # its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
     squared = lines.squared(lines.residuals(found.x, allowed.model))
     slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
     slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]

@@ -1,4 +1,4 @@
-"""What of a specimen can be fitted to linear motion, by name: read from a specimen, and given to another."""
+"""Parameters of a specimen that can be fitted to linear motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from ..tables import unit_of
 
 
 class Parameter(StrEnum):
-    """What of a specimen is fitted."""
+    """Parameter of a specimen."""
 
     DAMPING_TIME = "damping_time_s"
     """c_i / k_i, one for all links."""
@@ -24,20 +24,20 @@ class Parameter(StrEnum):
     M0 = "m0_kg"
     M1 = "m1_kg"
     M2 = "m2_kg"
-    """One of the three at a time: motion tells ratios of masses, and a scale comes from the other two."""
+    """Only one at a time, because motion determines only ratios of masses."""
     C0 = "c0_ns_per_m"
     C1 = "c1_ns_per_m"
     C2 = "c2_ns_per_m"
-    """A damper that does not follow the one damping time."""
+    """Single dampers, independent of the common damping time."""
     GAP = "gap_m"
 
 
 LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
-"""What a transmission without collisions is fitted by."""
+"""Default parameters for a transmission without collisions."""
 MASSES = (Parameter.M0, Parameter.M1, Parameter.M2)
 DAMPERS = (Parameter.C0, Parameter.C1, Parameter.C2)
 ALSO_FREE = MASSES + DAMPERS
-"""What can be fitted beside them, where the data ask for it."""
+"""Additional parameters for a transmission."""
 SHOWN = {
     Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),
     Parameter.F0: ("f0", 1.0, "Hz"),
@@ -51,7 +51,7 @@ SHOWN = {
     Parameter.C2: ("c2", 1.0, "N s/m"),
     Parameter.GAP: ("gap of the nearer side", 1e6, "µm"),
 }
-"""How a parameter is written: name, factor, unit."""
+"""Name, factor and unit of a parameter in texts."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +65,11 @@ class FittedValue:
     value: float
     low: float
     high: float
-    """Both with the confidence of the fit."""
+    """Bounds with the confidence of the fit."""
     sd: float
-    """Standard deviation; NaN where the interval is one of bounds."""
+    """Standard deviation; NaN if only bounds are known."""
     nominal: float
-    """What the bench configuration says."""
+    """Value in the bench configuration."""
 
     @property
     def unit(self) -> str:
@@ -97,9 +97,9 @@ def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
 
 
 def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Return a specimen other parameters; frequencies stay when a mass changes.
+    """Return a specimen with other parameters; frequencies stay when a mass changes.
 
-    Dampings that are not given keep their proportions to the stiffnesses, and two gaps theirs to each other.
+    Other dampings stay proportional to stiffness, and two gaps keep their ratio.
     """
     old = parameter_value(specimen, Parameter.DAMPING_TIME)
     beta = values.get(Parameter.DAMPING_TIME, old)

@@ -1,4 +1,4 @@
-"""The specimen that is really on the shaker: damping and frequencies fitted to a measured transmission."""
+"""Damping and frequencies of the specimen, fitted to a measured transmission."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,31 +27,30 @@ from .parameters import (
 from .suspects import Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
-"""Converters promise 50 parts in a million or better, which no recording of its own can tell."""
+"""Relative error of a converter clock, which no recording shows."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpecimenFit(Labelled):
-    """A fitted specimen, or why the model fits none."""
+    """A fitted specimen, or the reason why the model does not fit."""
 
     specimen: Specimen
-    """Fitted specimen; the described one where the model does not fit."""
+    """Fitted specimen; the described one if the model does not fit."""
     values: tuple[FittedValue, ...]
-    """Empty where it does not."""
+    """Fitted values; empty if the model does not fit."""
     covariance: Reals
-    """Of the logarithms of the fitted linear parameters, shape (n, n), in the order of ``values``."""
+    """Covariance of the logarithms of the fitted parameters, shape (n, n), in the order of ``values``."""
     lines: int
-    """Lines of the transmission that were used."""
+    """Number of lines used."""
     reduced_chi_square: float
-    """Per degree of freedom: 1 for a model that leaves nothing but the lines' own scatter, whose estimate's
-    own uncertainty is in it."""
+    """Reduced chi square, including the uncertainty of the scatter; 1 for a model that explains the lines."""
     limit: float
-    """What one right model in a thousand exceeds."""
+    """Value that one correct model in a thousand exceeds."""
     suspects: tuple[Suspect, ...]
-    """Where the model does not fit: which assumption would mend it, the likeliest first."""
+    """Wrong assumptions that would explain a misfit, the most likely first."""
     confidence: float
     phase_rad: tuple[float, float]
-    """What the channels add to the phase at 100 Hz: a high pass (falling as 1 / f), and a delay (as f)."""
+    """Phase of the channels at 100 Hz by a high pass (as 1 / f) and by a delay (as f)."""
 
     @property
     def fits(self) -> bool:
@@ -59,13 +58,13 @@ class SpecimenFit(Labelled):
         return self.reduced_chi_square <= self.limit
 
     def drawn(self, rng: np.random.Generator) -> Specimen:
-        """Return a specimen of the fit's uncertainty."""
+        """Return a random specimen within the fit's uncertainty."""
         logarithms = rng.multivariate_normal([np.log(each.value) for each in self.values], self.covariance)
         drawn = zip((each.parameter for each in self.values), np.exp(logarithms), strict=True)
         return with_values(self.specimen, {name: float(value) for name, value in drawn})
 
     def value(self, parameter: Parameter) -> FittedValue:
-        """Return one fitted value; InvalidRequest when it was not fitted."""
+        """Return one fitted value; raises InvalidRequest if it was not fitted."""
         for each in self.values:
             if each.parameter is parameter:
                 return each
@@ -82,30 +81,29 @@ def fit_specimen(
     scale_sd: float = 0.0,
     is_nonlinear: bool | None = None,
 ) -> SpecimenFit:
-    """Fit linear parameters to magnitude and phase, line by line weighted by their scatter.
+    """Fit linear parameters to magnitude and phase, weighted by the scatter of the lines.
 
-    The lines' scatter was estimated from few averages, so that each weighs by Student's likelihood. A fit
-    whose chi square a right model exceeds once in a thousand times is refused: it has no values, and the
-    assumptions that could be wrong, ranked.
+    The scatter comes from few averages, so Student's likelihood is used. A fit is refused if a correct
+    model exceeds its chi square once in a thousand times. It then has no values, but a ranking of
+    assumptions that could be wrong.
 
-    Raises InvalidRequest when nothing is free, or what no linear transmission tells: the gap, or more than
-    one mass, and NotEnoughData when fewer significant lines than twice what is fitted are left.
+    Raises InvalidRequest when nothing is free, or for parameters that no linear transmission determines
+    (gap, more than one mass), and NotEnoughData for too few significant lines.
 
     Parameters
     ----------
     transmission
         Displacement over displacement, delays removed.
     nominal
-        Where the search begins, and what stays of the parameters that are not free; contact and gap too.
+        Start of the search, and values of everything that is not free.
     free
-        What is fitted.
+        Parameters to fit.
     confidence
-        Of the intervals.
+        Confidence of the intervals.
     scale_sd
-        Relative standard deviation of the sensors' sensitivities, vibrometer over accelerometer, as their
-        calibrations state it; taken as exact when 0.
+        Relative standard deviation of vibrometer over accelerometer sensitivity by calibration; 0 if exact.
     is_nonlinear
-        Whether realisations scatter more than noise does: friction and not damping; None when not known.
+        Whether realisations scatter beyond noise, which suggests friction; None if unknown.
     """
     free = tuple(free)
     allowed = (*LINEAR, *ALSO_FREE)
@@ -137,7 +135,7 @@ def fit_specimen(
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Covariance that a wrong clock makes: it scales all frequencies, and times inversely."""
+    """Return the covariance by clock error, which scales all frequencies, and times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

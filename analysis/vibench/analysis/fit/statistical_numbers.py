@@ -1,4 +1,4 @@
-"""What collisions tell of a specimen where their motion cannot be tracked: from statistics of its chaos."""
+"""Parameters of a specimen from statistics of its chaos, if the motion cannot be tracked."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -19,28 +19,26 @@ from ..overlay.shaker_fit import FittedShaker
 from ..signals.arrays import Flags, Integers, Reals
 from .specimen_fit import SpecimenFit
 
-# Numbers of a model from statistics of its runs: approximate Bayesian computation with regression.
+# Parameters of a model from statistics of its runs: approximate Bayesian computation with regression.
 #
 # Parameters are drawn from a box, a run is made of each, and every parameter is regressed on the statistics
-# of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). What the regression says of
-# the observed statistics, with the errors that it makes of draws left out one at a time, is the posterior;
-# its intervals hold as often as they say for parameters of the box, however rough the regression is
-# (conformal prediction; Vovk, Gammerman and Shafer 2005). The box is then cut to where the parameters can
-# be, and drawn from again (Deistler, Goncalves and Macke 2022).
+# of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The prediction for the
+# observed statistics, with leave-one-out errors, is the posterior. Its intervals have the stated coverage
+# for parameters within the box, even for a poor regression (conformal prediction; Vovk, Gammerman and
+# Shafer 2005). The box is then narrowed and drawn from again (Deistler, Goncalves and Macke 2022).
 
 ROUNDS = (120, 120, 240)
-"""Runs that each box holds."""
+"""Number of runs per box."""
 _MARGIN = 1.25
-"""Multiple of the largest error of a regression, within which a parameter is looked for in the next box."""
+"""Half width of the next box as a multiple of the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
-"""Of the statistics' scatter, by which observed ones are checked against those of runs."""
+"""Number of components of the statistics' scatter for checking the observed ones."""
 _FAR = 1.05
-"""Observed statistics this many times as far from the model as those of the furthest run are not its.
+"""Distance of observed statistics, relative to the furthest run, above which the model is refused.
 
-Those of the model are further than the furthest of n runs once in n + 1 times at most; a little leeway is for
-what rig and recording differ in besides. It refuses as 1.25 did where runs were also compared with
-themselves.
+A correct model exceeds the furthest of n runs at most once in n + 1 times; the margin is for small
+differences between rig and recording.
 """
 
 Runs = Callable[[Reals], Reals]
@@ -49,36 +47,36 @@ Runs = Callable[[Reals], Reals]
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What observed statistics say of parameters."""
+    """Posterior of parameters for observed statistics."""
 
     draws: Reals
     """Shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics from those of runs, over that of the furthest run."""
+    """Distance of the observed statistics from those of runs, relative to the furthest run."""
 
     @property
     def fits(self) -> bool:
-        """Whether the observed statistics could be those of a run."""
+        """Return whether the observed statistics are compatible with the runs."""
         return self.distance <= _FAR
 
 
 def posterior(
     runs: Runs, observed: Reals, box: Reals, seed: int, rounds: Sequence[int] = ROUNDS
 ) -> Posterior:
-    """Draw, run, regress, and cut the box, round by round.
+    """Draw, run, regress and narrow the box, in rounds.
 
     Parameters
     ----------
     runs
-        Makes runs.
+        Function that makes runs.
     observed
-        Statistics of what was observed, shape (statistics,).
+        Observed statistics, shape (statistics,).
     box
-        Least and largest of each parameter, shape (parameters, 2): all in it is as likely before.
+        Range of each parameter, shape (parameters, 2), with a uniform prior.
     seed
-        Of the drawing.
+        Seed of the draws.
     rounds
-        How many runs each box holds.
+        Number of runs for each box.
     """
     rng = np.random.default_rng(seed)
     parameters, statistics = np.empty((0, len(box))), np.empty((0, observed.size))
@@ -86,7 +84,7 @@ def posterior(
         inside = np.all((parameters >= box[:, 0]) & (parameters <= box[:, 1]), axis=1)
         parameters, statistics = parameters[inside], statistics[inside]
         new = rng.uniform(box[:, 0], box[:, 1], (wanted - len(parameters), len(box)))
-        # A box that nothing has narrowed holds them all.
+        # An unchanged box contains all runs.
         if len(new):
             parameters = np.concatenate([parameters, new])
             statistics = np.concatenate([statistics, runs(new)])
@@ -100,7 +98,7 @@ def posterior(
 
 
 def _regression(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
-    """Give parameters (n,) of observed statistics, and errors of draws left out one at a time, (draws, n)."""
+    """Return parameters (n,) for the observed statistics, and leave-one-out errors of draws, (draws, n)."""
     middle, scale = statistics.mean(axis=0), statistics.std(axis=0) + 1e-12
     u, sizes, vt = np.linalg.svd((statistics - middle) / scale, full_matrices=False)
     new = vt @ ((observed - middle) / scale)
@@ -116,7 +114,7 @@ def _regression(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[
 
 
 def _leave_one_out_errors(u: Reals, sizes: Reals, target: Reals, ridge: float) -> Reals:
-    """Errors of a ridge regression of draws that it does not know, in closed form."""
+    """Return the leave-one-out errors of a ridge regression in closed form."""
     shrunk = sizes**2 / (sizes**2 + ridge)
     fitted = (u * shrunk) @ (u.T @ target)
     leverage = np.sum(u**2 * shrunk, axis=1) + 1 / len(target)
@@ -124,18 +122,18 @@ def _leave_one_out_errors(u: Reals, sizes: Reals, target: Reals, ridge: float) -
 
 
 def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
-    """Return how far observed statistics lie from what parameters give, over the furthest run's own.
+    """Return the distance of the observed statistics from the model, relative to the furthest run.
 
-    Without what the parameters that a regression finds explain, along the largest components of the rest and
-    beyond them. Each run is checked against the others, as the observed statistics are against all: a run
-    that had a part in its own reference would seem nearer than it is, the more so the fewer there are.
+    The effect of the fitted parameters is removed. The rest is measured along its largest components and
+    beyond them. Each run is compared with the others only, because including itself would make it seem
+    nearer.
 
     Parameters
     ----------
     parameters
-        As the regression finds them, those of the observed in the last row, shape (draws + 1, parameters).
+        Fitted parameters, the observed ones in the last row, shape (draws + 1, parameters).
     statistics
-        Of runs, shape (draws, statistics).
+        Statistics of runs, shape (draws, statistics).
     observed
         Shape (statistics,).
     """
@@ -152,7 +150,9 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
 
 
 def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
-    """Square distances of a run from others, shapes (terms,), (statistics,): along components and beyond."""
+    """Return squared distances of a run from others along components and beyond, (terms,) and
+    (statistics,).
+    """
     known, *_ = np.linalg.lstsq(terms, values, rcond=None)
     _, spread, axes = np.linalg.svd(values - terms @ known, full_matrices=False)
     rest = own_values - own_terms @ known
@@ -174,11 +174,11 @@ _SHARES = (0.5, 0.9, 0.99, 0.999)
 
 
 def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> Reals:
-    """Return what is compared of a stretch of irregular motion, shape (statistics,).
+    """Return statistics of a stretch of irregular motion, shape (statistics,).
 
-    Logarithms of the power of base acceleration and m0's velocity in bands; how much of the velocity follows
-    the base, band by band; the distribution of m0's displacement (its spread, skewness, tails); and under a
-    sine the components at the drive frequency and its harmonics, whose even ones tell the sides apart.
+    They are logarithmic band powers of base acceleration and m0's velocity, their coherence per band, the
+    distribution of m0's displacement (spread, skewness, tails), and under a sine the harmonics, whose even
+    ones distinguish the sides.
 
     Parameters
     ----------
@@ -196,14 +196,14 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
 
 
 def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
-    """Say which statistics are not those of a channel's own noise, whose spectrum nobody knows; same shape.
+    """Return which statistics are above channel noise, whose spectrum is unknown; same shape.
 
     Parameters
     ----------
     statistics
-        Of a recording.
+        Statistics of a recording.
     noise_rms
-        Of base acceleration and m0's velocity, white, per sample, shape (2,).
+        White noise of base acceleration and m0's velocity per sample, shape (2,).
     rate_hz
         Samples a second.
     """
@@ -216,7 +216,7 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
 
 
 def _bands(rate_hz: float) -> tuple[int, Integers]:
-    """Return the samples of a segment, and where the bands begin and end among its lines."""
+    """Return the samples of a segment, and the edges of the bands among its lines."""
     length = round(_SEGMENT_S * rate_hz)
     edges = np.geomspace(_LOWEST_HZ, min(_HIGHEST_HZ, _HIGHEST_PART * rate_hz), _BANDS + 1)
     return length, np.asarray(np.ceil(edges * length / rate_hz), dtype=np.int64)
@@ -235,7 +235,7 @@ def _in_bands(motion: Reals, rate_hz: float) -> tuple[Reals, ...]:
 
 
 def _displacement(velocity: Reals, rate_hz: float) -> Reals:
-    """Integrate, in steps of samples, without what lies below all drives."""
+    """Integrate in steps of samples, high-passed below all drives."""
     b, a = scipy.signal.butter(2, _DRIFT_HZ, "highpass", fs=rate_hz)
     return np.asarray(scipy.signal.lfilter(b, a, np.cumsum(velocity - velocity.mean())))
 
@@ -250,7 +250,7 @@ def _spread(values: Reals) -> Reals:
 
 
 def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
-    """Components of the velocity over its rms, in the phase of the base's fundamental."""
+    """Return components of the velocity over its rms, relative to the phase of the base's fundamental."""
     turn = np.exp(-2j * np.pi * drive_hz / rate_hz * np.arange(motion.shape[1]))
     tapered = motion * np.hanning(motion.shape[1])
     base = np.vdot(turn.conj(), tapered[0]) / motion.shape[1]
@@ -264,13 +264,12 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Factors about the description within which parameters are looked for; gaps by their geometric mean and
-the root of the upper over the lower."""
+"""Search range as factors of the description; gaps by geometric mean and root of upper over lower."""
 _CONFIDENCE = 0.95
 _TOLD = 0.5
-"""Width of bounds, over what is looked through, above which the statistics say nothing new."""
+"""Width of bounds relative to the search range above which the statistics add no information."""
 _LIKELY = 2.0
-"""Factor between the recorded base motion and those of first draws, beyond which nothing is drawn."""
+"""Largest factor between the recorded base motion and that of the first draws."""
 _LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
 _SEED = 29
 
@@ -284,36 +283,36 @@ def statistical_numbers(
     linear: SpecimenFit | None = None,
     rounds: Sequence[int] = ROUNDS,
 ) -> tuple[tuple[FoundParameter, ...], float]:
-    """Return gaps, m1, c1 and contact force with bounds of 95 %, or why each is not determined.
+    """Return gaps, m1, c1 and contact force with 95 % bounds, or why each is undetermined.
 
-    Rig and specimens are simulated together under the recorded voltage, and compared with the recording in
-    what does not depend on instants.
+    Rig and specimens are simulated under the recorded voltage, and compared with the recording by
+    statistics.
 
     Parameters
     ----------
     recording
-        Of a motion that collides.
+        A recording with collisions.
     specimen
-        As described, its linear numbers fitted: numbers are looked for about its own.
+        Start of the search, with fitted linear parameters.
     stretch_s
-        Begin and end of what is looked at.
+        Start and end of the stretch.
     drive_hz
-        Of a sine; None for sweeps and noise.
+        Drive frequency of a sine; None for sweeps and noise.
     fitted
-        A shaker, where the bench describes none.
+        A shaker, if the bench describes none.
     linear
-        Where the specimen's linear numbers come from: each run takes others of that uncertainty.
+        Fit of the linear parameters; each run draws them within its uncertainty.
     rounds
-        Runs, each time in a narrower box.
+        Numbers of runs, each in a narrower box.
 
     Returns
     -------
-    The numbers, and how far the statistics are from those of the furthest run, over that run.
+    The parameters, and the distance of the statistics relative to the furthest run.
 
     Raises
     ------
     AnalysisError
-        When rig, law or samples forbid it, or no specimen gives these statistics.
+        When rig, law or samples are unsuitable, or no specimen has these statistics.
     """
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)
@@ -342,7 +341,7 @@ def statistical_numbers(
 
 
 class _Runs:
-    """Statistics of runs, each of parameters and of a start of its own."""
+    """Runs with given parameters and random starts."""
 
     def __init__(
         self,
@@ -357,7 +356,7 @@ class _Runs:
         self.rng = np.random.default_rng(_SEED)
 
     def __call__(self, parameters: Reals) -> Reals:
-        """Make a run of each row."""
+        """Return the statistics of a run for each row."""
         seeds = self.rng.spawn(len(parameters))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             return np.array(list(pool.map(self._one, parameters, seeds)))
@@ -369,7 +368,7 @@ class _Runs:
 
 
 def _relative(logarithms: Reals) -> dict[Hidden, Reals]:
-    """Turn parameters, shape (5,) or (5, draws), into logarithms of values over those described."""
+    """Convert parameters, shape (5,) or (5, draws), to logarithms relative to the description."""
     mean, apart, m1, c1, force = logarithms
     return {
         Hidden.LOWER_GAP: mean - apart,
@@ -394,7 +393,7 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Refuse, after a few draws, a voltage that does not move this rig as it was moved."""
+    """Raise, after a few draws, if the voltage does not reproduce the recorded base motion."""
     first = made.draws.draw(made.specimen, made.rng)
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
@@ -416,7 +415,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "the motion's statistics tell it no better than it was assumed" if flat else ""
-        # The middle of its bounds, for they are written as it and a half width.
+        # The centre of the bounds, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):

@@ -1,4 +1,4 @@
-"""Which assumption of a model that does not fit would mend it: each is freed in turn, and ranked."""
+"""Find the wrong assumption of a model that does not fit, by freeing each in turn."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from .lines import Descended, Freedom, Lines, fit_lines_further, loaded_response
 from .parameters import DAMPERS, MASSES, SHOWN, Parameter, parameter_value
 
 TOLD_APART = 2.0 * float(np.log(20.0))
-"""Twice the logarithm of the likelihood ratio from which one of two explanations is named alone: 20 to 1."""
+"""Twice the log likelihood ratio (20 to 1) above which only the better explanation is named."""
 _HIGHEST_HZ = 2e4
 _MODE_LOW, _MODE_HIGH = (1e-6, 1e-4), (1.0, 0.3)
-"""Of mass over that of what it hangs on, and damping ratio, of a further mode."""
+"""Limits of the mass ratio and the damping ratio of a further mode."""
 _MODE_START = (float(np.log(0.02)), float(np.log(0.01)))
-"""Where a search for one begins: the logarithms of both."""
+"""Starts of the search for one: the logarithms of both."""
 
 
 class Assumption(StrEnum):
-    """What a model takes for granted of specimen, sensors or rig."""
+    """Assumption of the model on specimen, sensors or rig."""
 
     M0 = "m0"
     M1 = "m1"
@@ -33,7 +33,7 @@ class Assumption(StrEnum):
     C2 = "c2"
     FRICTION = "friction"
     SENSITIVITY = "sensitivity"
-    """Relative sensitivity of the vibrometer over that of the accelerometer: a transmission tells no more."""
+    """Sensitivity of the vibrometer over that of the accelerometer, the only observable one."""
     EXTRA_MODE = "extra mode"
     TABLE_MASS = "table mass"
     GAPS = "gaps"
@@ -41,7 +41,7 @@ class Assumption(StrEnum):
 
 @dataclass(frozen=True)
 class Suspect:
-    """An assumption that was dropped, and how well the model then fits."""
+    """A freed assumption, and the quality of the fit without it."""
 
     DOCUMENT: ClassVar = (
         "assumption would_mend_it=sentence reduced_chi_square mends behind_the_likeliest=behind"
@@ -49,30 +49,30 @@ class Suspect:
 
     assumption: Assumption
     sentence: str
-    """What would have to be otherwise, with its number."""
+    """The change that explains the misfit, with its size."""
     reduced_chi_square: float
     mends: bool
-    """Whether the model then fits."""
+    """Whether the model fits with it."""
     behind: float
-    """Twice the log likelihood ratio to the best one, a parameter costing ln(reals): 0 is best."""
+    """Twice the log likelihood ratio to the best one, penalised by ln(reals) per parameter; 0 is best."""
 
     @property
     def may_be_it(self) -> bool:
-        """Whether the data tell it not apart from the best one."""
+        """Return whether the data do not distinguish it from the best one."""
         return self.behind < TOLD_APART
 
 
 def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
-    """Free one assumption after the other, and rank them by likelihood and number of parameters.
+    """Free each assumption in turn; rank them by likelihood and number of parameters.
 
     Parameters
     ----------
     lines
-        What the model as it was described does not fit.
+        Lines that the described model does not fit.
     usual
-        How near it comes.
+        Fit of the described model.
     is_nonlinear
-        Whether realisations scatter beyond noise; None where nobody can tell.
+        Whether realisations scatter beyond noise; None if unknown.
     """
     tried = []
     for assumption, allowed, told in _ways(lines, is_nonlinear=is_nonlinear):
@@ -84,7 +84,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
             tried.append((assumption, sentence, found.chi_square, parameters, freedom))
     if not tried:
         return ()
-    # Where even the best leaves something, it is in the scatter: else every small difference would be sure.
+    # A residual of the best one is added to the scatter, so that small differences are not significant.
     left = max(1.0, min(chi / freedom for _, _, chi, _, freedom in tried)) * lines.correlation[0]
     reals = 2 * lines.frequency_hz.size
     scores = [chi / left + count * np.log(reals) for _, _, chi, count, _ in tried]
@@ -102,7 +102,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
 
 
 _Told = Callable[[Specimen, Reals], str]
-"""What would have to be otherwise; empty where that is impossible."""
+"""Description of the change; empty if it is impossible."""
 
 
 def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
@@ -181,7 +181,7 @@ def _off(_: Specimen, further: Reals) -> str:
 
 
 def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
-    """Return the dynamic stiffness of a small mass on a spring that hangs on a mass."""
+    """Return the dynamic stiffness of a small mass on a spring, attached to a mass."""
     own_hz, share, damping = np.exp(further)
     ratio = frequency_hz / own_hz
     spring = 1.0 + 2j * damping * ratio

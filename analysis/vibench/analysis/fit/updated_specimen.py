@@ -1,4 +1,4 @@
-"""The specimen that is really on the shaker, from the recordings of one campaign."""
+"""Fit the specimen on the shaker to the recordings of one campaign."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -28,14 +28,14 @@ from .specimen_fit import SpecimenFit, fit_specimen
 from .suspects import Assumption, Suspect
 
 _SURELY = 3.3
-"""Standard deviations that one right description in a thousand exceeds."""
+"""Standard deviations that one correct description in a thousand exceeds."""
 _LEAST_RELATIVE_SD = 2e-3
-"""What coil, filters and held samples leave in a table that is right."""
+"""Relative error of a correct table mass by coil, filters and held samples."""
 
 
 @dataclass(frozen=True)
 class TableFit:
-    """The moving mass without the specimen, fitted and described."""
+    """Fitted and described moving mass without the specimen."""
 
     mass_kg: float
     sd_kg: float
@@ -44,12 +44,12 @@ class TableFit:
 
     @property
     def z(self) -> float:
-        """How far the described mass lies from the fitted one, in standard deviations."""
+        """Difference of described and fitted mass in standard deviations."""
         return float(np.log(self.mass_kg / self.described_kg) * self.mass_kg / self.sd_kg)
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """What would have to be otherwise; empty where the description holds."""
+        """Changes that explain a misfit; empty if the description holds."""
         if abs(self.z) <= _SURELY:
             return ()
         ratio = self.mass_kg / self.described_kg
@@ -62,7 +62,7 @@ class TableFit:
 
     @property
     def sentence(self) -> str:
-        """The mass with two standard deviations, and what the bench says."""
+        """Return a sentence on the mass with two standard deviations, and the described one."""
         mass = plus_minus(1e3 * self.mass_kg, 2e3 * self.sd_kg)
         return (
             f"Fitted mass of the moving table = ({mass}) g; the bench says {1e3 * self.described_kg:.4g} g."
@@ -70,10 +70,10 @@ class TableFit:
 
 
 def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
-    """Fit the shaker to weak noise, and hold its mass against the bench's; None where no shaker is described.
+    """Fit the shaker to weak noise and compare its mass with the bench; None without a described shaker.
 
-    The table's mass shows in how the specimen's resonances pull at the base; the coil's numbers go along.
-    Raises UnusableData when no shaker explains how the base follows the voltage.
+    The table mass shows in the reaction of the specimen's resonances on the base. Raises UnusableData when
+    no shaker explains the transmission from voltage to base.
     """
     with open_recording(analysis.facts.path) as recording:
         described = described_shaker(recording)
@@ -90,31 +90,31 @@ _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class UpdatedSpecimen(Labelled):
-    """A specimen fitted to recordings, with what could not be told and what does not fit."""
+    """A specimen fitted to recordings, with undetermined values and misfits."""
 
     specimen: Specimen
     values: tuple[FittedValue, ...]
-    """Values of a model that fits; none where it does not."""
+    """Fitted values; empty if the model does not fit."""
     collisions: CollisionNumbers | None
-    """What collisions tell, tracked or from their statistics; None where neither can be."""
+    """Parameters from collisions by tracking or statistics; None if neither is possible."""
     linear: SpecimenFit | None
-    """Linear fit of the weakest noise; None where there is none."""
+    """Linear fit of the weakest noise; None without noise."""
     linear_from: str
-    """Recording whose transmission told damping and frequencies; empty if none did."""
+    """Recording for damping and frequencies; empty if none."""
     table: TableFit | None
     not_told: tuple[str, ...]
-    """A sentence for everything that stays as the bench says, and why."""
+    """One sentence with the reason for everything that stays as described."""
     nominal: SpecimenTable
-    """Specimen as the bench describes it."""
+    """Specimen described by the bench."""
 
     @property
     def fitted(self) -> bool:
-        """Whether anything of it is more than the bench's description."""
+        """Whether anything was fitted."""
         return bool(self.values) or self.collisions is not None
 
     @property
     def fits(self) -> bool:
-        """Whether no recording contradicts what the bench says and the fit takes for granted."""
+        """Whether no recording contradicts the description and the assumptions of the fit."""
         return not self.suspects
 
     @property
@@ -124,14 +124,14 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Assumptions that a recording contradicts, of each recording the likeliest first."""
+        """Assumptions that recordings contradict, the most likely first for each."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     @property
     def description(self) -> SpecimenDescription:
-        """The fitted specimen as a file has it; what was not fitted is the bench's."""
+        """Return the fitted specimen for a file, with the bench's values for the rest."""
         lower, upper = self.specimen.gaps_m
         fitted = {each.parameter.value for each in self.values}
         if self.collisions is not None:
@@ -157,11 +157,11 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Say every value with its interval, what does not fit, and what is to be known of it."""
+        """Return sentences on every value with its interval, misfits and remarks."""
         return tuple(_sentences(self))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Return the results as JSON."""
         values = {each.parameter: each for each in self.values}
         told = {key: value for way in Way for key, value in self._told(way).items()}
         linear = columns(
@@ -181,7 +181,7 @@ class UpdatedSpecimen(Labelled):
         return dict(plain(document))
 
     def _told(self, way: Way) -> dict[str, object]:
-        """Return what collisions tell in one way."""
+        """Return parameters from collisions by one method."""
         found = self.collisions if self.collisions is not None and self.collisions.way is way else None
         return {
             f"{way}_from": None if found is None else found.recording,
@@ -214,7 +214,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
 
 
 def culprits_text(suspects: Sequence[Suspect]) -> str:
-    """Return what would mend a model, as far as the data tell one explanation from another."""
+    """Return the possible causes of a misfit, as far as the data distinguish them."""
     best = suspects[0]
     alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
     named = ", or ".join(alike)
@@ -237,7 +237,7 @@ def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ..
 def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
-    # Two digits of the interval, so that it is an interval on paper too.
+    # Two digits of the interval, so that its ends differ in print.
     places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
@@ -250,28 +250,27 @@ def update_model(
     also_free: Sequence[Parameter | str] = (),
     observer: Observer = ignore_progress,
 ) -> UpdatedSpecimen:
-    """Fit a specimen to recordings, or say which assumption of the model they contradict.
+    """Fit a specimen to recordings, or name the assumption that they contradict.
 
-    Damping and frequencies come from the weakest noise; the gap of each side, m1, c1 and the contact law from
-    tracking a motion that collides, or, where none can be tracked, from statistics of its chaos (minutes of
-    simulation); failing both, the gap of the nearer side from where sweeps begin to collide or from two
-    dwells. The table's mass comes from how the base follows the voltage.
+    Damping and frequencies come from the weakest noise. The gap of each side, m1, c1 and the contact law
+    come from tracking a colliding motion, or else from statistics of chaos (minutes of simulation). If both
+    fail, the smaller gap comes from the onset of collisions in sweeps or dwells. The table mass comes from
+    the transmission from voltage to base.
 
     Parameters
     ----------
     results
-        Of recordings of one specimen; their simulation is not needed. Noise in displacement over
+        Results of recordings of one specimen, noise in displacement over
         displacement.
     also_free
-        What is fitted to noise beside damping and frequencies: masses (one at a time) and single dampers.
+        Additional parameters to fit to noise: one mass, and single dampers.
     observer
-        Told what takes long.
+        Receives the progress.
 
     Raises
     ------
     NotEnoughData
-        When nothing could be fitted: no noise, no motion that can be tracked, and no sweep or pair of
-        dwells that tells the gap.
+        When nothing could be fitted: no noise, no trackable motion, no onset of collisions.
     """
     if not results.results:
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
@@ -332,7 +331,7 @@ def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> Ta
 def _with_gaps(
     updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: Observer
 ) -> UpdatedSpecimen:
-    """Give each side's gap by tracking, else by statistics; else the nearer one by where collisions begin."""
+    """Add the gaps by tracking, else by statistics, else the smaller one by the onset of collisions."""
     found, why = tracked_numbers(results, updated.specimen)
     if found is None:
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
@@ -359,7 +358,7 @@ def _with_gaps(
 def _onset_gap(
     results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
 ) -> FittedValue | None:
-    """Return the narrower of what sweeps and dwells tell."""
+    """Return the narrower gap of those from sweeps and from dwells."""
     sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
     ways: tuple[Callable[[], FittedValue], ...] = (
         lambda: fit_gap(sweeps, model, linear),

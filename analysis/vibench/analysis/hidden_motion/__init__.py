@@ -1,8 +1,8 @@
-"""The hidden motion: how m1 moves against m2 and strikes its stops, told from base and m0.
+"""Estimate the hidden motion of m1 against m2, and its impacts, from base acceleration and m0's velocity.
 
-Two channels tell it, base acceleration and m0's velocity, in two ways, side by side: without a contact model,
-and tracked by an extended Kalman filter, with gaps, m1, c1 and contact law found on the way. Uncertainties
-come with every number; what is not followed or not told is said, with the reason. Equations and figures:
+Two methods run side by side: one without a contact model, and an extended Kalman filter that also finds
+gaps, m1, c1 and the contact law. Every number has an uncertainty. Whatever is undetermined is reported with
+the reason. Equations and figures:
 docs/hidden-motion.md.
 
 The paper's specimen collides under a sine of 5 um; its m0 is watched with a little noise:

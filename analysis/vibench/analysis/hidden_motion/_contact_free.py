@@ -1,4 +1,4 @@
-"""Motion, impacts, gaps, m1, springs and dampers without a contact model: what any stops leave true."""
+"""Motion, impacts, gaps, m1, springs and dampers without a contact model."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -20,32 +20,32 @@ from ._tracking_model import TrackedSpecimen
 
 _BLOCK_S, _OVERLAP_S = 0.12, 0.02
 _MISFIT = 3.0
-"""Mean squared innovation beyond which a block is not believed."""
+"""Largest mean squared innovation of a valid block."""
 FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
 _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
-"""Closed shares, one after the other, while numbers are fitted: the first bear an m1 that is 5 % off."""
+"""Closed shares in turn while parameters are fitted; the first tolerate an m1 that is 5 % wrong."""
 _FIT_STRETCH_S = 0.12
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
 _LEAST_OF_MEDIAN = 0.07
-"""An impulse below this part of the usual one is not told from what is left of its neighbours."""
+"""Least impulse relative to the usual one; smaller ones may be residuals of neighbours."""
 _LEAST_P_OF_MEDIAN = 0.9
-"""A force this much nearer to the middle than the usual impact of its side comes from no stop."""
+"""Relative distance from the usual position of impacts, beyond which a force comes from no stop."""
 _DEPTH_POWER = 0.8
 """Depth of a Hertz collision over its impulse: d ~ v^(4/5), and J ~ v."""
 _LAW_UNKNOWN = 0.15
-"""Part of the mean depth: what another law would change in a gap."""
+"""Error of a gap by another contact law, relative to the mean depth."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
-"""Of the depths of nine impacts in ten, over their mean: a line through impacts all alike leads nowhere."""
+"""Least range of the depths of 90 % of impacts over their mean, to fit a line."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
-"""Scatter of |p| at the impacts of a block, of the gap, beyond which its p is not believed."""
+"""Largest scatter of |p| at the impacts of a valid block, relative to the gap."""
 
 
 @dataclass(frozen=True, eq=False)
 class FreeImpacts(Labelled):
-    """Impacts told by the force that the channels need, one row each."""
+    """Impacts from the estimated contact force, one row each."""
 
     OWN_UNITS: ClassVar = {
         "impulses": "N s",
@@ -56,7 +56,7 @@ class FreeImpacts(Labelled):
     }
 
     samples: Reals
-    """Middle of the contact, in samples of the motion."""
+    """Centre of the contact, in samples of the motion."""
     sides: Reals
     """-1 at the lower stop, +1 at the upper one."""
     impulses: Reals
@@ -66,8 +66,7 @@ class FreeImpacts(Labelled):
     p_sd: Reals
     rate_before: Reals
     rate_after: Reals
-    """Of p, carried from the flights on either side to the middle of the contact, as speeds towards and away
-    from the stop [m/s]."""
+    """Speeds of p towards and away from the stop, extrapolated from the flights to the contact [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +76,7 @@ class FreeMotion(Labelled):
     OWN_UNITS: ClassVar = {"p": "m", "p_sd": "m"}
 
     p: Samples
-    """[m], NaN where it could not be told; shape (samples,)."""
+    """[m], NaN if undetermined; shape (samples,)."""
     p_sd: Samples
     impacts: FreeImpacts
     share_told: float
@@ -86,7 +85,7 @@ class FreeMotion(Labelled):
 def free_motion(
     model: MotionModel, motion: PreparedMotion, on_sample: Callable[[int], None] = lambda _sample: None
 ) -> FreeMotion:
-    """Tell the motion of m1 against m2 from the channels and the specimen's linear numbers alone."""
+    """Estimate the motion of m1 against m2 from the channels and the linear parameters of the specimen."""
     p, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(2))
     found: list[Reals] = []
     for first, begin, end in _blocks(motion):
@@ -107,7 +106,7 @@ def free_motion(
     for _, begin, stop in _blocks(motion):
         end = min(stop, begin + round(_BLOCK_S * motion.sample_rate_hz))
         here = (impacts.samples >= begin) & (impacts.samples < end) & ~np.isnan(line.residuals)
-        # p at an impact is known to lie at a stop: what is found there tells the error of the whole block.
+        # p lies at a stop during an impact, which shows the error of the whole block.
         scatter = float(np.sqrt(np.mean(line.residuals[here] ** 2))) if here.any() else 0.0
         sd[begin:end] = np.hypot(sd[begin:end], scatter)
         if scatter > _WORST_SCATTER_OF_GAP * min(model.gaps_m):
@@ -116,7 +115,7 @@ def free_motion(
 
 
 def _at_stops(rows: Reals) -> Flags:
-    """Tell impacts from windows that held none."""
+    """Return which windows contain impacts."""
     kept = np.zeros(len(rows), dtype=np.bool_)
     if not len(rows):
         return kept
@@ -147,7 +146,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     """Return an impact for every window with a significant impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
-    # Held over the step that ends at a sample: its middle lies half a sample earlier.
+    # The force is held over the step before a sample, so its centre is half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in _runs(latent.is_open):
         if begin < 2 or end > force.size - 2 or latent.is_dark[begin:end].any():
@@ -177,7 +176,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
 
 
 def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
-    """Carry a line through two samples of a flight on to the middle of the contact beside it."""
+    """Extrapolate a line through two samples of a flight to the centre of the adjacent contact."""
     return float(values[near] + (values[near] - values[far]) * (place - near) / (near - far))
 
 
@@ -191,17 +190,17 @@ def _between(values: Reals, slopes: Reals, t: float) -> float:
 
 @dataclass(frozen=True)
 class FreeGap:
-    """A gap without a contact model."""
+    """A gap, found without a contact model."""
 
     value_m: float
     sd_m: float
-    """Scatter of the impacts, and what another contact law than Hertz's would change."""
+    """Standard deviation by scatter of the impacts and by other contact laws than Hertz's."""
     impacts: int
 
 
 @dataclass(frozen=True, eq=False)
 class _GapLine:
-    """|p| in the middle of contacts against the impulse."""
+    """Line of |p| at the centre of contacts over the impulse."""
 
     gaps: tuple[FreeGap | None, FreeGap | None]
     residuals: Reals
@@ -209,19 +208,19 @@ class _GapLine:
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Return both gaps from |p| in the middle of contacts against the impulse; None of too few, or all alike.
+    """Return both gaps from |p| at the centre of contacts over the impulse; None if undetermined.
 
-    A stop is pressed in more the harder it is struck. The straight line of |p| over J^0.8, robustly fitted
-    with one slope for both sides, begins at the gap.
+    Harder impacts indent a stop more: |p| over J^0.8 is a straight line that starts at the gap. It is
+    fitted robustly with one slope for both sides.
     """
     return _gap_line(impacts).gaps
 
 
 def free_loss(impacts: FreeImpacts) -> float | None:
-    """Return the loss of the stops [s/m] by the speeds before and after impacts; None where too few tell it.
+    """Return the loss of the stops [s/m] from the speeds before and after impacts; None for too few.
 
-    Hunt and Crossley's stops, hardly lossy, give back 1 - 2/3 loss speed of the approach: a beginning for a
-    search, since both speeds are carried over from flights and a few per cent too low.
+    Hunt and Crossley's stops with little loss return 1 - 2/3 loss speed of the approach. This starts a
+    search, since both extrapolated speeds are a few per cent low.
     """
     before, after = impacts.rate_before, impacts.rate_after
     good = (before > np.median(before)) & (after > 0.0) if before.size else before > 0.0
@@ -231,9 +230,9 @@ def free_loss(impacts: FreeImpacts) -> float | None:
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
-    """Return the gap as each impact measured it: |p| less the depth that belongs to its impulse [m].
+    """Return the gap from each impact: |p| minus the depth for its impulse [m], shape (impacts,).
 
-    Shape (impacts,); NaN where a side has too few of them to tell a gap.
+    NaN on a side with too few impacts.
     """
     line = _gap_line(impacts)
     lower, upper = (np.nan if each is None else each.value_m for each in line.gaps)
@@ -267,7 +266,7 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
 
 
 def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Return how far values lie from the median of their side, NaN where they are on none."""
+    """Return the deviation of values from the median of their side; NaN without a side."""
     apart = np.full(values.size, np.nan)
     for each in sides:
         apart[each] = values[each] - np.median(values[each])
@@ -275,7 +274,7 @@ def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
 
 
 def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:
-    """Fit with Huber's weights; gives the solution and its covariance."""
+    """Fit with Huber's weights; return the solution and its covariance."""
     weight = np.ones(target.size)
     for _ in range(_HUBER_ROUNDS):
         solution, *_ = np.linalg.lstsq(matrix * weight[:, None], target * weight)
@@ -292,17 +291,17 @@ def _gap(value: float, variance: float, unknown: float, side: Flags) -> FreeGap:
 
 @dataclass(frozen=True)
 class FreeNumbers:
-    """m1, c1 and the linear numbers without a contact model."""
+    """m1, c1 and linear parameters, found without a contact model."""
 
     tracked: TrackedSpecimen
     """The specimen with both."""
     sd: Reals
-    """Standard deviation of each of them, relative, in the order of `FITTED`."""
+    """Relative standard deviations in the order of `FITTED`."""
     misfit: float
 
 
 def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeNumbers:
-    """Fit m1, c1, k0, k2, c0 and c2 so that flights fit best: Gauss and Newton on the innovations.
+    """Fit m1, c1, k0, k2, c0 and c2 to flights by Gauss-Newton on the innovations. ¶
 
     Raises NotEnoughData when no stretch is long enough.
     """
@@ -350,7 +349,7 @@ def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
 
 
 def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:
-    """Return the normalised innovations of stretches whose windows stay as they are."""
+    """Return the normalised innovations of stretches with fixed windows."""
     model = motion_model(tracked, motion).without_stops
     begin = round(_RESIDUAL_START_S * motion.sample_rate_hz)
     parts = []
@@ -364,7 +363,7 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
 
 _COLUMNS = 7
 _MOST_STEPS = 400
-"""A contact that lasts this many samples is no collision: m1 has come to rest on the stop."""
+"""Longest contact of a collision [samples]; in longer ones m1 rests on the stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -374,7 +373,7 @@ class Collisions(Labelled):
     OWN_UNITS: ClassVar = {"impulses": "N s", "speeds_before": "m s-1", "speeds_after": "m s-1"}
 
     samples: Reals
-    """Touch, in samples of the motion."""
+    """Start of contact, in samples of the motion."""
     durations_s: Reals
     sides: Reals
     """-1 at the lower stop, +1 at the upper one."""
@@ -388,12 +387,12 @@ class Collisions(Labelled):
 
     @property
     def count(self) -> int:
-        """How many."""
+        """Number of collisions."""
         return self.samples.size
 
 
 def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiece) -> Collisions:
-    """Follow every contact that begins in a piece, from the smoothed flight before it to its end."""
+    """Simulate every contact that starts in a piece, from the smoothed flight before it."""
     smoothed, tables = piece.smoothed, model.tables
     samples = smoothed.states.shape[0]
     rows = np.empty((samples + 1, _COLUMNS))
@@ -416,7 +415,7 @@ def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiec
 
 
 def join_collisions(parts: list[Collisions]) -> Collisions:
-    """Put those of several pieces after one another."""
+    """Join the collisions of several pieces."""
     names = [each.name for each in fields(Collisions)]
     return Collisions(
         **{name: np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in names}

@@ -1,7 +1,7 @@
-"""Gaps, m1, springs, dampers and contact law, found while the motion is tracked: a filter with parameters.
+"""Estimate gaps, m1, springs, dampers and contact law while the motion is tracked.
 
-The parameters are states that do not change. The filter begins with the channels' noise taken as many times
-larger, so that a wrong parameter costs the track little, and the noise is brought down while they are found.
+The parameters are constant states of the filter. It starts with a much larger noise of the channels, so
+that wrong parameters do not lose the track, and reduces it as they converge.
 """
 
 import math
@@ -29,20 +29,19 @@ from ._tracking import acquire
 from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m, step_tables
 
 _WANDER = 0.02
-"""Of the prior standard deviation, in every block: a parameter that is sure of itself too early moves on."""
+"""Random walk per block relative to the prior standard deviation, against early overconfidence."""
 REBUILT_S = 0.05
-"""After this length of motion the tables are those of the parameters found so far."""
+"""Interval after which the tables are computed for the current parameters [s]."""
 _LOST = (
     f"each track was lost within {REBUILT_S:g} s while the numbers were looked for, so that what is taken as "
     "described (m0, m2, k1, the kind of contact) may be otherwise"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
-"""Length of tracked motion, and the factor of the velocity's variance until then."""
+"""Schedule: length of tracked motion, and factor of the velocity variance until then."""
 _LEAST_OF_START = 0.05
-"""No parameter falls below this part of what it began with: none of them can be negative, but the loss,
-whose error goes both ways around none."""
+"""Lower limit of a parameter relative to its start; only the loss may be negative."""
 _FURTHEST = 8.0
-"""Prior standard deviations from the description at which the search is given up."""
+"""Deviation from the description at which the search stops, in prior standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +51,18 @@ class Estimate:
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]
     begun_at: Reals
-    """Where the search began, shape (parameters,), SI."""
+    """Start of the search, shape (parameters,), SI."""
     prior_sd: Reals
-    """How far from there they were looked for, shape (parameters,)."""
+    """Prior standard deviations, shape (parameters,)."""
     moved: Reals
-    """How far from there they are, in prior standard deviations, shape (parameters,)."""
+    """Deviations from the start in prior standard deviations, shape (parameters,)."""
     covariance: Reals
-    """As the filter claims it, in prior standard deviations, shape (parameters, parameters)."""
+    """Covariance by the filter in units of the prior, shape (parameters, parameters)."""
     wandered: float
-    """Variance that was added to each parameter on the way, in the same units."""
+    """Variance added to each parameter by its random walk, in the same units."""
     followed_s: float
     innovation_level: float
-    """Mean squared normalised innovation of the last part, at the channels' own noise; 1 for a good model."""
+    """Mean squared normalised innovation of the last part at the true noise; 1 for a good model."""
 
 
 def estimate(
@@ -73,15 +72,15 @@ def estimate(
     first: int,
     stop: int,
 ) -> Estimate | str:
-    """Find parameters between two samples of a motion; a sentence where they are not told.
+    """Find parameters between two samples of a motion; return a sentence if they are undetermined.
 
-    ``relative_sd`` names them, and says how far from ``start`` they may be.
+    ``relative_sd`` names them and gives their prior relative to ``start``.
     """
     return _Search(start, motion, relative_sd).over(first, stop)
 
 
 class _Search:
-    """Parameters on their way."""
+    """State of a search for parameters."""
 
     def __init__(
         self, start: TrackedSpecimen, motion: PreparedMotion, relative_sd: Mapping[Hidden, float]
@@ -98,7 +97,7 @@ class _Search:
         self._followed, self._level = 0, math.nan
 
     def over(self, first: int, stop: int) -> Estimate | str:
-        """Track from one sample to another, and begin again after every loss."""
+        """Track from one sample to another; restart after every loss."""
         rate = self._motion.sample_rate_hz
         block = round(REBUILT_S * rate)
         at: FilterState | None = None
@@ -109,7 +108,7 @@ class _Search:
                 begun = acquire(self._inflated(model), self._motion, looked)
                 match begun:
                     case str():
-                        # The first reason: the last one is that the motion ends.
+                        # Report the first reason; the last one is always the end of the motion.
                         why, looked = why or begun, looked + block
                         continue
                     case FilterState():
@@ -171,7 +170,7 @@ class _Search:
         return [step_tables(each, rate, coupling) for each in (current, *raised)]
 
     def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
-        """Filter some samples; says whether the track held."""
+        """Filter some samples; return whether the track held."""
         size = STATES + len(self._wanted)
         noise = np.zeros((size, size))
         noise[:STATES, :STATES] = model.step_noise
@@ -200,21 +199,21 @@ class _Search:
         )
 
 
-# Where a search begins that cannot begin at the description: without a contact model.
+# Start of a search without a contact model, if the description does not work as one.
 #
-# m1, springs and dampers from flights, gaps and loss from where impacts happen and how fast they end.
+# m1, springs and dampers from flights, gaps from positions of impacts, loss from their speeds.
 
 _TELLING_LOSS = 0.15
-"""Loss [s/m] from which speeds without a contact model tell more than a description."""
+"""Least loss [s/m] for which these speeds are better than a description."""
 _LAW_UNKNOWN = 0.3
-"""Part of a depth by the described law, which may be another."""
+"""Relative error of a depth by the described law, which may be wrong."""
 _FREE_S = 3.0
 
 
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Find a start without a contact model, and how far from it to look; a sentence where there is none."""
+    """Return a start without a contact model and its prior; a sentence if there is none."""
     rate = motion.sample_rate_hz
     numbers = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
@@ -253,7 +252,7 @@ def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]
 
 
 def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Return gaps where impacts are all alike: |p| there, less the depth that the described law has."""
+    """Return gaps for impacts that are all alike: |p| minus the depth by the described law."""
 
     def gap(side: float) -> FreeGap | None:
         here = impacts.sides == side

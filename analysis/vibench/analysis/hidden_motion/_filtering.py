@@ -14,19 +14,19 @@ from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 
 _DIFFUSION_OF_GAP = 7e-6
-"""What the model leaves out moves each mass by this part of the gap in the root of a millisecond."""
+"""Model error of each mass: displacement relative to the gap per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""... and changes its speed by this part of the gap times the highest natural frequency."""
+"""... and speed relative to the gap times the highest natural frequency."""
 _DRIFT_M_PER_S2 = 1e-3
 """Drift of the accelerometer's slow error in the root of a second."""
 _ACCELERATION_EXCESS = 1.5
-"""Variance of an acceleration between samples over that of one: what linear interpolation adds."""
+"""Ratio of the variance of an acceleration between samples to that of one, by linear interpolation."""
 _IMPULSE_SHARE = 0.003
-"""Error of a collision's impulse that the model's own equations may make."""
+"""Relative model error of a collision's impulse."""
 _SMOOTHING_S = 8e-3
-"""Over which squared innovations are averaged to notice a loss."""
+"""Averaging time of squared innovations to detect a loss [s]."""
 LOSS_LIMIT = 8.0
-"""Mean squared normalised innovation, 1 for a track, beyond which the motion is no longer followed."""
+"""Largest mean squared normalised innovation of a track; about 1 is good."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
 """Kind of a step without a stop."""
@@ -34,7 +34,7 @@ _FLIGHT = 0.0
 
 @dataclass(frozen=True, eq=False)
 class MotionModel:
-    """A specimen behind a bench's channels, as the filter takes it."""
+    """Model of specimen and channels for the filter."""
 
     specimen: Specimen
     tables: StepTables
@@ -44,7 +44,7 @@ class MotionModel:
 
     @property
     def without_stops(self) -> "MotionModel":
-        """The same, m1 free to pass: for a contact force that no law tells."""
+        """Return the model without stops, for an unknown contact force."""
         stop = self.tables.stop.copy()
         stop[:2] = np.inf
         return replace(self, tables=replace(self.tables, stop=stop))
@@ -56,14 +56,14 @@ class MotionModel:
 
 
 def motion_model(tracked: TrackedSpecimen, motion: PreparedMotion) -> MotionModel:
-    """Build what the filter needs for a motion."""
+    """Build the filter's model for a motion."""
     tables = step_tables(tracked, motion.sample_rate_hz, motion.coupling_rad_per_s)
     noise = step_noise(tracked.specimen, tables, motion.noise)
     return MotionModel(tracked.specimen, tables, noise, motion.noise.velocity**2)
 
 
 def step_noise(specimen: Specimen, tables: StepTables, noise: ChannelNoise) -> Reals:
-    """Return Q: the accelerometer's noise, what the model leaves out, and the drift of the acceleration."""
+    """Return Q: accelerometer noise, model error, and drift of the acceleration."""
     gap_m = min(specimen.gaps_m)
     speed = gap_m * 2.0 * np.pi * float(specimen.natural_frequencies_hz[-1])
     per_ms = tables.step_s / 1e-3
@@ -79,49 +79,49 @@ def step_noise(specimen: Specimen, tables: StepTables, noise: ChannelNoise) -> R
 
 @dataclass(eq=False)
 class FilterState:
-    """Where a run of the filter stands; it moves on in place."""
+    """State of a run of the filter, updated in place."""
 
     sample: int
-    """Number in the motion of the last sample that was used."""
+    """Index of the last used sample in the motion."""
     state: Reals
     covariance: Reals
     innovation_level: float = 1.0
     """Running mean of the squared normalised innovation."""
 
     def copy(self) -> "FilterState":
-        """Return one that moves on by itself."""
+        """Return an independent copy."""
         return FilterState(self.sample, self.state.copy(), self.covariance.copy(), self.innovation_level)
 
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """What a run of the filter kept, sample by sample, before each sample was used."""
+    """Predictions of a run of the filter, before each sample was used."""
 
     first: int
     """Number in the motion of the first sample."""
     states: Reals
     covariances: Reals
     innovations: Reals
-    """Innovation and its variance; the variance is 0 where the sample was not used."""
+    """Innovation and its variance, which is 0 if the sample was not used."""
     kinds: Reals
     jacobians: Reals
     impulses: Reals
 
     @property
     def squared(self) -> Reals:
-        """Squared normalised innovations; NaN where a sample was not used."""
+        """Squared normalised innovations; NaN if a sample was not used."""
         value, variance = self.innovations.T
         return np.asarray(np.where(variance > 0, value**2 / np.where(variance > 0, variance, 1.0), np.nan))
 
     @classmethod
     def room(cls, first: int, count: int) -> "Filtered":
-        """Make room for this many samples."""
+        """Allocate arrays for this many samples."""
         shapes = (STATES,), (STATES, STATES), (2,), (), (STATES, STATES), ()
         return cls(first, *(np.empty((count, *shape)) for shape in shapes))
 
     @property
     def arrays(self) -> dict[str, Reals]:
-        """Arrays by name, in the order of the fields; `TrackRecord` in native/structures.hpp has the same."""
+        """Return arrays by name, in the order of `TrackRecord` in native/structures.hpp."""
         return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
 
     def samples(self, begin: int, end: int | None = None) -> "Filtered":
@@ -130,7 +130,7 @@ class Filtered:
 
     @property
     def record(self) -> Structure:
-        """What the native engine fills and smooths."""
+        """Return the record for the native engine."""
         return native_engine().new("TrackRecord", **self.arrays)
 
 
@@ -143,9 +143,9 @@ def run_filter(
     loss_limit: float = np.inf,
     force_variance: Reals = _NOTHING,
 ) -> Filtered:
-    """Move ``at`` on by ``count`` samples, or until the running innovations pass the limit.
+    """Advance ``at`` by ``count`` samples, or until the mean innovation exceeds the limit.
 
-    ``force_variance`` is that of a contact force held over each sample [N^2], where no law tells it.
+    ``force_variance`` is the variance of an unknown contact force held over each sample [N^2].
     """
     kept = Filtered.room(at.sample + 1, min(count, motion.samples - 1 - at.sample))
     done = move_filter(
@@ -175,9 +175,9 @@ def move_filter(
     force_variance: Reals = _NOTHING,
     record: Structure | None = None,
 ) -> int:
-    """Move ``at`` on by up to ``count`` samples; returns how many were done before a loss.
+    """Advance ``at`` by up to ``count`` samples; return how many were done before a loss.
 
-    Tables behind the first are the model with one parameter raised by its deviation.
+    Tables after the first have one parameter changed by its deviation.
     """
     engine, first = native_engine(), tables[0]
     work = engine.new(
@@ -210,7 +210,7 @@ def move_filter(
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A stretch seen from both its ends."""
+    """A smoothed stretch."""
 
     first: int
     states: Reals
@@ -218,11 +218,11 @@ class Smoothed:
     variances: Reals
     """Variances of p and of its rate, shape (samples, 2)."""
     forces: Reals
-    """Latent force on m1 and its variance, shape (samples, 2); only where one was asked for."""
+    """Latent force on m1 and its variance, shape (samples, 2), if requested."""
     first_covariance: Reals
     """Covariance of the first state, shape (8, 8)."""
     touched: Flags
-    """Where a step met a stop."""
+    """Steps with contact."""
 
     @property
     def p(self) -> Reals:
@@ -236,7 +236,7 @@ class Smoothed:
 
 
 def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) -> Smoothed:
-    """Run back over what the filter kept."""
+    """Smooth a run of the filter backwards."""
     count = run.states.shape[0]
     states, variances = np.empty((count, STATES)), np.empty((count, 2))
     forces, matrix = np.empty((force_variance.size, 2)), np.empty((STATES, STATES))

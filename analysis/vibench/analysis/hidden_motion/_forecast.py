@@ -1,4 +1,4 @@
-"""Where m1 will be in some milliseconds, under a sine that goes on; and how wrong that has turned out."""
+"""Forecast of m1 for some milliseconds under a steady sine, with its observed error."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -14,35 +14,34 @@ from ._tracking_model import STATES, VX, W, X, Y, Z, equations, exact_flow
 
 AHEAD_S = 0.04
 LEARNT_S = 0.15
-"""Length of motion that tells how the base moves."""
+"""Length of motion for the model of the base [s]."""
 _HARMONICS = 3
 _YIELDING = (X, VX, W)
-"""States that the base's acceleration follows: the specimen pushes the table through k0 and c0."""
+"""States that act on the base: the specimen pushes the table through k0 and c0."""
 _BIN_S = 1e-3
 _WITHIN = 0.68
 _FEWEST, _MOST = 5, 40
-"""Forecasts whose errors are looked at: the newest."""
+"""Number of newest forecasts used for the error."""
 _NOT_MEASURED = 1e30
-"""Variance of a sample that is not there."""
+"""Variance of a missing sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast(Labelled):
-    """p from now on, one value a sample."""
+    """Forecast of p, one value per sample."""
 
     OWN_UNITS: ClassVar = {"p": "m", "error": "m"}
 
     first: int
-    """Number in the recording of the first sample."""
+    """Index of the first sample in the recording."""
     p: Reals
     """[m]"""
     error: Reals
-    """Within which 68 % of the last forecasts were, as far ahead, as the track then showed [m]; NaN until
-    some were seen."""
+    """Error that 68 % of recent forecasts did not exceed at the same horizon [m]; NaN without any."""
 
 
 class Forecaster:
-    """Makes forecasts, and compares them with what came."""
+    """Makes forecasts, and compares them with the track."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._bin = max(1, round(_BIN_S * sample_rate_hz))
@@ -58,9 +57,9 @@ class Forecaster:
         states: Reals,
         frequency_hz: float,
     ) -> Forecast | None:
-        """Let the motion go on from ``at``; ``states`` are those of the newest samples up to it.
+        """Forecast the motion after ``at``; ``states`` are those of the newest samples.
 
-        None where the base does not tell how it yields: it hardly moves, or moves otherwise.
+        None if the base hardly moves or does not follow the sine.
         """
         rate = motion.sample_rate_hz
         numbers = motion.first_sample + at.sample - np.arange(states.shape[0] - 1, -1, -1)
@@ -89,7 +88,7 @@ class Forecaster:
         return np.asarray(np.repeat(np.maximum.accumulate(usual), self._bin))
 
     def compare(self, first: int, p: Reals) -> None:
-        """Hold forecasts against the track from sample ``first`` on, NaN where it was lost."""
+        """Compare forecasts with the track from sample ``first``, NaN where it was lost."""
         while self._pending and self._pending[0][0] + self._count <= first + p.size:
             begin, told = self._pending.popleft()
             if begin < first:
@@ -105,7 +104,7 @@ def _tones(turns: Reals) -> Reals:
 
 
 def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> MotionModel:
-    """Let the base yield to the specimen, as the recording shows it to do."""
+    """Add the reaction of the specimen on the base, as found in the recording."""
     a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
     a[:, _YIELDING] += np.outer(base, weights)
     tables = model.tables

@@ -1,7 +1,7 @@
-"""What a colliding motion tells of a specimen: gaps, m1, springs, dampers, law, with bounds.
+"""Parameters of a specimen from a colliding motion, with bounds.
 
-A description that the motion can be tracked with is only refined. One that it cannot is searched: m1, springs
-and dampers from flights, the gaps from where impacts happen, both without a contact model, then everything
+If the motion can be tracked with the description, it is only refined. Otherwise a start is found without a
+contact model: m1, springs and dampers from flights, gaps from impacts. Then all are found
 by tracking.
 """
 
@@ -23,39 +23,38 @@ from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
-"""Length of each restart."""
+"""Length of each restart [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Of a short motion they overlap, and differ in where they begin to look."""
+"""Number of restarts; in a short motion they overlap and differ by their starts."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
-"""Mean squared innovation of a description that is not searched but refined."""
+"""Largest mean squared innovation of a description that is only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
-"""Standard deviations by which gaps told without a contact model are moved where no track holds with them."""
+"""Shifts of gaps found without a contact model, in standard deviations, tried if no track holds."""
 _TOLD = 0.5
-"""Standard deviation over that of a description above which the data say nothing that was not assumed."""
+"""Ratio to the standard deviation of the description above which the data add no information."""
 _WIDE = 3.0
-"""Prior standard deviations of a description that are put in the place of a narrow prior."""
+"""Prior standard deviations of a description that replace a narrow prior."""
 _FAR = 3.0
-"""Standard deviation over the narrow prior's above which a parameter was hardly looked for."""
+"""Ratio to the narrow prior above which the search hardly determined a parameter."""
 _SETTLED = 1.0
-"""Narrow priors that a value may lie from where the filter looked for it."""
+"""Largest distance of a value from the start of the filter, in narrow priors."""
 _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
-"""Relative, of what follows a frequency squared: converters' clocks keep 50 parts in a million, which no
-recording of its own can tell."""
+"""Relative error of squared frequencies by the converter clock (50 ppm), which no recording shows."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
     Hidden.FORCE: 0.02,
     Hidden.EXPONENT: 1.5e-3,
 }
-"""Error [SI] that restarts share where m1 meets one stop alone: on 15 random dwells all gaps came out
-smaller, by 0.4 to 7 nm, from a cause that was not found."""
+"""Systematic error [SI] if m1 strikes one stop only: on 15 random dwells all gaps were 0.4 to 7 nm too
+small, for an unknown reason."""
 _STARTS_APART = 0.3
-"""Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
+"""Spread of the starts in prior standard deviations, so that memory of them shows as scatter."""
 
 
 _SHOWN = {
@@ -75,14 +74,14 @@ _SHOWN = {
 
 
 def with_unit(value: float, half: float, unit: str) -> str:
-    """Write a value with half the width of its bounds."""
+    """Return a value with the half width of its bounds as text."""
     shown = plus_minus(value, half)
     return f"({shown}) {unit}".strip() if unit and "±" in shown else f"{shown} {unit}".strip()
 
 
 @dataclass(frozen=True)
 class FoundParameter:
-    """One parameter as collisions tell it."""
+    """One parameter found from collisions."""
 
     OWN_UNITS: ClassVar = dict.fromkeys(("value", "low", "high", "described"), "{0.unit}")
 
@@ -90,10 +89,10 @@ class FoundParameter:
     value: float
     low: float
     high: float
-    """Bounds of 95 %: restarts over parts of the motion, and what each of them claims."""
+    """95 % bounds from the scatter of restarts and their own uncertainties."""
     described: float
     not_determined: str = ""
-    """Why there is no value, in a sentence; empty where there is one."""
+    """Reason for a missing value; otherwise empty."""
 
     @property
     def unit(self) -> str:
@@ -102,7 +101,7 @@ class FoundParameter:
 
     @property
     def is_determined(self) -> bool:
-        """Whether value and bounds mean something."""
+        """Return whether there are a value and bounds."""
         return not self.not_determined
 
     @property
@@ -112,7 +111,7 @@ class FoundParameter:
 
     @property
     def row(self) -> tuple[str, str, str]:
-        """Name, value with bounds of 95 % or why there is none, as described."""
+        """Name, value with 95 % bounds or the reason for none, and described value."""
         label, factor, unit = _SHOWN[self.what]
         said = self.not_determined and f"not determined: {self.not_determined}"
         value = with_unit(factor * self.value, factor * self.half_width, unit)
@@ -121,17 +120,17 @@ class FoundParameter:
 
 @dataclass(frozen=True, eq=False)
 class FoundSpecimen(Labelled):
-    """What was found, and the specimen that the motion is tracked with."""
+    """Parameters that were found, and the specimen for tracking."""
 
     tracked: TrackedSpecimen
     parameters: tuple[FoundParameter, ...]
     restarts: int
     searched: bool
-    """Whether the description could not be tracked with."""
+    """Whether tracking failed with the description."""
 
 
 def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundSpecimen:
-    """Find the parameters that collisions tell."""
+    """Find the parameters that collisions determine."""
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
@@ -147,7 +146,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
         start = first_look.tracked
     found = _refine(described, motion, start, near)
     for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
-        # Move both gaps by the same number of standard deviations: without a contact model they err together.
+        # Shift both gaps by the same number of standard deviations, because their errors are common.
         gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
         moved = with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
         looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
@@ -164,7 +163,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
 
 
 def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estimate]:
-    """Whether a search over a stretch kept its track for half of it."""
+    """Return whether a search kept its track for half of a stretch."""
     enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
     return isinstance(answer, Estimate) and answer.followed_s > enough_s
 
@@ -172,7 +171,7 @@ def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estima
 def _refine(
     described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> FoundSpecimen | str:
-    """Find parameters near a start, and again from the result while it moves."""
+    """Find parameters near a start; repeat from the result until it converges."""
     wanted = tuple(near)
     for _ in range(_ROUNDS):
         good = _restarts(motion, start, near)
@@ -206,12 +205,12 @@ def _refine(
 def _restarts(
     motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> list[Estimate] | str:
-    """Search several parts of a motion from different beginnings; a sentence where too few held."""
+    """Search several parts of a motion from different starts; return a sentence if too few held."""
     stretches = _stretches(motion)
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # What does not hold from a start elsewhere is tried from the start itself, and from what was found.
+        # If a shifted start fails, try the start itself, then the result.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
             if _is_held(answer, motion):
@@ -230,24 +229,24 @@ def _restarts(
 
 @dataclass(frozen=True, eq=False)
 class _Combined:
-    """Parameters as the motion alone tells them; all of shape (parameters,), SI."""
+    """Parameters from the motion without the prior; all of shape (parameters,), SI."""
 
     values: Reals
     half: Reals
-    """Half the width of the bounds."""
+    """Half width of the bounds."""
     sd: Reals
-    """Standard deviation as the filter claims it, or the scatter."""
+    """Standard deviation by the filter or by scatter."""
     assumed: Reals
     """Standard deviation of a description."""
     beyond: Reals
-    """How far the values lie from where the filter looked."""
+    """Distance of the values from the filter's start."""
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
-    """Return the mean of restarts, and half the width of its bounds: from the larger of scatter and claims.
+    """Return the mean of restarts and its half width, from the larger of scatter and claimed uncertainty.
 
-    Restarts over the same samples are not independent: their scatter tells what they have not forgotten.
-    Scatter beyond what is claimed tells of a model that does not fit, and a few values tell it badly.
+    Restarts over the same samples are not independent, so their scatter shows the memory of their starts.
+    Larger scatter than claimed shows a wrong model, and is uncertain for few values.
     """
     wanted = found[0].wanted
     centre = np.array([value_of(described, each) for each in wanted])
@@ -268,11 +267,11 @@ def combine(found: list[Estimate], described: TrackedSpecimen, independent: floa
 
 
 def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
-    """Take back that parameters were looked for near the start alone: values, claimed and likely variances.
+    """Replace the narrow prior by a wide one; return values, claimed and likely variances.
 
-    The filter weighs the motion against a narrow prior, without which it loses its track. What a motion tells
-    weakly would stay where the description put it, with bounds as narrow as the prior. In units of that
-    prior the motion's own information is J = P^-1 - 1; with a wide prior in its place nothing is held back.
+    The filter needs a narrow prior to keep its track. Weakly determined parameters would stay at the
+    description, with bounds as narrow as the prior. In units of that prior the information of the motion is
+    J = P^-1 - 1.
     """
     size = len(found.wanted)
     inverse = np.linalg.inv(found.covariance)
@@ -283,8 +282,8 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     pull = weak @ ((centre - found.begun_at) / found.prior_sd)
     moved = freed @ (inverse @ found.moved + pull)
     variance = np.diag(freed)
-    # A parameter that wanders is better known than it claims once wandering is all that it does not know;
-    # one that is hardly determined states honest bounds, which wandering would widen.
+    # The random walk of a well determined parameter overstates its variance; for a hardly determined one
+    # the stated bounds are right.
     wandering = found.wandered / (found.wandered + np.diag(found.covariance))
     part = np.array([SEARCHES[each].claimed for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
@@ -305,7 +304,7 @@ def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) ->
 
 
 def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
-    """Return what was found without its values, of which ``why`` says that they are not the specimen's."""
+    """Return the parameters without values, with the reason ``why`` they are not the specimen's."""
     nan = float("nan")
     parameters = tuple(
         each if each.not_determined else replace(each, value=nan, low=nan, high=nan, not_determined=why)
@@ -323,7 +322,7 @@ def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
 
 
 def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) -> TrackedSpecimen:
-    """Begin each restart elsewhere, in a fixed pattern of signs."""
+    """Shift the start of each restart, in a fixed pattern of signs."""
     sign = {each: 1.0 if (number >> (place % 2)) % 2 else -1.0 for place, each in enumerate(near)}
     return with_values(
         start,
@@ -335,7 +334,7 @@ def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) ->
 
 
 def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
-    """Try short stretches with the numbers as they are."""
+    """Return whether short stretches can be tracked with the description."""
     model = motion_model(tracked, motion)
     count = round(_TRIAL_S * motion.sample_rate_hz)
     firsts = np.linspace(0, max(0, motion.samples - 2 * count), _TRIALS).astype(int)

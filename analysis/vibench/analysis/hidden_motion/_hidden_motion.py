@@ -1,4 +1,4 @@
-"""The hidden motion of one recording: tracked, and without a contact model, side by side."""
+"""Hidden motion of one recording, tracked and without a contact model."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -34,48 +34,47 @@ from ._tracking_model import TrackedSpecimen, tracked_specimen
 
 MICRO = 1e6
 _LEAST_HELD = 0.95
-"""Share of the motion, once a track was started, that numbers which are right lose none of."""
+"""Least tracked share of the motion with correct parameters."""
 _HIGHEST_LEVEL = 1.25
-"""Mean squared innovation in flight above which the specimen is another than the filter's; 0.8 to 1.1 with
-the right one."""
+"""Largest mean squared innovation in flight with correct parameters; 0.8 to 1.1 are usual."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrackedMotion(Labelled):
-    """p as the extended Kalman filter followed and smoothed it; NaN where it was not followed."""
+    """p tracked by the extended Kalman filter and smoothed; NaN where the track was lost."""
 
     OWN_UNITS: ClassVar = {"p": "m", "rate": "m s-1", "p_sd": "m"}
 
     p: Samples
     """Relative displacement y - z, shape (samples,) [m]."""
     rate: Samples
-    """Its rate [m/s]."""
+    """"""
     p_sd: Samples
     """Standard deviation of p [m]."""
     collisions: Collisions
     not_followed: tuple[NotFollowed, ...]
     innovation_level: float
-    """Mean squared normalised innovation in flight: 1 for a model that leaves nothing but noise."""
+    """Mean squared normalised innovation in flight; 1 if only noise remains."""
 
     @property
     def share_followed(self) -> float:
-        """Part of the samples with a track."""
+        """Share of samples with a track."""
         return float(np.mean(~np.isnan(self.p)))
 
 
 @dataclass(frozen=True, eq=False)
 class HiddenMotion(Labelled):
-    """What base acceleration and m0's velocity tell of the motion that nobody measured."""
+    """Hidden motion estimated from base acceleration and m0's velocity."""
 
     name: str
     sample_rate_hz: float
     first_sample: int
-    """Number in the recording of the first sample here."""
+    """Index of the first sample in the recording."""
     noise: ChannelNoise
     specimen: TrackedSpecimen
-    """The numbers that the motion was tracked with."""
+    """Parameters used for tracking."""
     found: FoundSpecimen | None
-    """What collisions told; None when the description was taken as it is."""
+    """Parameters found from collisions; None if the description was used."""
     tracked: TrackedMotion
     free: FreeMotion
     free_gaps: tuple[FreeGap | None, FreeGap | None]
@@ -83,26 +82,26 @@ class HiddenMotion(Labelled):
 
     @property
     def time_s(self) -> Reals:
-        """Since the beginning of the recording, shape (samples,) [s]."""
+        """Time since the start of the recording, shape (samples,) [s]."""
         return (self.first_sample + np.arange(self.tracked.p.size)) / self.sample_rate_hz
 
     @property
     def gaps_m(self) -> tuple[float, float]:
-        """Lower and upper gap that the motion was tracked with."""
+        """Lower and upper gap used for tracking."""
         return self.specimen.specimen.gaps_m
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether the specimen's numbers were taken as given, or found: otherwise nothing told has bounds."""
+        """Return whether the parameters were given or found; otherwise results have no bounds."""
         return self.found is None or any(each.is_determined for each in self.found.parameters)
 
     @property
     def parameters(self) -> tuple[FoundParameter, ...]:
-        """What collisions told of the specimen; empty when nobody asked."""
+        """Parameters found from collisions; empty if not requested."""
         return () if self.found is None else self.found.parameters
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON: what was found and how well, without the motion itself."""
+        """Return the results as JSON, without the motion itself."""
         return {
             "share_followed": self.tracked.share_followed,
             "impacts": self.tracked.collisions.count,
@@ -136,7 +135,7 @@ class HiddenMotion(Labelled):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Return what was followed, what was not, and what was found."""
+        """Return sentences on tracked and lost parts, and on the parameters."""
         return tuple(_sentences(self))
 
 
@@ -153,11 +152,11 @@ def hidden_motion(
     numbers: Numbers = Numbers.FOUND,
     observer: Observer = ignore_progress,
 ) -> HiddenMotion:
-    """Tell the relative motion of m1 and its collisions from base acceleration and m0's velocity.
+    """Estimate the relative motion of m1 and its collisions from base acceleration and m0's velocity.
 
-    Two ways, side by side. Without a contact model: the force on m1 is an unknown, and follows from the
-    specimen's linear numbers. Tracked: an extended Kalman filter on the seven relative states and the error
-    of the accelerometer, with exact flight, and a smoother back over it. docs/hidden-motion.md has the
+    Without a contact model, the force on m1 is an unknown and follows from the linear parameters. For
+    tracking, an extended Kalman filter and smoother use the seven relative states and the error of the
+    accelerometer, with exact flight. docs/hidden-motion.md has the
     equations.
 
     Parameters
@@ -165,10 +164,10 @@ def hidden_motion(
     recording
         Any, with base acceleration and m0's velocity; sampled at 10 kHz or more, 51.2 kHz for its law.
     specimen
-        As it is known: m0, m2 and k1 are taken as they are, all else within some per cent; as the recording
-        describes it when left out.
+        Description; m0, m2 and k1 are taken as exact, all else within some per cent. By default from the
+        recording.
     start_s, stop_s
-        Stretch of the recording [s]; all of it when left out.
+        Stretch of the recording [s]; by default all of it.
     numbers
         Whether gaps, m1, springs, dampers and contact law are found first.
     observer
@@ -177,10 +176,9 @@ def hidden_motion(
     Raises
     ------
     InvalidRequest
-        When the stretch is none, or the contact law has no stops that yield.
+        When the stretch is empty, or the stops of the contact law are rigid.
     UnusableData
-        When samples were lost, a channel is missing, the rate is too low, or the recording is not as it was
-        sealed.
+        When samples were lost, a channel is missing, the rate is too low, or the recording was changed.
     NotEnoughData
         When the stretch is too short.
     """
@@ -202,14 +200,14 @@ def hidden_motion_in_samples(
     specimen: Specimen,
     numbers: Numbers = Numbers.FOUND,
 ) -> HiddenMotion:
-    """Tell the hidden motion from samples whose sensors are taken out already; as `hidden_motion`.
+    """Estimate the hidden motion from samples corrected for their sensors; see `hidden_motion`.
 
     Parameters
     ----------
     base_acceleration
-        Of the base, DC included, shape (n,) [m/s2].
+        Acceleration of the base including DC, shape (n,) [m/s2].
     m0_velocity
-        Of m0 at the same instants, absolute, shape (n,) [m/s].
+        Absolute velocity of m0 at the same instants, shape (n,) [m/s].
     sample_rate_hz
         Of both.
     specimen
@@ -220,7 +218,7 @@ def hidden_motion_in_samples(
     Raises
     ------
     InvalidRequest
-        When the arrays differ in length, or the contact law has no stops that yield.
+        When the arrays differ in length, or the stops of the contact law are rigid.
     UnusableData
         When samples are not finite, or the rate is too low.
     NotEnoughData
@@ -245,7 +243,7 @@ def hidden_motion_of(
     name: str,
     observer: Observer = ignore_progress,
 ) -> HiddenMotion:
-    """Go through a prepared motion both ways."""
+    """Apply both methods to a prepared motion."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
     followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples))
@@ -284,7 +282,7 @@ def _tracked_motion(
     motion: PreparedMotion, tracked: TrackedSpecimen, found: FoundSpecimen | None, told: Callable[[int], None]
 ) -> TrackedMotion:
     model = motion_model(tracked, motion)
-    # Seven digits: more than is known of any of them, and half of the memory.
+    # Single precision is enough and halves the memory.
     p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(3))
     collisions: list[Collisions] = []
     lost: list[NotFollowed] = []
@@ -315,7 +313,7 @@ def _tracked_motion(
 
 
 def _fault_of_numbers(tracked: TrackedMotion) -> str:
-    """Return why the numbers that a motion was tracked with are not its specimen's, or nothing."""
+    """Return the reason why the parameters cannot be the specimen's, if there is one."""
     told = ~np.isnan(tracked.p)
     held = float(np.mean(told[int(np.argmax(told)) :]))
     if held < _LEAST_HELD:
@@ -329,7 +327,7 @@ def _fault_of_numbers(tracked: TrackedMotion) -> str:
 
 
 def _gap_sd(found: FoundSpecimen | None) -> float:
-    """Return what the gaps' uncertainty, a quarter of the width of their bounds, adds to that of p."""
+    """Return the uncertainty of p by that of the gaps, a quarter of the width of their bounds."""
     if found is None:
         return 0.0
     gaps = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
@@ -338,7 +336,7 @@ def _gap_sd(found: FoundSpecimen | None) -> float:
 
 
 def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
-    """Return what was found as rows: name, value with bounds of 95 % or why there is none, as described."""
+    """Return rows of parameters: name, value with 95 % bounds or the reason for none, description."""
     return tuple(each.row for each in motion.parameters)
 
 
@@ -388,11 +386,11 @@ _TIME, _IMPACT, _FREE = "time", "impact_time", "free_impact_time"
 
 
 def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
-    """Save a hidden motion beside the samples it came from; gives the name of the result.
+    """Save a hidden motion in its recording; return the name of the result.
 
-    Exports take it along (`vibench export --results`). Not followed samples are NaN.
+    Exports can include it (`vibench export --results`). Samples without a track are NaN.
 
-    Raises RecordingError when the recording is not finished, or the disk refuses.
+    Raises RecordingError when the recording is unfinished or cannot be written.
     """
     arrays = {**_channels(motion), **_tracked_impacts(motion), **_free_impacts(motion)}
     settings = {"told": motion.to_dict(), "sentences": list(motion.sentences)}

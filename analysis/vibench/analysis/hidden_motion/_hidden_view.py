@@ -1,4 +1,4 @@
-"""The hidden motion of a short stretch, for a picture: what is asked, and what is drawn of it."""
+"""Hidden motion of a short stretch, for a picture."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ from ..tables import Labelled
 from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
-"""Longest duration of a picture: worked out in about a second."""
+"""Longest duration of a picture [s], computed in about one second."""
 _NUMBERS_SHOWN = 3
 """Gaps and m1."""
 _LEAD_S = 0.15
-"""Before and behind what is shown, so that a track has started and its end is smoothed."""
+"""Margin before and after the picture [s], to start a track and smooth its end."""
 
 
 @dataclass(frozen=True)
@@ -30,36 +30,36 @@ class HiddenViewRequest:
     low_s: float
     high_s: float
     specimen: str = ""
-    """A shipped specimen's name, or the path of one's file; as the recording describes it when empty."""
+    """Name of a shipped specimen or path of a file; by default the recording's description."""
     numbers: Numbers = Numbers.AS_DESCRIBED
 
 
 @dataclass(frozen=True, eq=False)
 class HiddenView(Labelled):
-    """What is drawn of it."""
+    """Data of the picture."""
 
     OWN_UNITS: ClassVar = {"p": "m", "free_p": "m"}
 
     request: HiddenViewRequest
     time_s: Reals
     p: Samples
-    """Tracked, NaN where it was not followed [m]."""
+    """Tracked, NaN without a track [m]."""
     free_p: Samples
     """Without a contact model [m]."""
     stops_m: tuple[float, float]
-    """Places of the lower and the upper stop."""
+    """Positions of the lower and the upper stop."""
     sentence: str
 
 
 def hidden_view(request: HiddenViewRequest) -> HiddenView:
-    """Tell the hidden motion of a stretch.
+    """Estimate the hidden motion of a stretch.
 
     Raises
     ------
     AnalysisError
         As `hidden_motion` does.
     """
-    # The window takes the words above when it begins, and what works them out loads scipy.stats.
+    # Imported late: the window needs the classes above at its start, and this loads scipy.stats.
     from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415
 
     try:

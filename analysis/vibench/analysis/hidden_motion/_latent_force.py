@@ -1,10 +1,10 @@
-"""The contact force as an unknown, told by the two channels alone: motion and impacts without a contact law.
+"""Motion and impacts without a contact law, with the contact force as an unknown.
 
-Two relations hold whatever the law: z follows from m0's motion through a stable first-order filter, and
-the sum of m1 y'' and m2 z'' contains no contact force. A Kalman smoother weighs both by their noise, with
-a force that is white and held over each sample. Where m1 flies the force is known to be nothing: windows
-around its peaks are found first, then all but they are closed (a switched variance, as Rogers and Friis,
-arXiv 2303.03858), and the double integral of the second relation no longer drifts.
+Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum
+of m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held
+over each sample. In flight the force is zero: windows around its peaks are found first, then the force is
+set to zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858), so that the double integral
+of the second relation does not drift.
 """
 
 from dataclasses import dataclass
@@ -18,24 +18,24 @@ from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES
 
 _PEAK_BAND_HZ = 4500.0
-"""The force is looked at in this band: wide enough for a collision, narrow enough for its noise."""
+"""Band of the force, a compromise between the width of a collision and noise."""
 _WINDOW_S = 6e-5
-"""To each side of a peak."""
+"""Half width of a window around a peak [s]."""
 _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
-"""Least peak of the first guess of the force."""
+"""Least peak relative to the first guess of the force."""
 CLOSED_SHARE = 3e-4
-"""Standard deviation of the force between impacts, of the first guess of the force."""
+"""Standard deviation of the force between impacts, relative to the first guess."""
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
-"""Squared normalised innovation that tells an impact that was overlooked."""
+"""Squared normalised innovation of an overlooked impact."""
 _MEDIAN_OF_SQUARE = 0.455
 """Median of square of a normal variable's square."""
 _RERUNS = 3
 _START_UP_S = 4e-3
-"""Innovations of a filter that has just started are not judged."""
+"""Start-up time of the filter whose innovations are ignored [s]."""
 _START_SD = (1e-4, 0.3, 1.0, 0.5)
-"""Standard deviations of displacements, velocities, W and B, when nothing is known yet."""
+"""Initial standard deviations of displacements, velocities, W and B."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +45,20 @@ class LatentMotion:
     run: Filtered
     smoothed: Smoothed
     is_open: Flags
-    """Samples at whose step a contact force was allowed."""
+    """Samples with a possible contact force."""
     is_dark: Flags
-    """Those of them of which nothing was measured."""
+    """Those of them without measurement."""
     force_variance: Reals
     misfit: float
-    """Mean squared normalised innovation, its largest thousandth left out; 1 when all fits."""
+    """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""
 
 
 def latent_motion(
     model: MotionModel, motion: PreparedMotion, first: int, count: int, closed_share: float = CLOSED_SHARE
 ) -> LatentMotion:
-    """Smooth ``count`` samples behind sample ``first`` without a contact law.
+    """Smooth ``count`` samples after sample ``first`` without a contact law.
 
-    A larger ``closed_share`` lets the force between impacts stand for wrong numbers of the specimen.
+    A larger ``closed_share`` allows a force between impacts for wrong parameters of the specimen.
     """
     free = model.without_stops
     # Guess the size of the force: m1 times the rms acceleration of m0.
@@ -68,7 +68,7 @@ def latent_motion(
     guess_n = max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
     variance = np.full(count, guess_n**2)
     run, smoothed = _filter_and_smooth(free, motion, first, variance)
-    # Whether m1 met a stop without light nobody saw.
+    # During a drop-out, m1 may have struck a stop unseen.
     is_dark = _widen_marks(motion.is_dark[first + 1 : first + count + 1], motion.sample_rate_hz)
     windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz) | is_dark
     closed = (closed_share * guess_n) ** 2
@@ -88,7 +88,7 @@ def latent_motion(
 
 
 def latent_start(first: int) -> FilterState:
-    """Begin behind a sample of which nothing is known."""
+    """Return the initial state after an unknown sample."""
     place, rate, base, error = _START_SD
     return FilterState(first, np.zeros(STATES), np.diag([place**2] * 3 + [rate**2] * 3 + [base**2, error**2]))
 
@@ -119,9 +119,9 @@ def _start_up(sample_rate_hz: float, count: int) -> int:
 
 
 def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
-    """Open a window where an innovation tells a force that came just before."""
+    """Open a window where an innovation shows a force just before."""
     squared = run.squared
-    # Wrong numbers of the specimen surprise everywhere: only what stands out from that is an impact.
+    # Wrong parameters raise innovations everywhere; only outliers are impacts.
     usual = max(1.0, float(np.nanmedian(squared)) / _MEDIAN_OF_SQUARE)
     surprise = squared > _SURPRISE * usual
     surprise[: _start_up(sample_rate_hz, surprise.size)] = False
@@ -132,7 +132,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
 
 
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
-    """Return each window the mean square of the force found in it, as expectation maximisation does."""
+    """Return the mean square force of each window, as in expectation maximisation."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
     begins, ends = edges[::2], edges[1::2]
     squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))

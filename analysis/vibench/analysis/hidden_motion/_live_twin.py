@@ -1,7 +1,7 @@
-"""The hidden motion beside a running measurement: the same filter, fed as samples come.
+"""Hidden motion during a measurement, with the same filter.
 
-The sensors' dynamics are undone by the filters of `_sensor_correction`, which makes the motion a third of a
-millisecond late, and a sample is used when what follows tells whether the vibrometer saw it, six later; the
+Correction filters (`_sensor_correction`) delay the motion by a third of a millisecond. A sample is used six
+samples later, when drop-outs are known. The
 accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
 """
 
@@ -35,9 +35,9 @@ from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, reliable_samples
 from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 
-# Whether the specimen is what it was: innovations of a track against a baseline, block by block.
+# Detection of changes of the specimen: innovations of a track compared with a baseline, block by block.
 #
-# Each block of a tenth of a second lies within the level that is usual, or out. Page's test (CUSUM,
+# Each block of a tenth of a second lies within the usual level or outside it. Page's test (CUSUM,
 # Biometrika 41, 100, 1954) adds up the likelihood ratio of "one block in two is out" to "one in a hundred
 # is". By Lorden (Ann. Math. Stat. 42, 1897, 1971) the mean time between false alarms is at least
 # exp(threshold) blocks, as long as no more than one block in a hundred lies out without a change; the
@@ -47,34 +47,34 @@ BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
 """Mean time between false alarms, at least [s]."""
 OUT_BY_CHANCE = 0.01
-"""Largest share of blocks that lie out while nothing has changed."""
+"""Largest share of blocks outside without a change."""
 _OUT_WHEN_CHANGED = 0.5
 _OUT_ADDS = math.log(_OUT_WHEN_CHANGED / OUT_BY_CHANCE)
 _IN_ADDS = math.log((1.0 - _OUT_WHEN_CHANGED) / (1.0 - OUT_BY_CHANCE))
 THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
-"""Blocks of a motion whose usual level is not kept yet."""
+"""Number of blocks to learn the usual level."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is out if it exceeds this multiple of the usual level, and this number of deviations above it."""
+"""A block is outside above this multiple of the usual level and this number of deviations."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
 
 class Level(FrozenModel):
-    """Mean squared normalised innovation of blocks of flight, its outliers clipped."""
+    """Mean squared normalised innovation of blocks in flight, with clipped outliers."""
 
     mean: float
     sd: float
-    """Standard deviation from block to block."""
+    """Standard deviation between blocks."""
 
     @property
     def limit(self) -> float:
-        """Above it a block lies out."""
+        """Limit above which a block is outside."""
         return max(_LARGER * self.mean, self.mean + _SCATTERS * self.sd)
 
 
 class KnownNumber(FrozenModel):
-    """A number of the specimen, and its bounds of 95 %."""
+    """A parameter of the specimen with its 95 % bounds."""
 
     value: float
     low: float
@@ -82,24 +82,24 @@ class KnownNumber(FrozenModel):
 
 
 class Baseline(FrozenModel):
-    """A specimen on its bench while it was in order."""
+    """Reference state of a specimen on its bench."""
 
     bench: str
     since: datetime
     numbers: Mapping[Hidden, KnownNumber]
-    """Those that its collisions told."""
+    """Parameters found from collisions."""
     levels: Mapping[str, Level]
     """Levels by excitation."""
 
 
 def baseline_path(rig: Rig, specimen: Specimen) -> Path:
-    """Name the file of the baseline of a specimen, as described, on a bench; in the user's state folder."""
+    """Return the baseline file of a specimen on a bench, in the user's state folder."""
     digest = hashlib.sha256(f"{rig.name}\n{specimen!r}".encode()).hexdigest()[:_HASH_DIGITS]
     return state_folder() / _FOLDER / f"{digest}.json"
 
 
 def kept_baseline(path: Path) -> Baseline | None:
-    """Read a baseline; None when there is none, or none that this version can read."""
+    """Read a baseline; None if it is missing or unreadable by this version."""
     try:
         return Baseline.model_validate_json(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValidationError):
@@ -107,24 +107,24 @@ def kept_baseline(path: Path) -> Baseline | None:
 
 
 def keep_baseline(baseline: Baseline, path: Path) -> None:
-    """Keep a baseline in the place of the last one; raises OSError when the folder cannot be written."""
+    """Replace the stored baseline; raises OSError when the folder cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replace_file(path) as coming:
         coming.write_text(baseline.model_dump_json(indent=2), encoding="utf-8")
 
 
 class ChangeWatch:
-    """Takes the level of one block after the other, and says when they are no longer the usual ones."""
+    """Detect when the levels of blocks are no longer the usual ones."""
 
     def __init__(self, usual: Level | None = None) -> None:
-        """``usual`` as kept; learnt from the first two seconds when there is none."""
+        """``usual`` is the stored level; without one it is learnt from the first two seconds."""
         self.usual = usual
         self._learnt: list[float] = []
         self._sum = 0.0
         self.has_changed = False
 
     def take(self, level: float) -> bool:
-        """Take a block, infinite where the motion could not be followed; whether that is the alarm."""
+        """Add a block, infinite without a track; return whether to raise the alarm."""
         if self.usual is None:
             if math.isfinite(level):
                 self._learnt.append(level)
@@ -139,60 +139,60 @@ class ChangeWatch:
 
 
 class LiveState(StrEnum):
-    """What of the hidden motion is known at the moment."""
+    """State of the live hidden motion."""
 
     WAITING = "waiting"
-    """Too little has been measured, or nothing moves enough to be told."""
+    """Too little data or motion."""
     TRACKED = "tracked"
     LOST = "lost"
-    """What is measured does not fit the specimen's numbers: nothing is shown as motion."""
+    """The data do not fit the parameters; no motion is shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class LiveMotion(Labelled):
-    """The newest of the hidden motion."""
+    """Newest part of the hidden motion."""
 
     OWN_UNITS: ClassVar = {"p": "m"}
 
     state: LiveState
     why: str
-    """Where it is not tracked."""
+    """Reason if it is not tracked."""
     first: int
     """Number in the recording of the first sample of ``p``."""
     p: Reals
-    """Relative displacement, NaN where it was not followed [m]."""
+    """Relative displacement, NaN without a track [m]."""
     forecast: Forecast | None
     """Under a sine only."""
     gaps_m: tuple[float, float]
     level: float
-    """Level of the last block; 1 when nothing but noise is left."""
+    """Level of the last block; 1 if only noise remains."""
     limit: float
-    """Limit beyond which a block is out; NaN while the usual level is being learnt."""
+    """Limit above which a block is outside; NaN while the usual level is being learnt."""
 
 
 HELD_S = 3.0
-"""Length of motion that is held for finding numbers in."""
+"""Length of motion kept for finding parameters [s]."""
 _NOISE_S = 0.5
 _LOOKED_S = 0.25
-"""Length of the newest samples in which drop-outs are looked for."""
+"""Length of the newest samples searched for drop-outs [s]."""
 _FIND_S = 2.4
-"""Length of motion that numbers are found in."""
+"""Length of motion for finding parameters [s]."""
 _PATIENCE = 2.0
-"""After numbers were not found this many times as long is waited."""
+"""Factor of the waiting time after a failed search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
-"""Between two attempts at a motion that does not fit."""
+"""Time between two attempts for a motion that does not fit [s]."""
 _CLIPPED = 25.0
-"""Largest squared innovation that counts: a single impact met a little late is no change."""
+"""Clipping of squared innovations, so that one late impact is no change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
 _APART = 3.0
-"""Half widths of both bounds, added in squares, beyond which two numbers are different."""
+"""Difference of two parameters that counts as a change, in root-sum-square half widths."""
 
 
 class LiveTwin:
-    """Follows what m1 does from samples as they come, finds its numbers, and notices when they change.
+    """Track m1 live, find its parameters, and detect changes.
 
-    `take` is given every stretch of samples once and in order, and gives sentences about what has happened
-    to the specimen; `newest` is for a picture.
+    Pass every stretch of samples to `take` once and in order; it returns sentences about changes. `newest`
+    returns data for a picture.
     """
 
     def __init__(
@@ -208,15 +208,15 @@ class LiveTwin:
         Parameters
         ----------
         rig
-            The bench: its sensors, and the specimen where none is given.
+            The bench with its sensors, and the default specimen.
         sample_rate_hz
             Of both channels.
         executor
-            Where numbers are found while the motion is being followed: a second of computing.
+            Runs the search for parameters (one second of computing) during tracking.
         specimen
             As it is known.
         known
-            Numbers of its baseline, which take the place of those described.
+            Parameters of its baseline, which replace those described.
 
         Raises
         ------
@@ -237,12 +237,12 @@ class LiveTwin:
         self._executor = executor
         self._finding: Future[FoundSpecimen] | None = None
         self.found: tuple[FoundParameter, ...] = ()
-        """What this run's collisions told of the specimen last; empty before."""
+        """Latest parameters found in this run; empty before."""
         self.watch = ChangeWatch()
         self._begin_anew(0)
 
     def warm_up(self) -> None:
-        """Load what is compiled before the first sample comes: later it would make the twin late."""
+        """Load the native library before the first sample, to avoid a delay later."""
         count = round(4 * ACQUISITION_S * self._rate)
         noise = 1e-3 * np.random.default_rng(1).standard_normal((2, count))
         self.take(0, noise[0], noise[1])
@@ -253,14 +253,14 @@ class LiveTwin:
         self._begin_anew(0)
 
     def begin_run(self, usual: Level | None) -> None:
-        """Forget the last run's motion; its numbers stay. ``usual`` is the level of what is played now."""
+        """Discard the last motion, but not its parameters; ``usual`` is the level of the new excitation."""
         self.watch = ChangeWatch(usual)
         self.found = ()
         self._begin_anew(0)
 
     def _begin_anew(self, sample: int) -> None:
         self.next_sample = sample
-        """Number in the recording of the sample that comes next."""
+        """Index of the next sample in the recording."""
         self._raw, self._used = np.empty((2, 0)), HALF_LENGTH
         nothing = np.empty(0)
         self._motion = PreparedMotion(
@@ -292,7 +292,7 @@ class LiveTwin:
 
     @property
     def newest(self) -> LiveMotion:
-        """Return what is known now: p of what is held, and the forecast behind it."""
+        """Return p of the kept motion and its forecast."""
         limit = np.nan if self.watch.usual is None else self.watch.usual.limit
         return LiveMotion(
             self._state,
@@ -308,7 +308,7 @@ class LiveTwin:
     def take(
         self, first_sample: int, acceleration: Reals, velocity: Reals, frequency_hz: float | None = None
     ) -> tuple[str, ...]:
-        """Take the next samples, as recorded in channel units; after a hole all begins again.
+        """Add the next samples in channel units; after a hole, tracking restarts.
 
         Parameters
         ----------
@@ -317,7 +317,7 @@ class LiveTwin:
         acceleration, velocity
             Of the base [m/s2] and of m0 [m/s], shape (samples,).
         frequency_hz
-            Of the sine that is played, for a forecast; None under anything else.
+            Frequency of a sine excitation, for a forecast; otherwise None.
         """
         if first_sample != self.next_sample:
             self._begin_anew(first_sample)
@@ -333,7 +333,7 @@ class LiveTwin:
         return tuple(said)
 
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
-        """Correct new samples and hold them; forget the oldest."""
+        """Correct and store new samples; drop the oldest."""
         self._raw = np.concatenate([self._raw, (acceleration, velocity)], axis=1)
         first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUTS_TOLD_AFTER_S * self._rate)
         if stop <= first:
@@ -361,7 +361,7 @@ class LiveTwin:
             self._at.sample -= surplus
 
     def _follow(self, said: list[str]) -> None:
-        """Track to the newest sample, block by block of the test for a change."""
+        """Track up to the newest sample, in blocks of the test for changes."""
         motion = self._motion
         while True:
             if self._at is None:
@@ -380,7 +380,7 @@ class LiveTwin:
         first = motion.samples - 2 - window
         if first < self._looked:
             return
-        # A third of the window is new: its middle third, where a track begins, was not looked at yet.
+        # A third of the window is new, so its middle third, where a track starts, is new too.
         self._looked = first + max(window // 3, self._pause)
         part = slice(max(0, motion.samples - round(_NOISE_S * self._rate)), None)
         if motion.samples < 2 * window:
@@ -414,12 +414,12 @@ class LiveTwin:
         self._squares.append(_clipped_innovations(run))
 
     def _wait_longer(self) -> None:
-        """Try again at once, then less and less often: what does not fit costs no more than what does."""
+        """Retry at once, then less often, to limit the load."""
         longest = round(_LONGEST_PAUSE_S * self._rate)
         self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
 
     def _judge(self, said: list[str]) -> None:
-        """Hold the block that has ended against the usual level."""
+        """Compare the finished block with the usual level."""
         squares = np.concatenate(self._squares or [np.empty(0)])
         self._squares = []
         is_out, self._is_out = self._is_out or self._state is LiveState.LOST, False
@@ -428,7 +428,7 @@ class LiveTwin:
         if not is_out and squares.size < self._block // 4:
             return
         self._level = np.inf if is_out else float(squares.mean())
-        # Before any number is known a description that does not fit is no change.
+        # Before any parameter is known, a wrong description is no change.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             said.append(
@@ -436,13 +436,13 @@ class LiveTwin:
                 f"numbers (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
-            # Numbers that are being found are still those of before.
+            # A running search uses samples from before the change.
             self._finding = None
             self._wait = round(_FIND_S * self._rate)
             self._find_at = self.next_sample + self._wait
 
     def _find(self, said: list[str]) -> None:
-        """Find gaps and masses in what is held, beside the tracking."""
+        """Start a search for gaps and masses in the stored motion, beside tracking."""
         if self._finding is not None and self._finding.done():
             finding, self._finding = self._finding, None
             self._take_found(finding.result(), said)
@@ -461,7 +461,7 @@ class LiveTwin:
             return
         if Hidden.LOWER_GAP in told or Hidden.UPPER_GAP in told:
             self._find_at = np.iinfo(np.int64).max
-        # Dampers and contact law differ from level to level on a specimen that is as it was.
+        # Dampers and contact law depend on the level, without a change of the specimen.
         compared = (
             told.values() if self.watch.has_changed else [told[each] for each in _STEADY if each in told]
         )
@@ -493,7 +493,7 @@ class LiveTwin:
 
     @property
     def known(self) -> dict[Hidden, KnownNumber]:
-        """The numbers that the motion is tracked with, as far as collisions told them."""
+        """Parameters used for tracking that were found from collisions."""
         return dict(self._known)
 
     def _foresee(self, frequency_hz: float | None) -> None:
@@ -509,6 +509,6 @@ class LiveTwin:
 
 
 def _clipped_innovations(run: Filtered) -> Reals:
-    """Return the squared innovations of flight, the largest clipped."""
+    """Return the squared innovations in flight, clipped."""
     squared = run.squared
     return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))

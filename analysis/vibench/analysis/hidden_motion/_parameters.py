@@ -1,4 +1,4 @@
-"""What of a specimen a colliding motion tells: read from it, and given to it."""
+"""Parameters of a specimen that a colliding motion determines."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,7 +9,7 @@ from ._tracking_model import TrackedSpecimen
 
 
 class Hidden(StrEnum):
-    """What of a specimen a colliding motion tells; m0, m2 and k1 stay as described."""
+    """Parameters that a colliding motion determines; m0, m2 and k1 stay as described."""
 
     LOWER_GAP = "lower_gap_m"
     UPPER_GAP = "upper_gap_m"
@@ -24,23 +24,23 @@ class Hidden(StrEnum):
     EXPONENT = "contact_exponent"
     LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
-    """Mean gap of both sides: what statistics tell better than either."""
+    """Mean gap of both sides, which statistics determine better than either."""
 
 
 class Search(NamedTuple):
-    """How one parameter is looked for; all numbers are relative to it."""
+    """Settings of the search for one parameter, relative to its value."""
 
     prior_sd: float
-    """How far from the description."""
+    """Prior standard deviation about the description."""
     step: float
-    """Of the derivatives by it."""
+    """Step for derivatives."""
     near: float
-    """How far from a description that can be tracked."""
+    """Prior standard deviation about a description that can be tracked."""
     least_sd: float = 0.0
-    """Where it was found without a contact model."""
+    """Prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
-    """Part of the standard deviation that a filter claims which its errors have; parameters that wander look
-    less certain than they are. Found on 31 random rigs; checked on others by the slow tests."""
+    """Ratio of actual errors to the filter's standard deviation; the random walk makes it smaller than 1.
+    Found on 31 random rigs; the slow tests check others."""
 
 
 SEARCHES = {
@@ -82,12 +82,12 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
 
 
 def scale_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Return what relative distances are parts of: the parameter; of the loss, which may be none, 1 s/m."""
+    """Return the scale of relative distances: the parameter, or 1 s/m for the loss, which may be zero."""
     return 1.0 if what is Hidden.LOSS else value_of(tracked, what)
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
-    """Return others; k1 stays when m1 changes."""
+    """Return a copy with other values; k1 stays when m1 changes."""
     new = {each: values.get(each, value_of(tracked, each)) for each in PRIOR_SD}
     m0, _, m2 = tracked.specimen.masses
     specimen = replace(
@@ -102,8 +102,8 @@ def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> Tra
 
 
 class Numbers(StrEnum):
-    """Which gaps, m1, springs, dampers and contact law the motion is tracked with."""
+    """Source of gaps, m1, springs, dampers and contact law for tracking."""
 
     FOUND = "found"
-    """Those that the collisions tell, where they tell them."""
+    """Found from collisions where possible."""
     AS_DESCRIBED = "as described"

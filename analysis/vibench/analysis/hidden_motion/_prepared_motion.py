@@ -1,4 +1,4 @@
-"""The two channels as base and m0 moved, and how noisy they are: what every way starts from."""
+"""Motion of base and m0 corrected for their sensors, with its noise."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -14,20 +14,20 @@ from ..signals.arrays import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
-"""Parts of the sample rate where specimen and shaker hardly move and the converter still passes."""
+"""Band relative to the sample rate without motion but within the converter's pass band."""
 _SEGMENT = 1024
 _MOST_SEGMENTS = 4096
-"""Spread over a long motion: 80 s at 51.2 kS/s."""
+"""Samples for estimating noise, spread over a long motion: 80 s at 51.2 kS/s."""
 _PIECE = 1 << 19
-"""Samples that are corrected at a time."""
+"""Samples corrected at once."""
 _LEAST_NOISE = 1e-6
-"""Least part of the signal: a channel without noise has rounding, and a filter needs a variance."""
+"""Least noise relative to the signal, because a filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
 """Median over mean of a periodogram's line of white noise, exponentially distributed."""
 _DARK_MARGIN = 8
-"""Samples on either side of a drop-out that a corrected one is still made of by more than a hundredth."""
+"""Samples on each side of a drop-out with a weight above 1 % in a corrected sample."""
 LOWEST_RATE_HZ = 10_000.0
-"""A collision of a twentieth of a millisecond leaves nothing to see at a lower rate."""
+"""Lowest sample rate [Hz] at which collisions of 0.05 ms are visible."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +44,17 @@ class ChannelNoise:
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """A stretch of a recording without holes, sensors' dynamics and delays taken out.
+    """A stretch of a recording without holes, corrected for dynamics and delays of the sensors.
 
-    A long one is held in single precision, far below any sensor's noise; `accelerations` and `velocities`
-    give what is computed with.
+    Long stretches are stored in single precision, far below sensor noise.
     """
 
     acceleration: Samples
-    """Acceleration of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
+    """Acceleration of the base, shape (samples,) [m/s2]; the tracker corrects its AC coupling."""
     velocity: Samples
-    """Velocity of m0, shape (samples,) [m/s]; a bridge where the vibrometer had no light."""
+    """Velocity of m0, shape (samples,) [m/s]; bridged in drop-outs."""
     is_dark: Flags
-    """Where it had none, shape (samples,)."""
+    """Samples in drop-outs, shape (samples,)."""
     sample_rate_hz: float
     coupling_rad_per_s: float
     first_sample: int
@@ -64,19 +63,19 @@ class PreparedMotion:
 
     @property
     def samples(self) -> int:
-        """How many."""
+        """Number of samples."""
         return self.velocity.size
 
     def accelerations(self, start: int, stop: int) -> Reals:
-        """Return those of a short stretch."""
+        """Return the accelerations of a short stretch."""
         return self.acceleration[start:stop].astype(np.float64, copy=False)
 
     def velocities(self, start: int, stop: int) -> Reals:
-        """Return those of a short stretch as measured; NaN without light, of which a filter uses nothing."""
+        """Return the velocities of a short stretch; NaN in drop-outs."""
         return np.where(self.is_dark[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
-        """Return a stretch of it, noise as found in the whole."""
+        """Return a stretch, with the noise of the whole."""
         return replace(
             self,
             acceleration=self.acceleration[start:stop],
@@ -87,7 +86,7 @@ class PreparedMotion:
 
 
 def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMotion:
-    """Read both channels between two samples and take their sensors out.
+    """Read both channels between two samples and correct for their sensors.
 
     Raises UnusableData when a channel is missing, samples were lost, or the rate is too low, and
     NotEnoughData when the stretch is empty.
@@ -95,7 +94,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
     rate = recording.sample_rate_hz
     require_channels(recording.path.name, recording.roles)
     _require_rate(rate)
-    # A corrected sample is made of its neighbours, so the recording's first and last few have none.
+    # The correction needs neighbours, so the first and last few samples of a recording are left out.
     start, stop = max(start, HALF_LENGTH), min(stop, recording.samples - HALF_LENGTH)
     _require_length(stop - start, rate)
     correction = sensor_correction(
@@ -117,7 +116,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
 
 
 def dark_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
-    """Mark corrected samples from ``start`` to before ``stop`` that drop-outs leave nothing of."""
+    """Return which corrected samples from ``start`` to before ``stop`` are affected by drop-outs."""
     is_dark = np.zeros(stop - start, dtype=np.bool_)
     for each in dropouts:
         first, behind = each.first - _DARK_MARGIN - start, each.stop + _DARK_MARGIN - start
@@ -145,7 +144,7 @@ def _motion(
 
 
 def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: float) -> PreparedMotion:
-    """Take samples whose sensors are taken out already; raises as `prepared_motion` does."""
+    """Prepare samples already corrected for their sensors; raises like `prepared_motion`."""
     _require_rate(sample_rate_hz)
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
     _require_finite(_lost_samples(acceleration, velocity))
@@ -184,7 +183,7 @@ def _require_finite(lost: int) -> None:
 
 
 def require_channels(name: str, roles: Collection[str]) -> None:
-    """Raise UnusableData where a recording, or a bench, lacks what the hidden motion is estimated from."""
+    """Raise UnusableData when a recording or bench lacks a channel that the hidden motion needs."""
     missing = [role for role in (BASE, RESPONSE) if role not in roles]
     if missing:
         raise UnusableData(
@@ -194,7 +193,7 @@ def require_channels(name: str, roles: Collection[str]) -> None:
 
 
 def white_noise(samples: Samples) -> float:
-    """Estimate the rms of white noise from the quietest band near the top; a median outvotes impacts."""
+    """Estimate the rms of white noise from the quietest high band; the median rejects impacts."""
     count = samples.size // _SEGMENT
     every = -(-count // _MOST_SEGMENTS)
     pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT)[::every] * np.hanning(_SEGMENT)

@@ -1,4 +1,4 @@
-"""What sensors do to the two channels, undone by short symmetric filters."""
+"""Correction of both channels for their sensors by short symmetric filters."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,26 +13,26 @@ from ..recordings.channels import SensedChannel, sensor_gain
 from ..signals.arrays import Complexes, Reals
 
 HALF_LENGTH = 16
-"""Samples on either side that a corrected one is made of: a third of a millisecond at 51.2 kS/s."""
+"""Samples on each side for a corrected one: a third of a millisecond at 51.2 kS/s."""
 _EXACT_BAND = 0.42
-"""Part of the sample rate up to which the correction is fitted; a converter passes 0.45."""
+"""Fraction of the sample rate up to which the correction is fitted; a converter passes 0.45."""
 _FIT_POINTS = 400
 _REST_WEIGHT = 1e-3
-"""Above the band the filter is only kept from growing."""
+"""Weight above the band, which only limits the gain."""
 
 
 @dataclass(frozen=True, eq=False)
 class SensorCorrection:
-    """Filters for the two channels, and what is left to the tracker."""
+    """Filters for both channels, and the AC coupling for the tracker."""
 
     acceleration: Reals
     """Weights, shape (2 HALF_LENGTH + 1,); corrected for linear interpolation between samples as well."""
     velocity: Reals
     coupling_rad_per_s: float
-    """Corner of the accelerometer's AC coupling, undone as a state of the tracker; 0 for DC."""
+    """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""
 
     def corrected(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
-        """Return both channels as the base and m0 moved; values within HALF_LENGTH of an end are wrong."""
+        """Return the motion of base and m0; values within HALF_LENGTH of an end are wrong."""
         return (
             np.convolve(acceleration, self.acceleration, "same"),
             np.convolve(velocity, self.velocity, "same"),
@@ -42,7 +42,7 @@ class SensorCorrection:
 def sensor_correction(
     bench: Mapping[str, Any], base: SensedChannel, response: SensedChannel, sample_rate_hz: float
 ) -> SensorCorrection:
-    """Design the filters from what a recording says of its sensors; what it leaves out is ideal."""
+    """Design the filters from a recording's sensors; undescribed ones are taken as ideal."""
 
     def base_gain(frequency_hz: Reals) -> Complexes:
         interpolation = np.sinc(frequency_hz / sample_rate_hz) ** 2
@@ -56,7 +56,7 @@ def sensor_correction(
 
 
 def ideal_sensors(sample_rate_hz: float) -> SensorCorrection:
-    """Correct for nothing but the interpolation between samples."""
+    """Return a correction for the interpolation between samples only."""
 
     def interpolation(frequency_hz: Reals) -> Complexes:
         return np.asarray(np.sinc(frequency_hz / sample_rate_hz) ** 2, dtype=np.complex128)

@@ -1,6 +1,6 @@
-"""The hidden motion followed sample by sample: acquired without a contact law, tracked with it, smoothed.
+"""Track the hidden motion: acquisition without a contact law, then filter and smoother.
 
-What is not followed is said and never shown as motion.
+Stretches without a track are reported and never shown as motion.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,27 +22,27 @@ from ._latent_force import latent_motion
 from ._prepared_motion import PreparedMotion
 
 ACQUISITION_S = 0.06
-"""Length of motion that a track begins with."""
+"""Length of motion for acquisition [s]."""
 _WORST_MISFIT = 3.0
-"""Worst misfit of an acquisition; a model that explains less is not started with."""
+"""Largest misfit of an acquisition that may start a track."""
 _ACQUIRED_EXCESS = 4.0
-"""Factor on the covariance of what was acquired: the same samples are used again by the filter."""
+"""Factor on the acquired covariance, because the filter uses the same samples again."""
 _FLIGHT_MARGIN_S = 8e-5
-"""Length of flight on either side of the sample that is started with."""
+"""Least length of flight on each side of the first sample [s]."""
 _PIECE_S = 0.25
-"""Filtered and smoothed at a time."""
+"""Samples filtered and smoothed at once."""
 _OVERLAP_S = 0.02
-"""Filtered beyond a piece so that its end is smoothed too: several times what the past is remembered for."""
+"""Samples filtered beyond a piece so that its end is smoothed too, several memory times."""
 _GOOD = 2.5
-"""Mean squared innovation over `_LOOK_S` up to which a track that was lost later is believed."""
+"""Largest mean squared innovation over `_LOOK_S` of the valid part of a lost track."""
 _LOOK_S = 4e-3
 _WORST_SD_OF_GAP = 0.1
-"""A track whose own standard deviation exceeds this part of the gap says too little to be one."""
+"""Largest standard deviation of a track relative to the gap."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrackedPiece:
-    """Consecutive samples that were followed."""
+    """Consecutive samples with a track."""
 
     smoothed: Smoothed
     run: Filtered
@@ -61,7 +61,7 @@ class TrackedPiece:
 
 @dataclass(frozen=True)
 class NotFollowed:
-    """A stretch in which no track held, and why."""
+    """A stretch without a track, and the reason."""
 
     first: int
     stop: int
@@ -69,7 +69,7 @@ class NotFollowed:
 
 
 def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterState | str:
-    """Begin a track in the middle third of the 60 ms behind a sample; a sentence where none begins."""
+    """Start a track in the middle third of the 60 ms after a sample; return a sentence if this fails."""
     count = min(round(ACQUISITION_S * motion.sample_rate_hz), motion.samples - 1 - first)
     if count < round(ACQUISITION_S * motion.sample_rate_hz):
         return f"fewer than {1e3 * ACQUISITION_S:.0f} ms of motion were left to begin a track with"
@@ -87,7 +87,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
 
 
 def _calmest(model: MotionModel, smoothed: Smoothed, is_open: Flags, sample_rate_hz: float) -> int | None:
-    """Choose the flight sample of the middle third whose p is known best."""
+    """Return the flight sample of the middle third with the smallest uncertainty of p."""
     count = is_open.size
     margin = max(1, round(_FLIGHT_MARGIN_S * sample_rate_hz))
     near = np.convolve(is_open, np.ones(2 * margin + 1), "same") > 0.5
@@ -108,7 +108,7 @@ def follow(
     motion: PreparedMotion,
     on_sample: Callable[[int], None] = lambda _sample: None,
 ) -> Iterator[TrackedPiece | NotFollowed]:
-    """Go once through a motion; pieces and what lies between them, in the order of time."""
+    """Track a motion; return pieces and stretches between them in the order of time."""
     window = round(ACQUISITION_S * motion.sample_rate_hz)
     last = motion.samples - 1 - window
     looked, done = 0, 0
@@ -133,7 +133,7 @@ def follow(
                     done = piece.stop
                     on_sample(done)
                     piece = next(pieces, None)
-        # The next 60 ms are chosen so that their middle third begins where the track ended.
+        # The middle third of the next 60 ms starts where the track ended.
         following = max(done - window // 3, looked + window // 3)
         looked = last if looked < last < following else following
         on_sample(done)
@@ -142,7 +142,7 @@ def follow(
 
 
 def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
-    """Move a state on to a sample that it lies before; says whether it held."""
+    """Advance a state to a later sample; return whether the track held."""
     count = sample - at.sample
     if count <= 0:
         return True
@@ -151,7 +151,7 @@ def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sam
 
 
 def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iterator[TrackedPiece]:
-    """Follow from a state until the motion ends or the track is lost."""
+    """Track from a state until the motion ends or the track is lost."""
     length = round(_PIECE_S * motion.sample_rate_hz)
     overlap = round(_OVERLAP_S * motion.sample_rate_hz)
     while at.sample < motion.samples - 1:
@@ -190,7 +190,7 @@ def _join_runs(one: Filtered, other: Filtered) -> Filtered:
 
 
 def reliable_samples(run: Filtered, sample_rate_hz: float) -> int:
-    """Count the samples before a loss: up to where innovations over some milliseconds were good last."""
+    """Return the number of valid samples before a loss, where innovations were last good."""
     squared = run.squared
     used = ~np.isnan(squared)
     width = max(1, round(_LOOK_S * sample_rate_hz))

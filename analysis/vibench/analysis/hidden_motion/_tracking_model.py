@@ -1,4 +1,4 @@
-"""The equations of the relative motion as tables for the filter, of one specimen at one sample rate."""
+"""Tables of the relative motion for the filter, for one specimen and sample rate."""
 
 import math
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from ..signals.arrays import Reals
 STATES = 8
 """X, Y, Z and their rates relative to the base, the base's velocity W, the error B of its acceleration, SI.
 
-Behind them the filter has deviations of the parameters that are estimated. Equations: docs/hidden-motion.md.
+They are followed by deviations of the estimated parameters. Equations: docs/hidden-motion.md.
 """
 X, Y, Z, VX, VY, VZ, W, B = range(STATES)
 _SMALL_STEPS_A_CONTACT = 36
-"""Steps during the shortest collision; a force at 1 um then errs by under 1e-3."""
+"""Steps during the shortest collision; the force at 1 um is then accurate to 1e-3."""
 _FASTEST_APPROACH_M_PER_S = 0.5
 _FEWEST_SMALL_STEPS = 4
 HERTZ_EXPONENT = 1.5
@@ -31,10 +31,10 @@ class TrackedSpecimen:
 
     specimen: Specimen
     force_at_1um_n: float
-    """f, without the spring that a law may have beside it."""
+    """f, without a parallel spring of the law."""
     exponent: float
     loss_s_per_m: float
-    """chi; a search may find it below zero, as far as its bounds reach."""
+    """chi; a search may find a negative value within its bounds."""
 
     @property
     def steepness(self) -> float:
@@ -59,12 +59,12 @@ def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
 
 @dataclass(frozen=True, eq=False)
 class StepTables:
-    """What the filter needs of a specimen."""
+    """Tables of a specimen for the filter."""
 
     flow: Reals
     """Shape (8, 10): state, acceleration and its rise -> state one sample later, without stops."""
     small_flow: Reals
-    """The same for a small step."""
+    """The same for one small step."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
@@ -76,7 +76,7 @@ class StepTables:
 
 
 def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Reals, Reals]:
-    """Return A (8, 8), the input of the recorded acceleration (8,), and of a force on m1 against m2 (8,)."""
+    """Return A (8, 8) and the inputs (8,) of the recorded acceleration and of a force on m1 against m2."""
     m0, m1, m2 = specimen.masses
     k0, k1, k2 = specimen.stiffnesses
     c0, c1, c2 = specimen.dampings
@@ -98,7 +98,7 @@ def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Rea
 
 
 def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
-    """Return the state one step later, of the state, an input and its linear rise, shape (n, n + 2)."""
+    """Return the one-step map from state, input and its linear rise, shape (n, n + 2)."""
     n = len(a)
     joint = np.zeros((n + 2, n + 2))
     joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s
@@ -138,17 +138,17 @@ def step_tables(tracked: TrackedSpecimen, sample_rate_hz: float, coupling_rad_pe
 
 
 def indentation_m(tracked: TrackedSpecimen, approach_m_per_s: float) -> float:
-    """How far a stop is pressed in by an approach whose energy it takes up."""
+    """Return the largest indentation of a stop for a speed of approach."""
     _, m1, m2 = tracked.specimen.masses
     energy, n = 0.5 * m1 * m2 / (m1 + m2) * approach_m_per_s**2, tracked.exponent
     return float(((n + 1.0) * energy / tracked.steepness) ** (1.0 / (n + 1.0)))
 
 
 def small_steps_of(tracked: TrackedSpecimen, step_s: float) -> int:
-    """Count the small steps in a sample that resolve the shortest collision."""
+    """Return the small steps per sample that resolve the shortest collision."""
     if tracked.steepness == 0.0:
         return _FEWEST_SMALL_STEPS
-    # pi / 2 of the time to the deepest point at full speed, and back.
+    # pi / 2 times the time to the deepest point at full speed, and back.
     deepest_m = indentation_m(tracked, _FASTEST_APPROACH_M_PER_S)
     duration_s = math.pi * deepest_m / _FASTEST_APPROACH_M_PER_S
     return max(_FEWEST_SMALL_STEPS, math.ceil(step_s * _SMALL_STEPS_A_CONTACT / duration_s))

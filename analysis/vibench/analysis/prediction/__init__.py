@@ -1,8 +1,8 @@
-"""Simulations that a person asks for: what is asked, how the answer grows, and what it costs.
+"""Simulations for the window: requests, growing results, and costs.
 
-One specimen, one drive over frequency, up to two models; answers come piece by piece from a process of
-their own, which computes one request after another and can be told to stop. Errors and costs of each
-accuracy are those of docs/accuracy.md.
+A request has one specimen, one drive over frequency, and up to two models. A separate process computes
+requests in turn, sends results in pieces, and can be cancelled. docs/accuracy.md shows errors and costs of
+each accuracy.
 
 >>> from vibench.analysis.prediction.progress import SimulationRequest
 >>> from vibench.analysis.prediction.accuracy_cost import cost_sentences

@@ -7,7 +7,7 @@ from vibench.sim import Accuracy, PowerLaw
 from .progress import Exponent, SimulationRequest
 
 MACHINE = "one core of a 2-core AMD EPYC"
-"""Where it was measured; `vibench tradeoff` measures it again on any machine."""
+"""Machine of these measurements; `vibench tradeoff` repeats them on any machine."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ CHAOS_SCATTER = 0.03
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
-    """Return what a request's accuracy costs and errs, and how long it takes on this many idle cores."""
+    """Return sentences on cost, error and duration of a request on this many idle cores."""
     if request.has_target:
         wish = "" if request.error is None else f" to an error of {100.0 * request.error:g} %"
         limit = "a minute" if request.time_s is None else f"{request.time_s:g} s"
@@ -51,7 +51,7 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
     on_top = "; the exponent about doubles that" if request.exponent is Exponent.COMPUTED else ""
     if request.budget_s > 0.0:
-        on_top += f"; a point whose start is forgotten takes {request.budget_s:g} s of a core more, at most"
+        on_top += f"; a point sensitive to its start takes up to {request.budget_s:g} s of a core more"
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
     shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
     return (

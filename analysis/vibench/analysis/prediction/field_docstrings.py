@@ -1,4 +1,4 @@
-"""Docstrings of a model's fields: the help of options on the command line, the explanations of a form."""
+"""Docstrings of a model's fields, the help texts of command options and forms."""
 
 import ast
 import inspect
@@ -29,7 +29,7 @@ def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
     """
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
-    except OSError:  # installed without sources: there are no explanations then
+    except OSError:  # installed without sources, so there are no explanations
         return {}
     return {
         (each.name, field.target.id): inspect.cleandoc(text.value.value)

@@ -1,4 +1,4 @@
-"""What a person asks of a simulation or a map, its pieces, and the answer as far as it has come."""
+"""Requests for simulations and maps, their pieces, and the results so far."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -51,9 +51,9 @@ from ..signals.arrays import Reals
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
-"""Drive periods of a motion that are shown, and samples in each."""
+"""Number of drive periods shown of a motion, and samples in each."""
 MOST_CELLS = 200_000
-"""Most cells of a map in a window; larger ones are made by `vibench map`, and opened."""
+"""Most cells of a map in a window; compute larger ones with `vibench map` and open them."""
 
 
 class MapRequest(SpecimenChoice):
@@ -66,15 +66,15 @@ class MapRequest(SpecimenChoice):
     lowest_m: PositiveFloat = 1e-6
     """Smallest amplitude of the base displacement."""
     highest_m: PositiveFloat = 50e-6
-    """Largest amplitude; values between lie logarithmically."""
+    """Largest amplitude; values between are spaced logarithmically."""
     columns: Annotated[int, Field(ge=3, le=1000)] = 121
     """Frequencies."""
     rows: Annotated[int, Field(ge=3, le=1000)] = 81
     """Amplitudes."""
     random_starts: Annotated[int, Field(ge=0, le=100)] = 0
-    """Random starts at every point, beside rest: they tell how many motions there are."""
+    """Random starts at every point in addition to rest, to find coexisting motions."""
     periods: Annotated[int, Field(ge=300, le=30_000)] = 3000
-    """Drive periods after which a motion that does not repeat is followed no longer."""
+    """Longest run in drive periods of a motion that does not repeat."""
 
     @model_validator(mode="after")
     def _is_a_map(self) -> Self:
@@ -88,7 +88,7 @@ class MapRequest(SpecimenChoice):
 
     @property
     def plan(self) -> Map:
-        """The same as every program computes it."""
+        """Return the request as a plan."""
         return Map(
             specimen=self.described,
             model=self.law,
@@ -105,21 +105,21 @@ class MapRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class MapPicture:
-    """A map as far as it has come; cells that are not known yet look like the nearest that is."""
+    """A map so far; unknown cells show the nearest known one."""
 
     frequency_hz: tuple[float, float]
     """Outer edges."""
     amplitude_m: tuple[float, float]
     classes: NDArray[np.int8]
-    """Places in `MOTION_CLASSES`, shape (rows, columns)."""
+    """Indices in `MOTION_CLASSES`, shape (rows, columns)."""
     response_i: NDArray[np.float32]
     motions: NDArray[np.float32]
-    """How many motions the starts of a cell came to."""
+    """Number of motions found in each cell."""
     said: str
 
 
 class MotionRequest(SpecimenChoice):
-    """The motion that a specimen comes to from rest at one drive."""
+    """Request for the motion from rest at one drive."""
 
     frequency_hz: PositiveFloat
     amplitude_m: PositiveFloat
@@ -128,7 +128,7 @@ class MotionRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class SettledMotion:
-    """The end of a motion, sampled, and what it is."""
+    """Samples of the end of a motion, with its kind."""
 
     frequency_hz: float
     amplitude_m: float
@@ -145,7 +145,7 @@ class SettledMotion:
 
 
 class PicturingStore(MemoryStore):
-    """Keeps a map in memory, and shows how it grows, some times a second."""
+    """Store of a map in memory that sends pictures several times a second."""
 
     def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
         super().__init__(plan)
@@ -153,13 +153,13 @@ class PicturingStore(MemoryStore):
         self._told_s = -BETWEEN_PICTURES_S
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Keep, and show if the last picture is old."""
+        """Store results, and send a picture if the last one is old."""
         super().keep(answers)
         if time.monotonic() - self._told_s >= BETWEEN_PICTURES_S:
             self.show()
 
     def show(self) -> None:
-        """Tell what there is."""
+        """Send a picture of the results."""
         self._tell(picture_of(MapResults(self._plan, self.arrays)))
         self._told_s = time.monotonic()
 
@@ -167,7 +167,7 @@ class PicturingStore(MemoryStore):
 def map_pictures(
     request: MapRequest, tell: Callable[[MapPicture], None], cancelled: Callable[[], bool]
 ) -> None:
-    """Compute a map, and tell pictures of it as it grows; the last one is whole unless it was cancelled."""
+    """Compute a map and send pictures while it grows; the last is complete unless cancelled."""
     plan = request.plan
     store = PicturingStore(plan, tell)
     with executor_of(None, None, map_solver(plan)) as executor:
@@ -197,7 +197,7 @@ def picture_of(results: MapResults) -> MapPicture:
 
 
 def settled_motion(request: MotionRequest) -> SettledMotion:
-    """Follow a specimen from rest until its motion has settled, and sample what it does then.
+    """Simulate a specimen from rest until its motion has settled, and sample that motion.
 
     Raises ValueError when it cannot be followed.
     """
@@ -240,7 +240,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
 
 @dataclass(frozen=True)
 class SimulatedPoint:
-    """One model at one frequency; None where it was not asked for, or not found."""
+    """Result of one model at one frequency; None if not requested or not found."""
 
     model: str
     frequency_hz: float
@@ -252,7 +252,7 @@ class SimulatedPoint:
     error_estimate: float | None
     memory: StartMemory = StartMemory.UNKNOWN
     ensemble: Ensemble | None = None
-    """What other starts came to, where the start is forgotten."""
+    """Other motions from other starts, with sensitive dependence on the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +288,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Most points of both models together: a picture shows no more, and an afternoon computes no more."""
+"""Most points of both models together: more is neither visible nor computed in an afternoon."""
 
 
 class Exponent(StrEnum):
@@ -310,19 +310,19 @@ class SimulationRequest(SpecimenChoice):
     stop_hz: PositiveFloat = 600.0
     """Highest drive frequency."""
     step_hz: PositiveFloat = 5.0
-    """Between neighbouring frequencies."""
+    """Frequency step."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of contacts; flight is exact at every level. Below stands what each level costs and errs."""
+    """Accuracy of contacts; flight is exact at every level. Costs and errors are shown below."""
     duration_s: PositiveFloat = 8.0
     """Length of each run, from rest."""
     window_s: PositiveFloat = 5.0
-    """Length of its end that is observed."""
+    """Observed length at its end."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Most processor time a point for other starts, where the start is forgotten; 0 looks for none."""
+    """Most processor time per point for other starts in case of sensitive dependence; 0 for none."""
     error: TargetError | None = None
-    """Relative error to reach at each point, as 0.01; it replaces accuracy, duration and budget."""
+    """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Time in which each point is answered as exactly as possible; as the error, alone or with it."""
+    """Time limit per point, with or without a requested error."""
     exponent: Exponent = Exponent.LEFT_OUT
     """Largest Lyapunov exponent; it about doubles the work."""
     signal_hz: PositiveFloat | None = 260.0
@@ -330,7 +330,7 @@ class SimulationRequest(SpecimenChoice):
 
     @model_validator(mode="after")
     def _is_a_study(self) -> Self:
-        """Refuse here what a study would refuse, in its own words, and what would take for ever."""
+        """Refuse invalid studies with their own error, and requests that would take too long."""
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
@@ -342,13 +342,13 @@ class SimulationRequest(SpecimenChoice):
 
     @property
     def models(self) -> tuple[str, ...]:
-        """The first is the reference of the similarity."""
+        """Models; the first is the reference of the similarity."""
         second = self.compared_with.strip()
         return (self.law,) if second in ("", self.law) else (self.law, second)
 
     @property
     def study(self) -> Study:
-        """The same as every program of the house computes it."""
+        """Return the request as a study."""
         exponents = (Observable.LYAPUNOV,) if self.exponent is Exponent.COMPUTED else ()
         varied = {"damping_times_s": self.damping_time_s, "gaps_m": self.gap_m}
         return Study(
@@ -375,12 +375,12 @@ class SimulationRequest(SpecimenChoice):
 
     @property
     def points(self) -> int:
-        """Scenes that are computed."""
+        """Number of scenes."""
         return self.study.grid.size
 
     @property
     def simulated_s(self) -> float:
-        """Time that all scenes together last."""
+        """Simulated time of all scenes."""
         return self.points * self.duration_s
 
 
@@ -388,7 +388,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
-    """Say the numbers of a motion, its share and what it is."""
+    """Return the values of a motion, its share and its kind as texts."""
     share, period = motion.share, "" if motion.period is None else f", {motion.period} drive periods"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
@@ -400,19 +400,19 @@ def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
 
 
 class SimulationProgress:
-    """Takes the pieces as they come, in any order."""
+    """Collects pieces in any order."""
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
         self._amplitude_m = amplitude_m
         self.asked = points
-        """Points that were asked for."""
+        """Number of requested points."""
         self._note = note
         self._found: dict[str, dict[float, SimulatedPoint]] = {}
         self._signals: dict[str, SimulatedSignal] = {}
         self._troubles: list[str] = []
 
     def add(self, parts: tuple[PartialResult, ...]) -> None:
-        """Take what has come."""
+        """Add pieces."""
         for part in parts:
             match part:
                 case SimulatedPoint():
@@ -424,22 +424,22 @@ class SimulationProgress:
 
     @property
     def done(self) -> int:
-        """Points that have an answer, good or bad."""
+        """Number of finished points, with or without errors."""
         return sum(len(each) for each in self._found.values()) + len(self._troubles)
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Those of which something is known."""
+        """Models with results."""
         return tuple(dict.fromkeys((*self._signals, *self._found)))
 
     @property
     def signals(self) -> tuple[SimulatedSignal, ...]:
-        """Time signals, one a model."""
+        """Time signals, one per model."""
         return tuple(self._signals.values())
 
     @property
     def largest_signal_m(self) -> float:
-        """Furthest that a time signal goes from rest."""
+        """Largest displacement of the time signals."""
         reached = [np.max(np.abs((each.displacement_m, each.relative_m))) for each in self.signals]
         return float(max(reached, default=0.0))
 
@@ -452,18 +452,18 @@ class SimulationProgress:
 
     @property
     def troubles(self) -> tuple[str, ...]:
-        """What could not be computed."""
+        """Points that could not be computed."""
         return tuple(self._troubles)
 
     def column(self, model: str, name: str) -> tuple[Reals, Reals]:
-        """Return frequencies and one quantity of a model, NaN where it is not known."""
+        """Return frequencies and one quantity of a model, NaN if unknown."""
         points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
         values = [getattr(point, name) for point in points]
         frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
         return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
     def other_motions(self, model: str) -> tuple[Reals, Reals]:
-        """Return frequencies, and Response I of each motion that other starts came to there."""
+        """Return frequencies and Response I of each motion from other starts."""
         found = [
             (point.frequency_hz, motion.response_i)
             for point in self._found.get(model, {}).values()
@@ -476,7 +476,7 @@ class SimulationProgress:
 
     @property
     def motion_rows(self) -> tuple[tuple[str, ...], ...]:
-        """Words for every motion at every point that came to more than one, by `MOTION_COLUMNS`."""
+        """Return table rows (`MOTION_COLUMNS`) for points with several motions."""
         return tuple(
             (model, f"{point.frequency_hz:g}", *_motion_words(motion))
             for model, points in self._found.items()
@@ -487,19 +487,19 @@ class SimulationProgress:
 
     @property
     def forgotten(self) -> int:
-        """Points whose start is forgotten: which motion they come to is chance."""
+        """Number of points with sensitive dependence on the start."""
         points = (point for found in self._found.values() for point in found.values())
         return sum(point.memory is StartMemory.LOST for point in points)
 
     def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
-        """Stretches of neighbouring points at which the masses strike."""
+        """Return stretches of neighbouring points with collisions."""
         frequency_hz, impacts = self.column(model, "impacts")
         striking = np.flatnonzero(impacts > 0)
         groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of every model, to be overlaid on recordings."""
+        """Return Responses I and II of every model, to overlay on recordings."""
         return tuple(
             Curve(
                 f"model {model}, {1e6 * self._amplitude_m:.4g} µm",
@@ -519,7 +519,7 @@ class SimulationProgress:
         )
 
     def similarity(self) -> Similarity | None:
-        """Compare Response I of the second model with the first's, where both are known; None before."""
+        """Return the similarity of Response I of both models, where known; None before."""
         if len(self._found) < 2:
             return None
         first, second = (model for model in self.models if model in self._found)

@@ -1,4 +1,4 @@
-"""Simulations for a window: each sends its answer piece by piece, and stops on request."""
+"""Simulations for the window, which send results in pieces and can be cancelled."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -38,7 +38,7 @@ SAMPLES_PER_PERIOD = 400
 
 
 class _TellingStore(MemoryStore):
-    """Keeps answers in memory, and tells each one once."""
+    """Store of results in memory that sends each one once."""
 
     def __init__(self, study: Study, tell: Tell) -> None:
         super().__init__(study)
@@ -46,7 +46,7 @@ class _TellingStore(MemoryStore):
         self._tell = tell
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Keep and tell."""
+        """Store and send."""
         super().keep(answers)
         self._tell(tuple(self._pieces(answers)))
 
@@ -69,9 +69,9 @@ class _TellingStore(MemoryStore):
 def simulate(
     request: SimulationRequest, tell: Tell, cancelled: Cancelled, workers: int | None = None
 ) -> None:
-    """Compute what is asked for, the time signals first; returns early when cancelled.
+    """Compute a request, the time signals first; return early when cancelled.
 
-    ``cancelled`` is asked several times a second; scenes under way, parts of a second each, are ended.
+    ``cancelled`` is called several times a second; running scenes, shorter than a second, are finished.
     """
     for model in request.models if request.signal_hz is not None else ():
         if cancelled():
@@ -88,7 +88,7 @@ def simulate(
 def simulated_signal(
     request: SimulationRequest, model: str, frequency_hz: float
 ) -> SimulatedSignal | Trouble:
-    """Follow the specimen from rest, and give the last periods."""
+    """Simulate the specimen from rest and return the last periods."""
     specimen = request.specimen_under(model)
     drive = Harmonic(frequency_hz, request.amplitude_m)
     shown_s = min(SIGNAL_PERIODS / frequency_hz, 0.5 * request.duration_s)
@@ -117,7 +117,7 @@ def simulated_signal(
 
 
 def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
-    """Take from a prediction what a picture shows."""
+    """Convert a prediction for the picture."""
     return SimulatedPoint(
         model=model,
         frequency_hz=found.frequency_hz,
@@ -133,11 +133,11 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
 
 
 Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest | MapRequest | MotionRequest
-"""What the process answers."""
+"""Requests that the process accepts."""
 
 
 def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
-    """Compute whatever is asked for, telling it piece by piece; returns early when cancelled."""
+    """Compute a request and send it in pieces; return early when cancelled."""
     try:
         match request:
             case SimulationRequest():
