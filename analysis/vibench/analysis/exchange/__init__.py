@@ -1,8 +1,8 @@
-"""Recordings go out to other programs, and other programs' files come in; one module a format.
+"""Export recordings for other programs, and import their files; one module per format.
 
-Out: CSV, MATLAB 5, UFF 58, WAV, in blocks, and a labelled xarray Dataset; a file appears whole or not at
-all, and none is overwritten. In: these, HDF5 of any layout and TDMS, with a mapping that says what each
-channel means; nothing in a file is ever run. See docs/exchange.md. No analysis of samples happens here.
+Export writes CSV, MATLAB 5, UFF 58 and WAV in blocks, and a labelled xarray Dataset; files appear complete
+or not at all, and are never overwritten. Import reads these, HDF5 of any layout and TDMS, with a mapping of
+channels; nothing in a file is ever executed. See docs/exchange.md.
 
 >>> import numpy as np
 >>> from pathlib import Path

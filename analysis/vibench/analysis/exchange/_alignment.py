@@ -1,4 +1,4 @@
-"""Channels of a file on one time axis: aligned by the times in the file, or refused."""
+"""Align the channels of a file by its times, or refuse."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,33 +43,33 @@ _TIME = re.compile(
 )
 _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03bc]*)\s*", re.IGNORECASE)
 SAME_RATE = 1e-4
-"""How far two statements of one sample rate may differ: clocks differ less."""
+"""Relative tolerance between two statements of a sample rate; clocks differ less."""
 EVEN = 1e-3
-"""How far a sample may lie from its place on an even axis of exactly known rate, in sample intervals."""
+"""Tolerance of a sample's time on an even axis of exactly known rate, in sample intervals."""
 _PLACED = 0.1
-"""How far it may lie from a place on any even axis, beside the rounding of the times."""
+"""Tolerance on any even axis, in addition to rounding."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Share of intervals, and their relative deviation from the median, above which times have too few digits."""
+"""Share of intervals and their relative deviation from the median that show too few digits."""
 _COARSE_SPREAD = 1.25
-"""Of coarse times about a straight line, in their last digit; more shows that samples are missing."""
+"""Largest deviation of coarse times from a line, in last digits; more shows missing samples."""
 _RISING = 0.9
-"""Share of its intervals that are not negative in a channel of times."""
+"""Least share of non-negative intervals in a channel of times."""
 _BIN = 512
-"""Samples of which the extremes are kept."""
+"""Number of samples per pair of kept extremes."""
 _LEAST_RISING = 64
-"""Numbers that must rise evenly before they count as times under another name than that of times."""
+"""Evenly rising numbers required to accept times under another name."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
-"""Samples by which times may go back; more is another record."""
+"""Most samples by which times may go back; more is another record."""
 FARTHEST = 2**40
-"""Sample intervals between two times that are counted at most."""
+"""Largest counted gap between two times, in sample intervals."""
 _LONGEST_PAUSE = 10
-"""Lost samples for each one that is kept; more is a wrong time."""
+"""Most lost samples per kept one; more is a wrong time."""
 
 
 def stated_rate_hz(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, str]:
-    """Return the sample rate that named numbers state, the nearest first, and why they cannot all be true.
+    """Return the sample rate stated by named numbers, the nearest first, and any contradiction.
 
     A number is a rate or an interval, with a unit behind its name: ``"dt_ms"``, ``"Sample rate [kHz]"``.
     """
@@ -92,7 +92,7 @@ def _rates_hz(facts: Iterable[tuple[str, Any]]) -> Iterator[float]:
 
 
 def _number(value: Any) -> tuple[float, str]:
-    """Return a single number, also one that is written as text, and the unit behind it; NaN for all else."""
+    """Return a single number, possibly written as text, and its unit; NaN for anything else."""
     found = _QUANTITY.fullmatch(_text(value))
     return (nan, "") if found is None else (float(found[1]), found[2])
 
@@ -105,9 +105,9 @@ def _text(value: Any) -> str:
 
 
 def told_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return when a channel's first sample was taken, as named facts state it, the nearest first.
+    """Return the stated time of a channel's first sample, the nearest statement first.
 
-    A date and an offset from it are added, as in NI's waveforms.
+    A date and an offset are added, as in NI's waveforms.
     """
     moments_s, offsets_s = [], []
     for name, value in facts:
@@ -124,10 +124,9 @@ def told_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
 
 
 def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
-    """Place samples by a channel of times, read once in blocks.
+    """Return the time axis from a channel of times, read once in blocks; None for other channels.
 
-    None for a channel of other numbers. Whatever its name, a channel that rises evenly and has no unit of
-    another quantity contains times, or counts samples.
+    Any channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
     """
     found, said = _TIME.fullmatch(channel.label.strip()), channel.unit.casefold()
     first = next(iterator := iter(blocks), np.empty(0))
@@ -142,34 +141,34 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
         return replace(axis, unit=channel.unit or found["unit"] or "", is_named=True)
     if axis.interval == 1:
         return replace(axis, unit=None)
-    # Numbers under another name may have any unit: no exact rate, so that the mapping must confirm it.
+    # Numbers under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
     return replace(axis, unit=channel.unit if said in SECONDS else "", uncertainty=uncertainty)
 
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Where samples lie in time, in the unit of the file."""
+    """Times of samples, in the unit of the file."""
 
     start: float
     interval: float
     uncertainty: float
-    """Uncertainty of the interval; 0 where it is exact."""
+    """Uncertainty of the interval; 0 if exact."""
     rounding: float
     """Rounding of the start."""
     runs: tuple[tuple[int, int], ...]
-    """First sample, and its place in sample intervals, of each stretch without irregularity."""
+    """First sample and its place in sample intervals, for each regular stretch."""
     trouble: str = ""
-    """Why samples cannot be placed."""
+    """Reason why samples have no times."""
     unit: str | None = ""
-    """Empty where the file states none; None where these are numbers of samples."""
+    """Unit; empty if the file states none, None for sample numbers."""
     is_named: bool = False
     """Whether the channel is called time."""
 
     def of(self, channel: SourceChannel) -> SourceChannel:
-        """Return a channel with these times; what it said of its rate itself must agree.
+        """Return a channel with these times, which must agree with its stated rate.
 
-        A count of samples (no unit) shows which are missing, and nothing else.
+        Sample numbers (no unit) only show missing samples.
         """
         trouble = channel.time_trouble or self.trouble
         if (unit := self.unit) is None:
@@ -177,7 +176,7 @@ class TimeAxis:
         bounds = rate_bounds(self.interval, self.uncertainty, unit)
         told = channel.sample_rate_hz
         if told is not None and not unit:
-            # A rate tells in which unit the times are.
+            # A rate determines the unit of the times.
             units = {each: rate_bounds(self.interval, self.uncertainty, each) for each in _UNITS}
             unit, bounds = next(((a, b) for a, b in units.items() if b and agrees(told, b)), (unit, bounds))
         second = SECONDS[unit.casefold()]
@@ -188,7 +187,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=told if told is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # Times that begin at zero count from the start that the file states beside them.
+            # Times that start at zero count from the stated start.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,
@@ -219,7 +218,7 @@ def _begin(block: Reals) -> "_Scan | None":
 
 
 class _Scan:
-    """Times seen so far: extremes of their distance from the even axis, and where they jump."""
+    """Scan of times: extremes of their distance from the even axis, and jumps."""
 
     def __init__(self, interval: float, rounding: float) -> None:
         self._interval, self._rounding = interval, rounding
@@ -232,7 +231,7 @@ class _Scan:
         self._trouble = ""
 
     def add(self, block: Reals) -> None:
-        """Take the next times."""
+        """Add the next times."""
         if not np.isfinite(block).all():
             self._trouble = "has times that are not numbers"
             return
@@ -258,7 +257,7 @@ class _Scan:
         self._samples += block.size
 
     def axis(self) -> TimeAxis:
-        """Evaluate the times seen."""
+        """Return the time axis."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
         slope, offset = np.polyfit(places / span, distance, 1) if np.ptp(places) else (0.0, 0.0)
@@ -293,10 +292,10 @@ def _impossible(runs: list[tuple[int, int]], samples: int, span: float) -> str:
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples of a file that follow each other evenly."""
+    """Evenly spaced samples of a file."""
 
     first: int
-    """In the file."""
+    """First sample in the file."""
     place: int
     """Place of the first one, in sample intervals since the channel's start."""
     samples: int
@@ -308,7 +307,7 @@ class Piece:
 
 
 def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
-    """Cut a channel where its times jump; samples at places that come twice are left out, both times.
+    """Split a channel where its times jump; samples at repeated places are left out.
 
     Raises InvalidRequest when the times go back by more than a few samples: two records were joined.
     """
@@ -335,7 +334,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return the runs of a channel that states its start at some samples, and why they cannot be placed."""
+    """Return the runs of a channel with several stated starts, and any contradiction."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):
@@ -356,17 +355,17 @@ _UNITS = ("s", "ms", "us", "ns", "min", "h")
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where the samples of channels lie on one axis of even intervals."""
+    """Places of the samples of channels on one even axis."""
 
     rate_hz: float
     places: int
-    """Sample intervals from the first sample of any channel to the last that all have."""
+    """Sample intervals from the first sample of any channel to the last common one."""
     pieces: tuple[tuple[Piece, ...], ...]
     """Pieces of each channel."""
     late_s: tuple[float, ...]
-    """How much later than its place each channel was sampled, less than half an interval."""
+    """Delay of each channel relative to its place, less than half an interval."""
     remarks: tuple[str, ...]
-    """Time information in the file beyond a rate, and its replacement by the mapping."""
+    """Remarks on time information in the file and its replacement by the mapping."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:
@@ -431,7 +430,7 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
 
 
 def _with_unit(channel: SourceChannel, mapping: ImportMapping) -> SourceChannel:
-    """Return a channel with times in the unit of the mapping, or in one that agrees with its sample rate."""
+    """Return a channel with times in the mapping's unit, or in one that fits its sample rate."""
     if mapping.time == "even":
         return SourceChannel(channel.name, channel.samples, channel.label)
     if channel.time_unit is None:
@@ -459,7 +458,7 @@ def _in_unit(channel: SourceChannel, unit: str) -> SourceChannel:
 
 
 def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> float:
-    """Return the mapping's rate, or the file's where it has none."""
+    """Return the sample rate of the mapping, otherwise of the file."""
     said = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz
@@ -491,14 +490,14 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Return whether channels of these rates stay together over this many samples."""
+    """Return whether channels of these rates stay aligned over this many samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )
 
 
 def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> list[float]:
-    """Return how many sample intervals after the first channel each one starts."""
+    """Return the start of each channel after the first one, in sample intervals."""
     known = {each.start_s: each for each in channels if each.start_s is not None}
     if len(known) < 2 or (max(known) - min(known)) * rate_hz < _APART / 100:
         return [0.0 for _ in channels]

@@ -1,7 +1,7 @@
-"""A folder of recordings as a Research Object Crate: a zip that a repository takes as it is.
+"""Pack a folder of recordings as a Research Object Crate, a zip for a data repository.
 
-RO-Crate 1.1: ``ro-crate-metadata.json`` says of every file what it is; of recordings what was played, how
-they ended, which channels in which units, and with which software.
+RO-Crate 1.1: ``ro-crate-metadata.json`` describes every file, and for recordings the excitation, end,
+channels, units and software.
 """
 
 import hashlib
@@ -35,7 +35,7 @@ Entity = dict[str, Any]
 
 @dataclass(frozen=True)
 class CrateFacts:
-    """What a folder does not say of itself."""
+    """Facts that are not in the folder."""
 
     licence: str
     """Address of the licence: ``https://creativecommons.org/licenses/by/4.0/``."""
@@ -44,7 +44,7 @@ class CrateFacts:
     """The folder's name if empty."""
     description: str = ""
     organisation: str = ""
-    """Who publishes it, and what the authors belong to."""
+    """Publisher and affiliation of the authors."""
     organisation_url: str = ""
 
 
@@ -55,30 +55,29 @@ def pack_folder(
     untrusted: Mapping[str, str],
     observer: TransferObserver = ignore_progress,
 ) -> tuple[Path, ...]:
-    """Pack everything in a folder, and its description, into a zip; give the files that were packed.
+    """Pack a folder and its description into a zip; return the packed files.
 
     Parameters
     ----------
     folder
-        Recordings and whatever lies beside them: journals, reports, tables. It is left as it is.
+        Folder of recordings with journals, reports and tables; it is not changed.
     crate
         The new zip; nothing is overwritten.
     facts
         Licence, authors and their organisation, title.
     untrusted
-        Why a recording cannot be trusted, by its path below the folder: what `vibench.acquisition.campaign`'s
-        ``verify_recordings`` calls bad, recordings that are missing among them. They are packed as they are,
-        and the description says so.
+        Reasons not to trust recordings, by path below the folder, from `vibench.acquisition.campaign`'s
+        ``verify_recordings``. They are packed unchanged, with a remark in the description.
     observer
-        Told how many bytes were packed since it was last called.
+        Receives the number of bytes packed since the last call.
 
     Raises
     ------
     NotEnoughData
         When the folder holds no recording.
     InvalidRequest
-        When the licence or the organisation's page is no address, the page has no organisation, a link leads
-        out of the folder, or the zip exists or is refused.
+        When the licence or the organisation's page is no address, a link leads out of the folder, or the
+        zip exists or cannot be written.
     """
     _require_addresses(facts)
     paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
@@ -130,7 +129,7 @@ def _belongs(path: Path) -> bool:
 def _about(
     folder: Path, facts: CrateFacts, untrusted: Mapping[str, str], entities: Sequence[Entity]
 ) -> Iterator[Entity]:
-    """Describe the description, the crate, its licence, its authors and their organisation."""
+    """Return the entities of the crate, its licence, authors and organisation."""
     described = facts.description or "Recordings of vibro-impact shaker tests, made with vibench"
     warned = (f"{name} cannot be trusted ({why})" for name, why in untrusted.items())
     people = [{"@id": f"#author-{number}"} for number, _ in enumerate(facts.authors, 1)]
@@ -169,12 +168,12 @@ def _about(
 
 
 def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
-    """Return one alone as itself: RO-Crate 1.1 recommends it (appendix on JSON-LD, compacted form)."""
+    """Return a single entity without a list, as RO-Crate 1.1 recommends (compacted JSON-LD)."""
     return entities[0] if len(entities) == 1 else entities
 
 
 def _licence_name(address: str) -> str:
-    """Return "CC BY 4.0" for Creative Commons' addresses, those of deeds too, and the end of any other."""
+    """Return "CC BY 4.0" for addresses of Creative Commons, and the last part of any other."""
     found = _CREATIVE_COMMONS.search(address)
     if found is None:
         return address.rstrip("/").rpartition("/")[2]

@@ -1,6 +1,6 @@
-"""Samples as comma-separated text: one row a sample, headings with units, nothing before them.
+"""Write CSV with one row per sample below headings with units.
 
-Columns of text as a source: commas, semicolons, tabs or blanks between them, read whole.
+Read columns of text, separated by commas, semicolons, tabs or blanks, into memory.
 """
 
 import codecs
@@ -22,11 +22,11 @@ from ._source_channel import SourceChannel, TableSource
 TIME_FORMAT = "%.9f"
 """Nanoseconds since the recording's first sample."""
 VALUE_FORMAT = "%.10g"
-"""One more digit than 2^-30 of the range needs; lost samples read ``nan``."""
+"""One digit more than 2^-30 of the range needs; lost samples are ``nan``."""
 
 
 def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write time and channels, a block at a time."""
+    """Write time and channels in blocks."""
     headings = ["time [s]", *(f"{each.role} [{each.unit}]" for each in excerpt.channels)]
     row = ",".join([TIME_FORMAT, *(VALUE_FORMAT for _ in excerpt.channels)]) + "\n"
     rate = excerpt.recording.sample_rate_hz
@@ -41,9 +41,9 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 
 LONGEST_HEAD = 200
-"""Lines in which the numbers must have started."""
+"""Longest heading in lines."""
 DELIMITERS = (";", "\t", ",", None)
-"""In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
+"""Separators in the order of trying; None means blanks. With another separator, a comma is decimal."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
@@ -59,16 +59,16 @@ STATEMENT = re.compile(
 
 @dataclass(frozen=True)
 class _Layout:
-    """How the numbers of a text are written."""
+    """Format of the numbers of a text."""
 
     delimiter: str | None
     columns: int
     empty: int
-    """Cells behind the last number of each line, as spreadsheets write them."""
+    """Empty cells after the last number of each line, as spreadsheets write them."""
 
     @property
     def width(self) -> int:
-        """Number of all cells of a line."""
+        """Number of cells of a line."""
         return self.columns + self.empty
 
     def cells(self, line: str) -> list[str]:
@@ -79,7 +79,7 @@ class _Layout:
         return found
 
     def plain(self, line: str) -> str:
-        """Write a line as blanks and points; empty where no cell is filled."""
+        """Return a line with blanks and decimal points; empty if all cells are."""
         if '"' not in line and not self.empty and line.strip(BLANK + (self.delimiter or "")):
             return line if self.delimiter == "," else line.replace(",", ".")
         cells = [each.strip().replace(",", ".") for each in self.cells(line)]
@@ -91,9 +91,9 @@ BLANK = " \t\r\n"
 
 @contextmanager
 def open_csv(path: Path) -> Iterator[TableSource]:
-    """Open a file whose columns are ``"1"``, ``"2"``, ... or what the line above them calls them.
+    """Open a file; columns are named ``"1"``, ``"2"``, ... or by their heading.
 
-    ValueError when no line of numbers begins within the first 200, or a later line has others.
+    Raises ValueError when the first 200 lines have no numbers, or a later line differs.
     """
     encoding = _encoding(path)
     head, first, layout = _beginning(path, encoding)
@@ -117,7 +117,7 @@ def open_csv(path: Path) -> Iterator[TableSource]:
 
 
 def _encoding(path: Path) -> str:
-    """Tell by its beginning how text is written; who writes ``µ`` in one byte does not say so."""
+    """Guess the encoding of text from its start, since files do not state it."""
     with path.open("rb") as file:
         head = b"".join(islice(file, LONGEST_HEAD))
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -130,7 +130,7 @@ def _encoding(path: Path) -> str:
 
 
 def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
-    """Name the first line that does not belong to a table of numbers; empty where all do."""
+    """Describe the first line that does not fit the table; empty if all fit."""
     for number, line in enumerate(file, start=1):
         if number <= first or not layout.plain(line).strip():
             continue
@@ -147,9 +147,9 @@ def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
 
 
 def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
-    """Find the lines before the numbers, how many they are, and how the numbers are written.
+    """Return the heading, its length, and the format of the numbers.
 
-    A line of numbers whose next line has another number of them belongs to the heading.
+    A line of numbers followed by a different number of them belongs to the heading.
     """
     found: tuple[list[str], int, _Layout] | None = None
     with path.open(encoding=encoding, errors="replace") as file:
@@ -167,7 +167,7 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
 
 
 def _layout(line: str) -> _Layout | None:
-    """Return how a line of numbers is written; None where it is none."""
+    """Return the format of a line of numbers; None if it is none."""
     for delimiter in DELIMITERS:
         cells = _cells(line, delimiter)
         filled = len(cells)
@@ -192,7 +192,7 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units, from one row, or from two of which one holds only units; else empty ones."""
+    """Return labels and units from one row, or from two rows of which one has only units; else empty."""
     rows = [row for line in head if (row := _row(line, layout))]
     labels, units = (rows or [[""] * layout.columns])[-1], [""] * layout.columns
     if len(rows) > 1:
@@ -209,7 +209,7 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
 
 
 def _row(line: str, layout: _Layout) -> list[str]:
-    """Split a line of a heading into as many cells as there are columns; empty where that cannot be."""
+    """Split a line of a heading into one cell per column; empty if that fails."""
     line = line.strip().lstrip("#% ")
     tries = [layout.cells(line), *(_Layout(each, layout.columns, 0).cells(line) for each in DELIMITERS)]
     tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
@@ -220,6 +220,6 @@ def _row(line: str, layout: _Layout) -> list[str]:
 def _statements(head: Sequence[str]) -> Iterator[tuple[str, float]]:
     for line in head:
         if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
-            # A cell behind the number may be its unit, or another name.
+            # A cell after the number may be its unit, or another name.
             unit = found[3] if found[3].casefold() in UNITS else ""
             yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))

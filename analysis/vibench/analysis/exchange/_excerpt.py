@@ -1,4 +1,4 @@
-"""What is exported: some channels of a recording, from one moment to another, read in blocks."""
+"""Part of a recording for export: some channels and a stretch of time, read in blocks."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ TransferObserver = Callable[[int], None]
 
 
 def ignore_progress(_values: int) -> None:
-    """Watch nothing."""
+    """Ignore the progress."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,25 +37,25 @@ class Excerpt:
 
     @property
     def samples(self) -> int:
-        """Per channel."""
+        """Samples per channel."""
         return self.stop - self.start
 
     @property
     def values(self) -> int:
-        """Number of values of all channels together: what a watcher counts up to."""
+        """Total number of values of all channels, for progress."""
         return self.samples * len(self.channels)
 
     @property
     def name(self) -> str:
-        """The recording's, without suffixes."""
+        """Name of the recording without suffixes."""
         return self.recording.path.name.removesuffix(".part").removesuffix(".h5")
 
     def blocks(self) -> Iterator[RecordedBlock]:
-        """Go through all channels together, a block at a time."""
+        """Yield all channels together in blocks."""
         return self.recording.blocks(self.roles, BLOCK_SAMPLES, self.start, self.stop)
 
     def channel_blocks(self, role: str) -> Iterator[Reals]:
-        """Go through one channel, a block at a time [its physical unit]."""
+        """Yield one channel in blocks [its physical unit]."""
         for block in self.recording.blocks((role,), BLOCK_SAMPLES, self.start, self.stop):
             yield block.values[0]
 
@@ -66,7 +66,7 @@ def excerpt(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> Excerpt:
-    """Choose channels (all when none is named) and a stretch of time since the first sample.
+    """Return an excerpt of some channels (by default all) and a stretch of time.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def excerpt(
 
 
 def _sample(place: float) -> int:
-    """Round to a sample; what is no number, or beyond all of them, lies outside every recording."""
+    """Round to a sample; values that are not finite lie outside every recording."""
     return round(place) if isfinite(place) else -1
 
 

@@ -1,4 +1,4 @@
-"""An excerpt of a recording becomes a file that other programs read."""
+"""Export an excerpt of a recording to a file for other programs."""
 
 import errno
 import json
@@ -31,7 +31,7 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 def require_unused(path: Path) -> None:
-    """InvalidRequest when a file has that name, or its folder does not exist."""
+    """Raise InvalidRequest when a file has that name, or its folder does not exist."""
     if path.exists():
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():
@@ -40,7 +40,7 @@ def require_unused(path: Path) -> None:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Give a name to write to; when all went well the file has ``path`` as its name, else it is gone.
+    """Yield a temporary name; rename it to ``path`` on success, otherwise delete it.
 
     Raises InvalidRequest when ``path`` or its unfinished form exists, the folder does not, or the disk
     refuses.
@@ -50,7 +50,7 @@ def new_file(path: Path) -> Iterator[Path]:
         require_unused(each)
     try:
         yield unfinished
-        require_unused(path)  # another program may have been as busy
+        require_unused(path)  # another program may have created it meanwhile
         rename(unfinished, path)
     except OSError as error:
         mend = "choose another folder" if error.errno in _REFUSED else "make room and try again"
@@ -63,7 +63,7 @@ def new_file(path: Path) -> Iterator[Path]:
 
 
 def require_results(recording: Recording) -> Mapping[str, SavedResult]:
-    """Return them; NotEnoughData when there are none."""
+    """Return the results; raises NotEnoughData when there are none."""
     found = recording.results
     if not found:
         raise NotEnoughData(
@@ -74,7 +74,7 @@ def require_results(recording: Recording) -> Mapping[str, SavedResult]:
 
 
 def result_paths(recording: Recording, path: Path) -> tuple[Path, ...]:
-    """Names of the files that :func:`write_result_tables` makes; InvalidRequest when one is taken."""
+    """Return the files that :func:`write_result_tables` makes; raises InvalidRequest if one exists."""
     paths = tuple(path.with_name(f"{path.stem}.{each.name}.csv") for each in _tables(recording))
     for each in paths:
         require_unused(each)
@@ -123,7 +123,7 @@ def _tables(recording: Recording) -> Iterator[Table]:
 
 
 def _table(name: str, arrays: Mapping[str, ResultArray], axes: tuple[str, ...]) -> Table:
-    """Lay everything over the same axes side by side: one row for each point of their grid."""
+    """Join all values over the same axes into one table, one row per grid point."""
     grid = np.meshgrid(*(arrays[axis].values for axis in axes), indexing="ij")
     columns = {_heading(axis, arrays[axis].unit): values for axis, values in zip(axes, grid, strict=True)}
     for key, array in arrays.items():
@@ -145,7 +145,7 @@ def _heading(name: str, unit: str) -> str:
 
 
 class Format(StrEnum):
-    """What an excerpt can become; the word is the file's suffix too."""
+    """Export formats; the value is also the file's suffix."""
 
     CSV = "csv"
     """Text with units in its headings."""
@@ -160,7 +160,7 @@ class Format(StrEnum):
 
 
 class Results(Enum):
-    """Whether saved results go out with the samples."""
+    """Whether saved results are exported with the samples."""
 
     LEFT_OUT = auto()
     INCLUDED = auto()
@@ -173,10 +173,10 @@ def export_samples(
     results: Results = Results.LEFT_OUT,
     observer: TransferObserver = ignore_progress,
 ) -> tuple[Path, ...]:
-    """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
+    """Write the excerpt to ``path``, and facts that its format cannot store to ``PATH.facts.json``.
 
-    Results become structs in a MATLAB file, and beside the others ``NAME.RESULT.AXIS.csv``. Gives the
-    files that were written. Nothing is ever overwritten.
+    Results become structs in a MATLAB file, and ``NAME.RESULT.AXIS.csv`` beside other formats. Returns the
+    written files. Nothing is ever overwritten.
 
     Parameters
     ----------
@@ -187,18 +187,18 @@ def export_samples(
     path
         The new file.
     results
-        Whether saved results go out too.
+        Whether to export saved results too.
     observer
-        Told how many values were written since it was last called.
+        Receives the number of values written since the last call.
 
     Raises
     ------
     InvalidRequest
-        When a name is taken, the disk refuses, or the format cannot hold so much; nothing is left of it.
+        When a name is taken, writing fails, or the format cannot store so much; no file is left.
     UnusableData
         When the recording is not as it was sealed.
     NotEnoughData
-        When results are asked for and none is saved.
+        When results are requested and none is saved.
     """
     require_intact(excerpt.recording)
     return EXPORTERS[to].export(excerpt, path, results, observer)
@@ -207,23 +207,23 @@ def export_samples(
 def export_functions(
     excerpt: Excerpt, functions: Sequence[UniversalFunction], to: Format, path: Path
 ) -> tuple[Path, ...]:
-    """Write frequency responses and spectra of an excerpt as ``path``, and its facts beside it.
+    """Write frequency responses and spectra of an excerpt to ``path``, and its facts beside it.
 
     Parameters
     ----------
     excerpt
-        What they were estimated from.
+        Source of the functions.
     functions
-        In the order in which they are to stand.
+        Functions in the order of writing.
     to
-        A format that has a place for them.
+        A format that can store them.
     path
         The new file.
 
     Raises
     ------
     InvalidRequest
-        When the format has no place for them, a name is taken, or the disk refuses; nothing is left of it.
+        When the format cannot store them, a name is taken, or writing fails; no file is left.
     """
     write = EXPORTERS[to].write_functions
     if write is None:
@@ -245,25 +245,25 @@ WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]
 
 
 class Exporter(Protocol):
-    """A row of `EXPORTERS`: how an excerpt becomes files of one format."""
+    """Exporter of one format, a row of `EXPORTERS`."""
 
     @property
     def write_functions(self) -> WriteFunctions | None:
-        """Writes frequency responses and spectra; None where the format has no place for them."""
+        """Function that writes frequency responses and spectra; None if the format cannot."""
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
     ) -> tuple[Path, ...]:
-        """Write the files; gives them. Nothing is left of what could not be written whole."""
+        """Write and return the files; incomplete files are removed."""
 
 
 def _accept(_excerpt: Excerpt) -> None:
-    """Take an excerpt of any length."""
+    """Accept an excerpt of any length."""
 
 
 @dataclass(frozen=True)
 class SamplesFile:
-    """A format for samples alone: the facts go into a document beside it, results into tables."""
+    """A format for samples only; facts and results are written beside it."""
 
     write: Callable[[Excerpt, Path, TransferObserver], None]
     require: Callable[[Excerpt], None] = _accept
@@ -273,7 +273,7 @@ class SamplesFile:
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
     ) -> tuple[Path, ...]:
-        """Write samples, facts and tables, once every name is known to be free."""
+        """Write samples, facts and tables after checking that all names are free."""
         recording, facts = excerpt.recording, facts_path(path)
         are_included = results is Results.INCLUDED
         require_unused(facts)
@@ -290,7 +290,7 @@ class SamplesFile:
 
 @dataclass(frozen=True)
 class WholeFile:
-    """A format with a place for facts and results too."""
+    """A format that stores facts and results too."""
 
     write: Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
     require: Callable[[Excerpt], None] = _accept
@@ -316,4 +316,4 @@ EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
         Format.WAV: SamplesFile(write_wav, require_sound),
     }
 )
-"""How each format is written: a new one is a file with its writer, its word above, and its row here."""
+"""Exporters by format. A new format needs a module with its writer, a value above, and a row here."""

@@ -1,4 +1,4 @@
-"""What CSV, UFF and WAV have no place for: everything a recording says beside its samples, as JSON."""
+"""Facts of a recording beside its samples as JSON, for formats that cannot store them."""
 
 import json
 from dataclasses import asdict
@@ -16,7 +16,7 @@ def facts_path(path: Path) -> Path:
 
 
 def facts_document(excerpt: Excerpt) -> dict[str, Any]:
-    """Collect it; samples are counted from the recording's first, whatever the excerpt."""
+    """Return the facts; samples are counted from the first one of the recording."""
     recording = excerpt.recording
     return {
         "recording": excerpt.name,

@@ -1,4 +1,4 @@
-"""HDF5 of any layout as a source: netCDF-4, MATLAB 7.3 and instrument makers' own are HDF5 too."""
+"""Read HDF5 of any layout, including netCDF-4, MATLAB 7.3 and formats of instrument makers."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ from ._source_channel import SourceChannel, text_of
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
-"""What HDF5 says of a file that lost its end."""
+"""HDF5's message for a truncated file."""
 EXACT_KINDS = {"i": 4, "u": 2}
 """Integers of at most this many bytes fit the recording's own."""
 
@@ -30,7 +30,7 @@ Facts = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a channel's numbers lie."""
+    """Place of a channel's numbers."""
 
     path: str
     row: int | None
@@ -136,13 +136,13 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int, said: Mapping[str, 
 
 
 def _origin(file: h5py.File) -> Origin | None:
-    """Read what a recording, or a file made of one, says of itself."""
+    """Read the origin stated by a recording or by an export of one."""
     said = _text(file, "origin") if "origin" in file.attrs else ""
     return Origin(said) if said in set(Origin) else None
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Name what a group and those around it say in single numbers, the nearest first."""
+    """Return single numbers of a group and its parents by name, the nearest first."""
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]
@@ -158,5 +158,5 @@ def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
 
 def _text(item: h5py.HLObject, name: str) -> str:
     value = np.ravel(item.attrs[name])[0]
-    # h5py keeps bytes of variable length that are no UTF-8 as surrogates.
+    # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
     return text_of(value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape"))

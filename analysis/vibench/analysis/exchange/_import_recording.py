@@ -1,6 +1,6 @@
-"""Somebody else's file becomes a recording, with what it means, where it came from and its checksum.
+"""Import a file as a recording, with its mapping, origin and checksum.
 
-Where in a file the parts of a plan lie: told by the mapping, or one after the other.
+The parts of the plan are placed by the mapping, or one after the other.
 """
 
 import hashlib
@@ -55,9 +55,9 @@ class _Planned:
 
 
 def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
-    """Lay the plan's parts over the samples; parts past their end are left out, one across it is cut by it.
+    """Place the plan's parts in the file; parts after its end are left out, the last may be cut.
 
-    Raises InvalidRequest when more parts are given than are planned, they overlap, or none lies inside the
+    Raises InvalidRequest for too many or overlapping parts, or if none lies inside the
     file.
     """
     planned = list(_recorded_steps(mapping.measurement.excitation))
@@ -76,7 +76,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
 
 
 def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
-    """Join the steps that are recorded as one, as a run does."""
+    """Join the steps that a run records as one."""
     joined = 0
 
     def part(step: Step) -> int:
@@ -116,14 +116,14 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterat
 FARTHEST = 2.0**62
 """A sample beyond the end of every file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
-"""Between these a channel's numbers, their squares and their steps are all numbers of a computer."""
+"""Range of a channel's largest number, so that squares and steps stay finite."""
 NEAR_FULL_SCALE = 0.95
 """Share of the full scale from which a sample counts as overloaded, as at the bench."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Wanted:
-    """One channel to import: what the mapping and the file say of it."""
+    """One channel to import, with mapping and source."""
 
     mapped: ChannelMapping
     source: SourceChannel
@@ -146,17 +146,17 @@ class _Wanted:
 def import_recording(
     path: Path, mapping: ImportMapping, out: Path, observer: TransferObserver = ignore_progress
 ) -> Path:
-    """Make the recording ``out`` from a file, a block at a time.
+    """Make the recording ``out`` from a file, in blocks.
 
-    Channels are aligned by what the file says of time; places without a sample, and values that are no finite
-    numbers, count as lost samples of all channels. The stored "volts" are the
+    Channels are aligned by the times in the file. Missing samples and values that are not finite count as
+    lost samples of all channels. The stored "volts" are the
     numbers of the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
     two above their largest.
 
     Parameters
     ----------
     observer
-        Told how many values were written since it was last called.
+        Receives the number of values written since the last call.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def import_recording(
         try:
             _write(writer, source, wanted, parts, samples, observer)
         except BaseException:
-            # Half an import is worth nothing: the file it came from is still there.
+            # An incomplete import is deleted, since its source still exists.
             writer.finish(RecordingState.FAILED, "the import was not completed")
             out.unlink(missing_ok=True)
             raise
@@ -198,7 +198,7 @@ def import_recording(
 
 
 def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
-    """One simulated channel makes a recording that nobody has measured."""
+    """Return the origin; one simulated channel makes the whole recording simulated."""
     told = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and told - {mapping.origin}:
         raise InvalidRequest(
@@ -247,7 +247,7 @@ def _peak(source: Source, channel: SourceChannel) -> float:
 def _power_of_two_above(peak: float) -> float:
     """Return the smallest power of two that is not below a peak.
 
-    Raises UnusableData when the peak is beyond what a recording's numbers can be scaled by.
+    ¶ Raises UnusableData when a recording cannot store the peak.
     """
     if not LEAST_PEAK < peak < MOST_PEAK:
         if peak == 0:
@@ -263,7 +263,7 @@ def _power_of_two_above(peak: float) -> float:
 def _bench(
     path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what is known of the bench, and where the samples came from."""
+    """Return the known bench configuration and the origin of the samples."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     bench: dict[str, Any] = {
@@ -311,7 +311,7 @@ def _write(
 
 
 def _blocks(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Block]:
-    """Cut out what is no number in any channel, and mark what lies near full scale."""
+    """Yield blocks without missing numbers, and mark samples near full scale."""
     for start, stop in _runs(np.all(np.isfinite(values), axis=0)):
         kept = np.ascontiguousarray(values[:, start:stop])
         yield Block(first + start, kept, tuple(_overloads(kept, first + start, wanted)))
@@ -326,6 +326,6 @@ def _overloads(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator
 
 
 def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Ranges (start, stop) in which the flags hold."""
+    """Return ranges (start, stop) of set flags."""
     changes = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
     return [(int(start), int(stop)) for start, stop in changes.reshape(-1, 2)]

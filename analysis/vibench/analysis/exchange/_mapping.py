@@ -1,4 +1,4 @@
-"""What somebody else's file means: which of its channels is which, and what was played, as a TOML file."""
+"""Mapping of a foreign file, as TOML: its channels and the excitation."""
 
 from datetime import date
 from typing import Literal, Self
@@ -21,7 +21,7 @@ KNOWN_ROLES = {
     ACCELERATION: ("acceleration", "m s-2"),
     DISPLACEMENT: ("displacement", "m"),
 }
-"""Quantity and unit that the analysis takes these channels to have."""
+"""Quantity and unit of these channels in the analysis."""
 
 
 class ChannelMapping(FrozenModel):
@@ -39,14 +39,14 @@ class ChannelMapping(FrozenModel):
     """Unit per number in the file; of a file in volts, or the sensor's sensitivity: ``"100 mV/g"``."""
     offset: float = 0.0
     full_scale: PositiveFloat | None = None
-    """What the input could bear, as a number in the file; values near it are marked as overloads."""
+    """Full scale of the input, as a number in the file; values near it are marked as overloads."""
     coupling: Literal["AC", "DC"] = "DC"
     sensitivity: PositiveFloat | None = None
     sensitivity_unit: str = ""
     serial: str = ""
     calibration_date: date | None = None
     delay_s: float = 0.0
-    """How late the channel shows what happened [s]."""
+    """Delay of the channel [s]."""
     long_name: str = ""
 
     @model_validator(mode="after")
@@ -84,12 +84,12 @@ class ChannelMapping(FrozenModel):
 
     @property
     def kind(self) -> tuple[str, str]:
-        """Quantity and unit, from its role when they were left out."""
+        """Quantity and unit, by default from its role."""
         return KNOWN_ROLES.get(self.role, (self.quantity, self.unit))
 
 
 class Part(FrozenModel):
-    """Where in the file a part of the plan lies [s since its first sample]."""
+    """Place of a part of the plan in the file [s since its first sample]."""
 
     start_s: NonNegativeFloat
     stop_s: PositiveFloat
@@ -104,30 +104,30 @@ class Part(FrozenModel):
 
 
 class ImportMapping(FrozenModel):
-    """Everything an analysis must know that the file does not say."""
+    """Information for the analysis that is not in the file."""
 
     started_utc: AwareDatetime
-    """When it was measured, with its time zone: ``2026-03-01T12:00:00Z``."""
+    """Time of the measurement with time zone: ``2026-03-01T12:00:00Z``."""
     sample_rate_hz: PositiveFloat | None = None
-    """Needed where the file does not say it exactly: HDF5, universal files."""
+    """Sample rate; needed if the file does not state it exactly (HDF5, universal files)."""
     time: Literal["file", "even"] = "file"
-    """``"even"``: samples are even, simultaneous, at ``sample_rate_hz``, whatever the file says of time."""
+    """``"even"``: samples are simultaneous and even at ``sample_rate_hz``; ignores times in the file."""
     time_unit: Literal["s", "ms", "us"] | None = None
-    """Unit of the file's times, if missing or wrong there."""
+    """Unit of the times in the file, if missing or wrong there."""
     origin: Origin | None = None
-    """``"real"`` or ``"simulated"``; as the file says where it is left out, and real if that is silent."""
+    """``"real"`` or ``"simulated"``; by default as in the file, else real."""
     measurement: Measurement
-    """What was played, as in a campaign; a name, an excitation, notes."""
+    """Measurement as in a campaign: name, excitation, notes."""
     begins_s: NonNegativeFloat = 0.0
-    """When the first thing was played, its settling included [s since the first sample]."""
+    """Start of the excitation including settling [s since the first sample]."""
     parts: tuple[Part, ...] = ()
-    """Where each part of the plan was recorded, when it is not simply one after the other."""
+    """Place of each part of the plan, if they do not follow one another."""
     channels: tuple[ChannelMapping, ...] = Field(min_length=1)
     specimen: SpecimenTable | None = None
-    """What was on the shaker, where it was not the paper's."""
+    """The specimen, if it is not the paper's."""
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
-    """What else is known, for the report."""
+    """Remarks for the report."""
 
     @model_validator(mode="after")
     def _has_a_rate(self) -> Self:

@@ -1,6 +1,6 @@
-"""Samples and what is known of them as a MATLAB 5 file: a struct for each channel, and one of facts.
+"""Write MATLAB 5: a struct for each channel, and one of facts.
 
-MATLAB files as a source: 7.3 is HDF5; what ``save`` writes by default is MATLAB 5, read whole.
+Read MATLAB files: 7.3 is HDF5; the default of ``save`` is MATLAB 5, read into memory.
 """
 
 import json
@@ -27,7 +27,7 @@ from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
 from ._source_channel import SourceChannel, TableSource
 
-# The elements of a MATLAB 5 file, looked at before they are read: scipy's reader crashes on wrong types.
+# The elements of a MATLAB 5 file are checked first, because scipy's reader crashes on wrong types.
 #
 # Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format": a head of 128 bytes, then elements of a tag
 # (type, bytes) and data, padded to eight bytes; matrices hold elements, compressed ones hold one.
@@ -39,22 +39,22 @@ PLAIN = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
 SMALL_BYTES = 4
 """An element of up to this many bytes may lie in its tag."""
 DEEPEST = 30
-"""Cells in structs in cells: more is nothing that anybody measured."""
+"""Deepest nesting of cells and structs."""
 
 
 def require_whole(path: Path) -> None:
-    """Raise ValueError for a file whose elements do not lie within each other, or have unknown types."""
+    """Raise ValueError for a file with inconsistent elements or unknown types."""
     content = memoryview(path.read_bytes())
     if len(content) < HEAD_BYTES:
         raise ValueError("it ends within its head")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
-    # Version 4 has no such head: its reader knows few types, and checks them.
+    # Version 4 has no such head; its reader checks its few types.
     if order is not None:
         _look(content[HEAD_BYTES:], order, 0)
 
 
 def _look(content: memoryview, order: str, depth: int) -> None:
-    """Go through the elements that follow each other."""
+    """Check consecutive elements."""
     if depth > DEEPEST:
         raise ValueError(f"more than {DEEPEST} structs or cells lie within each other")
     while len(content) >= TAG_BYTES:
@@ -93,14 +93,14 @@ def _decompressed(data: memoryview) -> bytes:
 
 
 LARGEST_BYTES = 2**31
-"""A MATLAB 5 file counts the bytes of a variable with 31 bits, and many a reader those of the file."""
+"""Largest MATLAB 5 file: sizes of variables have 31 bits, and in many readers those of files too."""
 VALUE_BYTES = 8
 LONGEST_NAME = 63
 """Longest name of a MATLAB variable; longer names of channels are cut."""
 
 
 def require_small(excerpt: Excerpt) -> None:
-    """InvalidRequest when the samples, and their times, do not fit a MATLAB 5 file."""
+    """Raise InvalidRequest when samples and times do not fit into a MATLAB 5 file."""
     columns = len(excerpt.channels) + 1
     size = excerpt.samples * columns * VALUE_BYTES
     if size >= LARGEST_BYTES:
@@ -157,7 +157,7 @@ def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
 
 
 def _facts(excerpt: Excerpt) -> dict[str, Any]:
-    """Numbers and texts as they are; everything nested as the JSON that ``jsondecode`` reads."""
+    """Return facts: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
     facts = facts_document(excerpt)
     del facts["segments"]
     plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
@@ -188,7 +188,7 @@ FEWEST_SAMPLES = 2
 
 @contextmanager
 def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
-    """Open a file; matrices and fields of structs are called ``"name"``, ``"struct.field"``, ``"name#2"``.
+    """Open a file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``. ¶ Raises
 
     ValueError when it is damaged.
     """
@@ -205,7 +205,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
-    # What was exported here says its rate beside its channels.
+    # Our own exports state the rate beside the channels.
     about = own.get("recording")
     yield TableSource(dict(_numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())))
 
@@ -213,7 +213,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
 def _numbers(
     struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
 ) -> Iterator[tuple[SourceChannel, Any]]:
-    # Some measuring programs keep start and increment in a struct beside the values.
+    # Some programs store start and increment in a struct beside the values.
     own = {**struct, **(axis if isinstance(axis := struct.get("x_values"), dict) else {})}
     facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
     start_s = told_start_s(facts)

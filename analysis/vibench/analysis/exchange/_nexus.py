@@ -1,4 +1,4 @@
-"""Samples as a NeXus file: an NXentry with an NXdata for each channel, which silx plots with labels.
+"""Write NeXus: an NXentry with an NXdata for each channel, which silx plots with labels.
 
 Of the NeXus standard (NXdata, version 2024.02): the group names its ``signal`` and ``axes``; values are
 physical, since readers do not apply scales; the half step of the converter is each value's error.
@@ -18,14 +18,14 @@ SIGNAL, TIME = "values", "time"
 
 
 def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write channels one after the other, a block at a time; lost samples are NaN."""
+    """Write channels one after the other in blocks; lost samples are NaN."""
     with open_hdf5_to_write(path, "x") as file:
         file.attrs.update({"NX_class": "NXroot", "default": ENTRY})
         entry = _group(file, ENTRY, "NXentry")
         entry["title"] = f"{excerpt.name}: {excerpt.recording.plan.get('name', '')}".removesuffix(": ")
         entry["start_time"] = excerpt.recording.started_utc
         entry["program_name"] = "vibench"
-        # What opens first: the response of m0 where it was recorded.
+        # Default plot: the response of m0 if it was recorded.
         entry.attrs["default"] = "m0_velocity" if "m0_velocity" in excerpt.roles else excerpt.roles[-1]
         for channel in excerpt.channels:
             _write_channel(entry, excerpt, channel, observer)
@@ -42,7 +42,7 @@ def _write_channel(
 ) -> None:
     data = _group(entry, channel.role, "NXdata")
     data.attrs.update({"signal": SIGNAL, "axes": [TIME], f"{TIME}_indices": 0})
-    # silx names no vertical axis: the unit stands in the title as well.
+    # silx has no label for the vertical axis, so the title contains the unit too.
     data["title"] = f"{excerpt.name}: {channel.long_name or channel.role} [{channel.unit}]"
     chunks = (min(BLOCK_SAMPLES, excerpt.samples),)
     stored = {"shape": (excerpt.samples,), "dtype": "f8", "chunks": chunks, "compression": "gzip"}

@@ -64,25 +64,25 @@ DAMAGE = (
     UnboundLocalError,
     struct.error,
 )
-"""What h5py, npTDMS and scipy raise when the inside of a file is not what its outside promised."""
+"""Errors of h5py, npTDMS and scipy for damaged files."""
 
 
 CHANNELS_SHOWN, NAME_SHOWN = 20, 60
-"""Channels that a sentence names, and letters of each name."""
+"""Most channels named in a sentence, and letters of each name."""
 MOST_CHANNELS = 4096
-"""More is no measurement, but a table that lies on its side or a damaged file."""
+"""More channels mean a transposed table or a damaged file."""
 
 
 @contextmanager
 def opened_source(path: Path) -> Iterator[Source]:
-    """Open a file by its suffix. Nothing in it is ever run: no pickles, no macros.
+    """Open a file by its suffix. Nothing in it is ever executed: no pickles, no macros.
 
     Raises
     ------
     InvalidRequest
         When there is no such file, or no reader for its suffix.
     UnusableData
-        When it is not what its suffix says, or holds nothing that can be a channel.
+        When it is damaged, or contains no channel.
     """
     if not path.is_file():
         raise InvalidRequest(f"{path} does not exist, or is no file; give the path of a file to import")
@@ -109,7 +109,7 @@ def opened_source(path: Path) -> Iterator[Source]:
 
 
 def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
-    """Yield the channels with the times that stand beside them in the file."""
+    """Yield the channels with their times from the file."""
     read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
     for number, each in enumerate(source.channels):
@@ -125,31 +125,31 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
 
 
 def _group(channel: SourceChannel) -> str:
-    """Return what comes before a channel's own name."""
+    """Return the part of a channel's name before the last separator."""
     return re.sub(r"[^/.]*$", "", channel.name)
 
 
 def channel_blocks(source: Source, channel: SourceChannel) -> Iterator[Reals]:
-    """Go through a channel of a file, a block at a time."""
+    """Yield a channel of a file in blocks."""
     for start in range(0, channel.samples, BLOCK_SAMPLES):
         yield source.read(channel, start, min(start + BLOCK_SAMPLES, channel.samples))
 
 
 @dataclass(frozen=True)
 class _CheckedSource:
-    """A source whose every failure is a sentence."""
+    """A source that raises every failure as one sentence."""
 
     path: Path
     source: Source
     found: Mapping[SourceChannel, SourceChannel]
-    """Channels as the reader knows them, by what else the file says of them."""
+    """Channels of the reader, by channel with times."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
         return tuple(self.found)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        # Converting a signalling NaN is no error: it is a lost sample like any other NaN.
+        # A signalling NaN is a lost sample like any other NaN.
         with _readable(self.path), np.errstate(invalid="ignore"):
             values = self.source.read(self.found[channel], start, stop)
         if values.shape != (stop - start,):

@@ -1,7 +1,4 @@
-"""One channel of somebody else's file.
-
-A table held in memory as a source: what formats give that cannot be read in stretches.
-"""
+"""One channel of a foreign file, and a table in memory as a source."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +9,7 @@ from vibench.acquisition.recording import Origin
 from ..signals.arrays import Reals
 
 LEAST_INTERVAL_S = 1e-100
-"""Shorter is no time between samples, and its inverse may be no number."""
+"""Shortest interval between samples, whose inverse is finite."""
 SECONDS = {
     **dict.fromkeys(("", "none", "s", "sec", "secs", "sek", "second", "seconds", "sekunden"), 1.0),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
@@ -32,7 +29,7 @@ def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, 
 
 
 def text_of(raw: bytes) -> str:
-    """Decode text; makers write ``m/s²`` in one of two encodings, and say in neither which."""
+    """Decode text in one of two encodings, which files do not state."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -41,44 +38,44 @@ def text_of(raw: bytes) -> str:
 
 @dataclass(frozen=True)
 class SourceChannel:
-    """What the file says of it."""
+    """A channel as described by its file."""
 
     name: str
-    """How a mapping names it; no other channel of the file has it."""
+    """Unique name in the file, for mappings."""
     samples: int
     label: str = ""
-    """What its maker called it; others may be called the same."""
+    """Label in the file; not unique."""
     sample_rate_hz: float | None = None
-    """None when the file does not say, or not exactly."""
+    """Sample rate; None if the file does not state it exactly."""
     unit: str = ""
     step: float | None = None
-    """Distance of neighbouring values when they come from integers, so that they are kept exactly."""
+    """Step between values from integers, to store them exactly."""
     origin: Origin | None = None
-    """Whether it was measured or simulated; None when the file does not say."""
+    """Whether it was measured or simulated; None if unknown."""
     full_scale: float | None = None
-    """Largest value the file can hold, where that is the converter's range."""
+    """Largest value in the file format, if that is the converter's range."""
     rate_bounds_hz: tuple[float, float] | None = None
-    """The same where the file does not say it exactly, but tells times in few digits."""
+    """Bounds of the sample rate, from times with few digits."""
     start_s: float | None = None
-    """When its first sample was taken, on the clock that all channels of the file share."""
+    """Time of its first sample, on the common clock of the file."""
     start_error_s: float = 0.0
     runs: tuple[tuple[int, int], ...] = ()
-    """First sample, and its place in sample intervals, of each stretch; empty where all are even."""
+    """First sample and its place in sample intervals, for each stretch; empty if all are even."""
     time_unit: str | None = None
-    """Unit of its times, empty where the file states none; None where it has no times."""
+    """Unit of its times, empty if not stated; None without times."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
 
     @property
     def rates_hz(self) -> tuple[float, float]:
-        """Between which the rate lies, as far as the file tells it."""
+        """Bounds of the sample rate."""
         exact = self.sample_rate_hz
         return (self.rate_bounds_hz or (0.0, inf)) if exact is None else (exact, exact)
 
 
 @dataclass(frozen=True, eq=False)
 class TableSource:
-    """Channels with all their numbers."""
+    """A table of channels in memory."""
 
     numbers: Mapping[SourceChannel, Reals]
 

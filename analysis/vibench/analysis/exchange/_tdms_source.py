@@ -1,4 +1,4 @@
-"""National Instruments' TDMS as a source, read by npTDMS."""
+"""Read National Instruments' TDMS with npTDMS."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -51,18 +51,18 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         raise InvalidRequest(
             f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
         ) from error
-    # Ours to open: npTDMS does not close what it finds damaged.
+    # Opened here, because npTDMS does not close damaged files.
     with path.open("rb") as raw:
         if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, and say nothing
             raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
-        # It writes what it doubts to standard error, at any length; what matters, it raises.
+        # Its warnings on standard error are suppressed; errors are raised.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep what each segment states, by the sample that follows; npTDMS keeps the last statement."""
+            """Keep the statements of each segment by sample; npTDMS keeps only the last one."""
 
             def _update_object_metadata(self, segment: Any) -> None:
                 self._before = {path: each.num_values for path, each in self.object_metadata.items()}
@@ -71,7 +71,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
                 for name in properties or ():
-                    # The text of a time of npTDMS is a second off near the end of a second.
+                    # npTDMS's text of a time is wrong by a second near the end of a second.
                     statements.setdefault(name, {})[self._before.get(name, 0)] = tuple(
                         (each, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
                         for each, value in self.object_metadata[name].properties.items()

@@ -1,16 +1,12 @@
 """Samples as Universal File Format, dataset 58 in its binary form, with dataset 164 for the units.
 
 Layout: SDRC universal dataset 58, "Function at Nodal DOF", and its binary variant 58b (Structural
-Dynamics Research Laboratory, University of Cincinnati). The increment of time has five decimals there,
-which is half a millisecond after 200 s at 51.2 kHz; so the rate also stands, exactly, in ID line 5.
+Dynamics Research Laboratory, University of Cincinnati). The increment of time has five decimals, an error
+of 0.5 ms after 200 s at 51.2 kHz, so ID line 5 contains the exact rate.
 
-Universal dataset 58, as far as writing and reading share it.
-
-Universal files as a source: the time responses among their datasets 58, text or binary.
-
-Polytec's software exports scans so. Their increment of time has five decimals: the mapping must give
-the sample rate. What follows binary samples differs from maker to maker, so their number is taken from
-the header and never searched for.
+Reading takes the time responses of datasets 58, text or binary, as from Polytec's software. The mapping
+must give the sample rate. The number of binary samples comes from the header, because what follows them
+differs between makers.
 """
 
 import re
@@ -55,23 +51,23 @@ ORIGIN = re.compile(rf"\borigin=({'|'.join(Origin)})\b")
 
 
 def id_line(text: str) -> str:
-    """One of the five ID lines; they may not be empty."""
+    """Return one of the five ID lines, which may not be empty."""
     return f"{text.strip() or 'NONE':<{ID_WIDTH}.{ID_WIDTH}}"
 
 
 def rate_line(sample_rate_hz: float, first_sample: int, origin: Origin) -> str:
-    """Write what the increment of time cannot hold, every digit of the sample rate, and the origin."""
+    """Return a line with the exact sample rate and the origin."""
     return f"sample_rate_hz={sample_rate_hz!r} first_sample={first_sample} origin={origin.value}"
 
 
 def exact_rate_hz(line: str) -> float | None:
-    """Read back what :func:`rate_line` wrote; None when somebody else wrote the line."""
+    """Read the rate of :func:`rate_line`; None for other lines."""
     found = RATE.search(line)
     return None if found is None else float(found[1])
 
 
 def read_origin(line: str) -> Origin | None:
-    """Read back the origin that :func:`rate_line` wrote; None when somebody else wrote the line."""
+    """Read the origin of :func:`rate_line`; None for other lines."""
     found = ORIGIN.search(line)
     return None if found is None else Origin(found[1])
 
@@ -83,11 +79,11 @@ SI_UNITS = (
 ).replace("E+", "D+")
 """Dataset 164: units code 1, absolute temperature, factors to SI and the offset of the Celsius scale."""
 SCALAR = 0
-"""Direction of the response: the recording does not say how a sensor points."""
+"""Direction of the response, which recordings do not contain."""
 
 
 def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write one dataset for each channel, a block at a time; lost samples are NaN."""
+    """Write one dataset for each channel in blocks; lost samples are NaN."""
     with path.open("xb") as file:
         file.write(SI_UNITS.encode("ascii"))
         for number, channel in enumerate(excerpt.channels, start=1):
@@ -105,7 +101,7 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
     rate = recording.sample_rate_hz
     kind, *exponents = QUANTITIES.get(channel.quantity, UNKNOWN)
     yield DELIMITER
-    # Little-endian IEEE numbers behind eleven lines of text.
+    # Little-endian IEEE numbers after eleven lines of text.
     yield f"{58:6d}b{1:6d}{2:6d}{11:12d}{excerpt.samples * DOUBLE_BYTES:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
     yield id_line(channel.role)
     yield id_line(f"{excerpt.name} {recording.recording_id}")
@@ -135,9 +131,9 @@ def date_line(started_utc: str) -> str:
 
 HEADER_LINES = 11
 LEAST_TEXT = 2
-"""Characters of a number in free text: a digit and what divides it from the next."""
+"""Least characters per number in free text: a digit and a separator."""
 DIGITS = 5e-6
-"""How far an increment of time may lie from the truth, as a share: it has six digits."""
+"""Relative rounding of an increment of time with six digits."""
 IEEE = 2
 BYTE_ORDERS = {1: "<", 2: ">"}
 WIDTHS = {REAL_SINGLE: 13, REAL_DOUBLE: 20}
@@ -149,7 +145,7 @@ TIME_FUNCTIONS = {0, TIME_RESPONSE}
 
 @dataclass(frozen=True)
 class _Body:
-    """Where the numbers of a dataset lie, and how they are written."""
+    """Place and format of the numbers of a dataset."""
 
     offset: int
     end: int
@@ -166,7 +162,7 @@ class UffSource:
     path: Path
     bodies: Mapping[SourceChannel, _Body]
     parsed: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Numbers that stood in the file as text, by channel."""
+    """Numbers parsed from text, by channel."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
@@ -189,7 +185,7 @@ class UffSource:
 
 @contextmanager
 def open_uff(path: Path) -> Iterator[UffSource]:
-    """Find the time responses of a file; ValueError when a dataset 58 is damaged."""
+    """Open the time responses of a file; raises ValueError when a dataset 58 is damaged."""
     with path.open("rb") as file:
         bodies = dict(_bodies(file))
     yield UffSource(path, bodies)
@@ -212,7 +208,7 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
 
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
-    """Find the numbers and go past them; None when they are no samples over time."""
+    """Locate the numbers and skip them; None if they are no samples over time."""
     ordinate, count, spacing = (_whole(header[6][at : at + 10]) for at in (0, 10, 20))
     if count < 0:
         raise ValueError(f"a dataset of {count} numbers")
@@ -250,7 +246,7 @@ def _line(file: BinaryIO) -> str:
 
 
 def _skip_text(file: BinaryIO) -> None:
-    """Go past the delimiter that ends a dataset."""
+    """Skip to the end of a dataset."""
     while line := file.readline():
         if line.strip() == DELIMITER.strip().encode():
             return
@@ -287,7 +283,7 @@ def _real(text: str) -> float | None:
 
 
 def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
-    """All numbers of a text dataset: of fixed width without a blank between them, or free."""
+    """Return all numbers of a text dataset, of fixed width or separated by blanks."""
     with path.open("rb") as file:
         file.seek(body.offset)
         text = file.read(body.end - body.offset).upper().replace(b"D", b"E")
@@ -321,13 +317,13 @@ _PER_LINE = 4
 _LEAST_STEP = 1e-9
 """Relative error of a frequency up to which lines count as evenly spaced."""
 _LARGEST_OFFSET = 1e-3
-"""Largest offset of a written first line from its multiple of the spacing, in spacings."""
+"""Largest offset of the first line from a multiple of the spacing, in spacings."""
 _SPACINGS_TRIED = 1000
-"""On either side of the nearest one of six digits; about every second one serves."""
+"""Candidates on each side of the nearest spacing of six digits; about every second one works."""
 
 
 class FunctionType(IntEnum):
-    """What a dataset holds; numbers of its record 6."""
+    """Type of a function, as in record 6."""
 
     FREQUENCY_RESPONSE = 4
     COHERENCE = 6
@@ -336,12 +332,12 @@ class FunctionType(IntEnum):
 
 @dataclass(frozen=True)
 class FunctionAxis:
-    """What stands on one side of a function: a channel's motion, or nothing."""
+    """Axis of a function: a channel's motion, or nothing."""
 
     role: str = ""
     """Role of the channel."""
     label: str = "NONE"
-    """Twenty characters of it stand on the axis."""
+    """Label of the axis; 20 characters are written."""
     quantity: str = ""
     """``"velocity"``; decides data type and exponents."""
     unit: str = "NONE"
@@ -359,7 +355,7 @@ class UniversalFunction:
     response: FunctionAxis
     reference: FunctionAxis
     note: str
-    """How it was estimated, for ID line 4."""
+    """Description of the estimate, for ID line 4."""
 
 
 def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction], path: Path) -> None:
@@ -401,7 +397,7 @@ def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iter
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return the function, its first line, and its spacing as six digits hold it (0: uneven)."""
+    """Return the function, its first line, and its spacing in six digits (0: uneven)."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
@@ -428,9 +424,9 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 
 
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
-    """Return a first line and a spacing of six digits that divides it; 0 and 0 where none was found.
+    """Return a first line and a spacing of six digits that divides it; 0 and 0 if none was found.
 
-    pyEMA and sdypy-EMA count the lines below the first as here: a rounding error adds one.
+    pyEMA and sdypy-EMA count the lines below the first; a rounding error would add one.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))
@@ -448,7 +444,7 @@ def _last_digit(value: float) -> float:
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
-    """Lay the values out in lines of record 12, with their frequencies where these are not evenly spaced."""
+    """Return the lines of record 12, with frequencies if these are uneven."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     columns = [[f"{value:20.11E}" for value in part] for part in parts]
     if frequency_hz is not None:

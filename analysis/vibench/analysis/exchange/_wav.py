@@ -1,6 +1,6 @@
-"""Samples as sound: 32-bit WAV in which each channel's full scale is 1, for ears and sound programs.
+"""Write 32-bit WAV, with full scale of each channel as 1.
 
-WAV as a source: integers are fractions of full scale, -1 to 1, as every sound program takes them.
+Read WAV; integers are fractions of full scale, -1 to 1.
 """
 
 import os
@@ -24,12 +24,12 @@ from ._source_channel import SourceChannel
 
 BYTES = 4
 LARGEST_BYTES = 2**32 - 1024
-"""A WAV file counts its bytes with 32 bits, heading included."""
+"""Largest WAV file; sizes have 32 bits."""
 FULL_COUNT = 2**31
 
 
 def require_sound(excerpt: Excerpt) -> None:
-    """InvalidRequest when the rate is no whole number, or the samples are too many for a WAV file."""
+    """Raise InvalidRequest for a fractional sample rate, or too many samples for a WAV file."""
     rate = excerpt.recording.sample_rate_hz
     if rate != round(rate):
         raise InvalidRequest(
@@ -45,9 +45,9 @@ def require_sound(excerpt: Excerpt) -> None:
 
 
 def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write all channels, a block at a time; lost samples are silent, and past full scale is full scale.
+    """Write all channels in blocks; lost samples are zero, and larger values are clipped to full scale.
 
-    Counts of a converter of up to 32 bits stay exact: only zeros are put behind them.
+    Counts of a converter of up to 32 bits stay exact.
     """
     full_scales = np.array([[abs(each.physical_per_volt) * each.range_v] for each in excerpt.channels])
     with path.open("xb") as raw, wave.open(raw, "wb") as file:
@@ -63,10 +63,10 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 
 
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
-"""How sizes are written; those of RF64 files, over 4 GiB, stand elsewhere."""
+"""Byte orders of sizes; RF64 files over 4 GiB store them elsewhere."""
 FIRST_CHUNK = 12
 UNKNOWN_SIZE = 2**32 - 1
-"""Size field of samples that were written to a program that takes them as they come."""
+"""Size field of streamed samples."""
 OFFSETS = {"u": 128.0}
 """Eight bits are stored without sign."""
 
@@ -76,7 +76,7 @@ class WavSource:
     """Channels named ``"1"``, ``"2"``, ..."""
 
     data: NDArray[Any]
-    """Shape (samples, channels); on disk until it is read, except for 24 bits."""
+    """Shape (samples, channels); memory-mapped except for 24 bits."""
     channels: tuple[SourceChannel, ...]
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
@@ -87,7 +87,7 @@ class WavSource:
 
 @contextmanager
 def open_wav(path: Path) -> Iterator[WavSource]:
-    """Open a file; ValueError when it is no WAV, or compressed, or cut off."""
+    """Open a file; raises ValueError when it is not WAV, compressed or truncated."""
     _require_whole(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
@@ -108,7 +108,7 @@ def open_wav(path: Path) -> Iterator[WavSource]:
 
 
 def _require_whole(path: Path) -> None:
-    """Raise ValueError when a file ends before its samples do, or has several chunks of them."""
+    """Raise ValueError for a truncated file or several chunks of samples."""
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
         file.seek(FIRST_CHUNK)
@@ -132,12 +132,12 @@ def _require_whole(path: Path) -> None:
 
 def _read(path: Path) -> tuple[int, NDArray[Any]]:
     with warnings.catch_warnings():
-        # Chunks that are not sound: cue points, broadcast data.
+        # Skip other chunks: cue points, broadcast data.
         warnings.simplefilter("ignore", wavfile.WavFileWarning)
         try:
             return wavfile.read(path, mmap=True)
         except ValueError:
-            # 24 bits cannot be mapped: read whole, as the upper bytes of 32.
+            # 24 bits cannot be mapped; they are read as the upper bytes of 32.
             return wavfile.read(path)
 
 

@@ -1,4 +1,4 @@
-"""A recording, or a part of it, as a labelled Dataset for notebooks."""
+"""A recording or a part of it as a labelled Dataset."""
 
 import json
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
 
 BETWEEN = -1
-"""Number of the segment of a sample that lies in none."""
+"""Segment number of samples outside all segments."""
 
 
 def xarray_dataset(
@@ -29,18 +29,18 @@ def xarray_dataset(
 ) -> "xarray.Dataset":
     """Return channels in their physical units over ``time`` [s since the first sample], in memory.
 
-    Lost samples are NaN. ``segment`` is the number of the segment that a sample lies in, -1 between them;
-    the attribute ``segments_json`` says what each of them is. A finished file larger than memory is better
-    opened where it lies: ``xarray.open_dataset(path, engine="h5netcdf")``.
+    Lost samples are NaN. ``segment`` is the segment number of each sample, -1 between segments; the
+    attribute ``segments_json`` describes them. Open a finished file larger than memory directly:
+    ``xarray.open_dataset(path, engine="h5netcdf")``.
 
     Parameters
     ----------
     recording
-        Open; it may be closed afterwards.
+        An open recording; it may be closed afterwards.
     roles
-        Channels; all when none is named.
+        Channels; by default all.
     from_s, to_s
-        Stretch of time [s]; the whole recording if absent.
+        Stretch of time [s]; by default the whole recording.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _attributes(channel: ChannelHeader) -> dict[str, str | float]:
 
 
 def _numbers_of_segments(recording: Recording, start: int, stop: int) -> NDArray[np.int16]:
-    """Say for each sample which of the recording's segments it lies in."""
+    """Return the segment number of each sample."""
     numbers = np.full(stop - start, BETWEEN, dtype=np.int16)
     for number, each in enumerate(recording.segments):
         numbers[max(each.start - start, 0) : max(each.stop - start, 0)] = number

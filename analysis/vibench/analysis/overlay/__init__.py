@@ -1,7 +1,6 @@
-"""The model beside the measurement: predicted responses to sines, and the same test simulated.
+"""Compare measurements with the model: predicted responses to sines, and simulations of the same test.
 
-The specimen is simulated under the base motion that was recorded and goes through the estimators of the
-measurement; the difference is in dB, and in standard errors of both. A plan's responses and collisions
-are predicted before it is played. Similarity of two curves: eqs. 6 and 7 of Gong et al. 2025, whose
-logarithm is a named option. Nothing is fitted here.
+The specimen is simulated under the recorded voltage or base motion and analysed with the same estimators.
+Differences are in dB and in standard errors. Responses and collisions of a plan are predicted. Similarity
+of two curves: eqs. 6 and 7 of Gong et al. 2025, whose logarithm is a named option.
 """

@@ -1,4 +1,4 @@
-"""Draws of a recording: rig and specimen under its voltage, from slightly different starts."""
+"""Simulated draws of a recording: rig and specimen under its voltage, from slightly different starts."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -33,30 +33,28 @@ from .simulated_channels import (
 )
 
 _FRAME_SAMPLES = 1 << 15
-"""Within which a drive's lines stand apart from noise: half a second to a second."""
+"""Frame length in samples, 0.5 to 1 s, to separate the drive's lines from noise."""
 _BATCH_FRAMES = 16
-"""Changed together: some ten megabytes."""
+"""Frames per batch, about 10 MB."""
 _LEVEL_LINES = 256
-"""Over which the level of noise is taken: of their median, which a few lines of the drive hardly move."""
+"""Lines for the noise level, whose median is robust against lines of the drive."""
 _SURELY = 20.0
-"""Power of a line over that of noise, which exceeds it once in 5e8 lines."""
+"""Power of a line over the noise level that noise exceeds once in 5e8 lines."""
 
 
 class PlayedVoltage:
-    """A recorded voltage without its converter's noise, as far as that can be told.
+    """A recorded voltage without converter noise, as far as possible.
 
-    The converter's noise did not shake the table: simulated under the voltage as recorded, with as much added
-    for what is not known of it, a weak motion is lifted twice too much by noise. Frame by frame and line by
-    line the part that is likely stays (Wiener's filter; all of what certainly is no noise), and what that
-    leaves open is drawn. So draws scatter by the uncertainty of the voltage, and their power is that of the
-    recording without the converter's noise.
+    Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each frame
+    and line a Wiener filter keeps the likely part, and the uncertain rest is drawn. Draws therefore scatter
+    by the uncertainty of the voltage, and their power excludes the converter noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._samples, self._own_v = volts.size, converter_rms_v
         self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
         self._frames = 1 - (-volts.size // self._hop)
-        """They overlap by half; the first begins and the last ends half a frame outside."""
+        """Number of frames, which overlap by half; the first and the last extend half a frame outside."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
         self._likely: Samples = volts
         self._roots: list[Samples] = []
@@ -64,10 +62,10 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Give the likely voltage, and roots of the recorded shares, by line in batches of frames."""
+        """Return the likely voltage and the roots of the recorded shares by line, in batches."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
-        # Window of synthesis, with which frames that overlap by half add up to what was taken apart.
+        # Synthesis window, with which half-overlapping frames add up to the signal.
         back = (halves / np.sum(halves**2, axis=0)).ravel()
         recorded = np.zeros((self._frames + 1, self._hop), np.float32)
         recorded.ravel()[self._hop : self._hop + volts.size] = volts
@@ -95,10 +93,10 @@ class PlayedVoltage:
         return self._joined(likely), roots
 
     def drawn(self, rng: np.random.Generator) -> Samples:
-        """Return a voltage that may have been played, shape (samples,) [V]."""
+        """Return a random voltage compatible with the recording, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
-        # What is not known of a frame is noise of its own: fading into the next one keeps its power.
+        # The unknown part is independent between frames, so fading keeps its power.
         fade = np.sqrt(self._window, dtype=np.float32)
         size = np.float32(self._own_v * np.sqrt(self._hop))
         roots = iter(self._roots)
@@ -114,7 +112,7 @@ class PlayedVoltage:
         return drawn
 
     def _joined(self, frames: Callable[[int, int], Samples]) -> Samples:
-        """Add frames that overlap by half; ``frames`` gives those of a batch."""
+        """Add half-overlapping frames; ``frames`` returns those of a batch."""
         hop = self._hop
         result = np.zeros((self._frames + 1, hop), np.float32)
         for first in range(0, self._frames, _BATCH_FRAMES):
@@ -127,11 +125,11 @@ class PlayedVoltage:
 
 _BLOCK_S = 0.05
 _BLOCKS = 200
-"""Looked at, evenly over the recording; the whole first and last second besides."""
+"""Blocks spread over the recording, in addition to the first and last second."""
 _BAND = (0.2, 0.4)
-"""Part of the sample rate that shows a channel's own noise: no mode reaches there, and only impacts do."""
+"""Band relative to the sample rate that shows channel noise, without modes."""
 _ALIKE = 6.0
-"""Standard deviations of a block's power, of this many lines, between blocks of one level."""
+"""Standard deviations of a block's power within which blocks have the same level."""
 
 
 @dataclass(frozen=True)
@@ -140,11 +138,11 @@ class ChannelNoise:
 
     rms: dict[str, float]
     converter_v: float
-    """The least of them at a converter's input: the converter's own [V]."""
+    """Smallest of them at a converter input, which is the converter's noise [V]."""
 
 
 def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
-    """Take the quietest stretch of each channel: recordings begin in silence, or nearly."""
+    """Return the noise in the quietest stretch of each channel, since recordings start in silence."""
     rate, samples = recording.sample_rate_hz, recording.samples
     length = max(16, round(_BLOCK_S * rate))
     ends = np.concatenate([np.arange(0, rate, length), samples - np.arange(length, rate + length, length)])
@@ -159,7 +157,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Return the level of the blocks that are as quiet as the quietest: alone it is some per cent too low."""
+    """Return the mean level of the quiet blocks; the quietest one alone is some per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)
@@ -169,7 +167,7 @@ def _quiet(rms: list[float], length: int) -> float:
 
 
 def _white(samples: Reals) -> float:
-    """Rms of white noise of the density that a block shows far above all motion; infinite across a hole."""
+    """Return the rms of white noise from the density far above all motion; infinite across a hole."""
     if np.isnan(samples).any():
         return np.inf
     power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
@@ -179,31 +177,31 @@ def _white(samples: Reals) -> float:
 
 
 DRAWS = 16
-"""Number of draws of a colliding motion: its band of 95 % is then known to a fifth of its width."""
+"""Number of draws of a colliding motion, which determine its 95 % band to a fifth of its width."""
 FIRST_DRAWS = 8
-"""They suffice where they agree clearly with the measurement, or never collide: then noise alone differs."""
+"""Fewer draws, sufficient for clear agreement or without collisions."""
 _FURTHER_DRAWS = 4
-"""Made before it is looked at again whether they are enough."""
+"""Draws between two checks whether they are enough."""
 START_M = 5e-9
-"""Standard deviation of each mass' place at the start."""
+"""Standard deviation of each mass's initial position."""
 CLOCK_TOLERANCE = 50e-6
-"""Of the converter's clock, relative: what NI 9234 and its kind promise. It shifts resonances."""
+"""Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Simulated before a stretch, raised from nothing within it, and lowered to nothing behind [s]."""
+"""Time before a stretch, with fades in and out [s]."""
 _NOISE = 0.15
-"""How far, as a logarithm, a channel's noise may be from what its quietest stretch shows."""
+"""Logarithmic uncertainty of a channel's noise from its quietest stretch."""
 _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17
-"""Samples that get their noise together."""
+"""Samples per block of added noise."""
 _MOST_BYTES = 0.35e9
-"""That the draws under way at a time may take."""
+"""Memory for the running draws."""
 _BYTES_PER_SAMPLE = 16
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
-    """What was simulated beside a recording, in numbers."""
+    """Facts of the simulation of a recording."""
 
     DOCUMENT: ClassVar = (
         "drive=driven why draws base_band_hz accuracy masses_kg=specimen.masses "
@@ -214,15 +212,15 @@ class SimulatedRun:
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
-    """Of the contacts under a recorded base motion; under a voltage they are resolved as standard."""
+    """Accuracy of contacts under a recorded base motion; standard under a voltage."""
     base_band_hz: tuple[float, float] | None
-    """Band of the base displacement that drove; None under a voltage."""
+    """Band of the driving base displacement; None under a voltage."""
     draws: int
     impacts: float
-    """Contacts that began inside the parts that were analysed, mean over the draws."""
+    """Number of contacts during the analysed parts, mean over the draws."""
     played_s: float
     why: str = ""
-    """Why the recorded voltage did not drive, where it could not; else what is to be known of the rig."""
+    """Reason why the recorded voltage was not used, or remarks on the rig."""
 
     @property
     def smaller_gap_m(self) -> float:
@@ -240,10 +238,10 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class Draw(Generic[R]):
-    """One draw, through the estimator of the recording."""
+    """One draw, analysed like the recording."""
 
     response: Callable[[], R]
-    """Finish the estimate, of which a comparison needs the quantities alone."""
+    """Complete the estimate; comparisons need only the quantities."""
     quantities: tuple[Quantity, ...]
     endings: tuple[Ending, ...]
     impacts: float
@@ -252,7 +250,7 @@ class Draw(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class Drawn(Generic[R]):
-    """All draws; of the first its whole estimate, of the others what is compared."""
+    """All draws: the estimate of the first, and the compared quantities of the others."""
 
     run: SimulatedRun
     response: R
@@ -262,7 +260,7 @@ class Drawn(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class DrawSource:
-    """Where draws come from: each number gives the same one every time."""
+    """Source of draws, reproducible by number."""
 
     specimen: Specimen
     driven: Driven
@@ -280,7 +278,7 @@ def voltage_source(
     fitted: FittedShaker | None = None,
     draws: int = DRAWS,
 ) -> DrawSource:
-    """Let the recorded voltage move rig and specimen together.
+    """Return draws of rig and specimen under the recorded voltage.
 
     Raises UnusableData when samples were lost, or nothing is known of the shaker.
 
@@ -289,9 +287,9 @@ def voltage_source(
     recording
         Whose bench configuration describes the rig.
     fitted
-        A shaker to take instead of the described one; each draw takes another of its uncertainty.
+        A shaker instead of the described one; each draw varies it within its uncertainty.
     draws
-        How many, at most.
+        Maximum number of draws.
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     volts = recorded_voltage(recording, rig)
@@ -312,7 +310,7 @@ def voltage_source(
 def base_source(
     recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
 ) -> DrawSource:
-    """Let the recorded base motion shake the specimen: one draw, for linear and coherent motion."""
+    """Return one draw of the specimen under the recorded base motion, for linear and coherent motion."""
     channels = under_base_motion(recording, measurement, specimen, accuracy)
     rate = recording.sample_rate_hz
     band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
@@ -322,11 +320,10 @@ def base_source(
 def drawn(
     source: DrawSource, estimate: Callable[[SimulatedChannels], Draw[R]], measured: Sequence[Quantity]
 ) -> Drawn[R]:
-    """Estimate from every draw what was estimated from the recording.
+    """Analyse every draw like the recording.
 
-    Of `DRAWS` or less, fewer are made where the first ones agree clearly. Where most of what was ``measured``
-    is of a kind of motion that few draws come to, up to three times as many are made. Raises UnusableData
-    when a simulation did not reach its end.
+    Fewer draws are made if the first ones agree clearly, and up to three times as many if few have the
+    ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
     """
     responses: list[R] = []
 
@@ -349,7 +346,7 @@ def drawn(
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
             if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
-                # A user who requests more than the default wants narrower bands, not only a verdict.
+                # A request for more than the default is for narrower bands, so all are made.
                 len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
             ):
                 break
@@ -394,7 +391,7 @@ def _drawn_channels(
 def _moved(
     rig: DrivenRig, volts: Samples, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
 ) -> SampledMotion:
-    """Move rig and specimen from a random start; the channels of base and m0 get their noise."""
+    """Simulate rig and specimen from a random start, with noise on the channels of base and m0."""
     try:
         motion = follow_voltage(
             rig.table,
@@ -414,10 +411,9 @@ def _moved(
 
 @dataclass(frozen=True, eq=False)
 class StretchDraws:
-    """Draws of a stretch of a recording, each of a specimen of its own: for statistics of irregular motion.
+    """Draws of a stretch of a recording with given specimens, for statistics of irregular motion.
 
-    A run begins at rest, half a second before the stretch, with the recorded voltage faded in: how a motion
-    began is not a part of it.
+    A run starts from rest half a second before the stretch, with the recorded voltage faded in.
     """
 
     recording: Recording
@@ -427,13 +423,13 @@ class StretchDraws:
     volts: Reals
     """Without the noise of its channel."""
     first: int
-    """Sample of the recording with which it begins."""
+    """First sample in the recording."""
     kept: slice
     """The stretch within ``volts``."""
 
     @property
     def measured(self) -> Reals:
-        """Base acceleration and m0's velocity of the recording, over the same samples as a draw's."""
+        """Return base acceleration and m0's velocity of the recording over the samples of a draw."""
         start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
         velocity = BridgedChannel(self.recording, VELOCITY).read(start, stop)
         return np.stack([self.recording.read(BASE, start, stop), velocity])
@@ -444,7 +440,7 @@ class StretchDraws:
         return np.array([self.noise.rms[role] for role in (BASE, VELOCITY)])
 
     def draw(self, specimen: Specimen, rng: np.random.Generator) -> Reals:
-        """Give base acceleration [m/s2] and m0's velocity [m/s] of a run, noise included; shape (2, samples).
+        """Return base acceleration [m/s2] and m0's velocity [m/s] of a run with noise, shape (2, samples).
 
         Raises UnusableData when the simulation did not reach its end.
         """
@@ -461,12 +457,12 @@ class StretchDraws:
 def stretch_draws(
     recording: Recording, specimen: Specimen, start: int, stop: int, fitted: FittedShaker | None = None
 ) -> StretchDraws:
-    """Let the recorded voltage of samples ``start`` to ``stop`` move rig and specimens together.
+    """Return draws of rig and specimens under the recorded voltage of samples ``start`` to ``stop``.
 
-    Where the recording ends there, the stretch ends a little earlier.
+    At the end of the recording the stretch ends slightly earlier.
 
-    Raises UnusableData when samples were lost there, nothing is known of the shaker, or m0 is not shown by a
-    velocity: an integrated channel has no white noise.
+    Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is no velocity,
+    because the noise of an integrated channel is not white.
     """
     if VELOCITY not in recording.roles:
         raise UnusableData(
@@ -482,7 +478,7 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, VELOCITY))
-    # Noise of this channel would shake the simulated table: only lines far above it are played.
+    # Noise of this channel would drive the simulation, so only lines far above it are played.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
     played = np.asarray(np.fft.irfft(spectrum, volts.size))

@@ -1,4 +1,4 @@
-"""The rig that a recording was made on, as numbers, and the voltage in the recording that drove it."""
+"""Parameters of a recording's rig, and the recorded voltage that drove it."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -23,7 +23,7 @@ AMPLIFIER = "amplifier_voltage"
 
 
 class Driven(StrEnum):
-    """What moves the simulated specimen."""
+    """Drive of the simulated specimen."""
 
     AMPLIFIER = "recorded amplifier voltage"
     GENERATOR = "recorded generator voltage"
@@ -31,35 +31,35 @@ class Driven(StrEnum):
 
     @property
     def by_voltage(self) -> bool:
-        """Whether the table is simulated too, and yields to the specimen's blows."""
+        """Whether the table is simulated too, with the reaction of the specimen."""
         return self is not Driven.BASE
 
 
 @dataclass(frozen=True)
 class DrivenRig:
-    """Everything that moved under a recorded voltage."""
+    """Rig and specimen under a recorded voltage."""
 
     table: DrivenTable
     driven: Driven
     role: str
-    """Role of the channel that holds the voltage."""
+    """Role of the voltage channel."""
     response: str
     """Role of the channel that shows m0."""
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
-    """Return what the recorded voltage was played into.
+    """Return the rig under the recorded voltage.
 
     Raises UnusableData when the recording does not name its shaker or amplifier, or does not show m0.
 
     Parameters
     ----------
     recording
-        With the amplifier's output where it was recorded, else with the generator's.
+        Recording with the amplifier's output, otherwise with the generator's.
     specimen
         On the table.
     shaker
-        Its numbers, as fitted; by default those of the bench configuration.
+        Fitted parameters; by default those of the bench configuration.
     """
     response = ResponseChannel(recording).role
     rig = _configured(recording)
@@ -88,7 +88,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
 
 
 def described_shaker(recording: Recording) -> Shaker | None:
-    """Return the shaker that the bench configuration in a recording describes; None where it does not."""
+    """Return the shaker of a recording's bench configuration; None if not described."""
     rig = _configured(recording)
     return None if rig is None else shaker_of(rig)
 
@@ -101,9 +101,9 @@ def _configured(recording: Recording) -> Rig | None:
 
 
 def recorded_voltage(recording: Recording, rig: DrivenRig, start: int = 0, stop: int | None = None) -> Reals:
-    """Read the voltage that drove the rig, over the whole recording unless told otherwise [V]; (samples,).
+    """Read the driving voltage [V], by default of the whole recording, shape (samples,).
 
-    Raises UnusableData when samples were lost: a motion cannot be followed across a hole.
+    Raises UnusableData when samples were lost.
     """
     volts = recording.read(rig.role, start, stop)
     lost = int(np.count_nonzero(np.isnan(volts)))

@@ -1,7 +1,7 @@
-"""A measurement within the draws of its twin: bands, ranks and z, corrected for how many are compared.
+"""Compare a measurement with the draws of its twin: bands, ranks and z, corrected for multiple comparisons.
 
-In chaos a measurement and its simulation are two draws of one distribution. What can be asked is whether
-the measured value could be one more draw.
+In chaos a measurement and its simulation are two draws of one distribution. The test is whether the
+measurement could be another draw.
 """
 
 from collections.abc import Sequence
@@ -16,16 +16,16 @@ from ..signals.arrays import Flags, Integers, Reals
 from ..tables import Labelled
 
 AGREEMENT = 0.99
-"""Share of agreeing twins that the limit lets pass, whatever the number of values compared."""
+"""Share of agreeing twins within the limit, for any number of compared values."""
 BAND = 0.95
 MIXED = -1
-"""State of a value that holds some of either motion: it is not compared."""
+"""State of a value with a mixture of motions, which is not compared."""
 FEWEST_DRAWS = 5
-"""Of one kind of motion, below which a value is not compared: two draws more than a mean and a scatter."""
+"""Fewest draws of one kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Part of the normal limit: values within it after half of the draws lie within the limit after all."""
+"""Share of the normal limit; values within it after half of the draws will stay within the limit."""
 _FEWEST_POINTS = 30
-"""Below them the largest of a draw is hardly of Gumbel's distribution."""
+"""Fewest values for which the largest of a draw follows Gumbel's distribution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +38,20 @@ class Quantity:
     value: Reals
     """NaN where there is none."""
     state: Integers | None = None
-    """What kind of motion it is of, where there are several (colliding or not): only equals are compared."""
+    """Kind of motion (colliding or not), if there are several; only equal kinds are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class EnsembleCurve(Labelled):
     """One quantity, measured and in every draw.
 
-    Square roots are compared: they are near to normal for magnitudes that are known well, as logarithms are,
-    and for those that are mostly chance (of Rayleigh's distribution they have a skewness of -0.1, logarithms
-    -1.1).
 
-    Values at several frequencies are corrected for their number (Sidak 1967), draws of which there are few
-    by Student's t, tails that are longer than normal ones by setting each draw into the others: a limit is
-    exceeded in one per cent of all agreeing twins.
+
+    Square roots are compared, because they are nearly normal both for accurate magnitudes and for random
+    ones (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
+
+    The limit accounts for the number of frequencies (Sidak 1967), few draws (Student's t), and long tails
+    (each draw among the others). 1 % of agreeing twins exceed it.
     """
 
     DOCUMENT: ClassVar = (
@@ -65,21 +65,21 @@ class EnsembleCurve(Labelled):
     measured: Reals
     """Shape (points,)."""
     draws: Reals
-    """Shape (draws, points); NaN where the draw's motion is of another kind than the measured."""
+    """Shape (draws, points); NaN if the draw has another kind of motion."""
 
     @cached_property
     def count(self) -> Integers:
-        """Draws at each point, shape (points,)."""
+        """Number of draws at each point, shape (points,)."""
         return np.asarray(np.sum(np.isfinite(self._roots), axis=0), dtype=np.int64)
 
     @cached_property
     def median(self) -> Reals:
-        """Median of the draws, shape (points,); NaN where there is none."""
+        """Median of the draws, shape (points,); NaN without draws."""
         return _over_draws(self.draws, np.nanmedian)
 
     @cached_property
     def lower(self) -> Reals:
-        """Lower end of the band that holds 95 % of further draws; NaN below five draws."""
+        """Lower end of the band that contains 95 % of further draws; NaN below five draws."""
         return np.asarray(np.maximum(self._mean - self._reach, 0.0) ** 2)
 
     @cached_property
@@ -89,17 +89,17 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def relative_sd(self) -> Reals:
-        """Scatter of the draws over their size, shape (points,); NaN below two."""
+        """Relative scatter of the draws, shape (points,); NaN below two."""
         return 2 * self._sd / self._mean
 
     @cached_property
     def rank(self) -> Integers:
-        """How many draws lie below the measured value, shape (points,)."""
+        """Number of draws below the measured value, shape (points,)."""
         return np.asarray(np.sum(self.draws < self.measured, axis=0), dtype=np.int64)
 
     @cached_property
     def z(self) -> Reals:
-        """Place of the measured value as that of a normal deviate, shape (points,); NaN where not compared.
+        """Measured value as an equivalent normal deviate, shape (points,); NaN if not compared.
 
         Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)), at equal probability.
         """
@@ -109,21 +109,20 @@ class EnsembleCurve(Labelled):
 
     @property
     def compared(self) -> int:
-        """Points at which there are draws enough."""
+        """Number of points with enough draws."""
         return int(np.sum(self._is_compared))
 
     @property
     def largest_z(self) -> float:
-        """The z furthest from zero; NaN where nothing is compared."""
+        """The z furthest from zero; NaN without comparisons."""
         z = self.z[np.isfinite(self.z)]
         return float(z[np.argmax(np.abs(z))]) if z.size else np.nan
 
     @cached_property
     def limit(self) -> float:
-        """Largest |z| that is still chance among the points compared.
+        """Largest |z| that is compatible with chance among the compared points.
 
-        That of normal values, or where the draws themselves lie further out among one another, that of one
-        more such draw: chaos has longer tails than square roots cure.
+        This is the limit of normal values, or that of another draw if the draws have longer tails.
         """
         normal = z_limit(self.compared)
         own = np.abs(self._z_of_draws[:, self._is_compared])
@@ -134,27 +133,27 @@ class EnsembleCurve(Labelled):
 
     @property
     def outside(self) -> int:
-        """Points beyond the limit."""
+        """Number of points beyond the limit."""
         return int(np.sum(np.abs(self.z[np.isfinite(self.z)]) > self.limit))
 
     @property
     def agrees(self) -> bool:
-        """Whether the measured values could be one more draw."""
+        """Whether the measured values could be another draw."""
         return self.outside == 0
 
     @property
     def agrees_clearly(self) -> bool:
-        """Whether more draws would hardly change that they agree (`benchmarks/twin_agreement.py --stop`)."""
+        """Whether more draws would hardly change the agreement (`benchmarks/twin_agreement.py --stop`)."""
         return abs(self.largest_z) <= _CLEAR * z_limit(self.compared)
 
     @property
     def verdict(self) -> bool | None:
-        """Whether they agree; None where nothing is compared."""
+        """Whether they agree; None without comparisons."""
         return self.agrees if self.compared else None
 
     @property
     def share_in_band(self) -> float:
-        """Part of the compared points within the band of 95 %."""
+        """Share of compared points within the 95 % band."""
         inside = (self.measured >= self.lower) & (self.measured <= self.upper)
         return float(np.mean(inside[self._is_compared])) if self.compared else np.nan
 
@@ -166,7 +165,7 @@ class EnsembleCurve(Labelled):
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
             agrees = "agrees with" if self.agrees else "is not"
-            # Where the band alone does not show the verdict, the limit does.
+            # If the band alone does not show the verdict, state the limit.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             return (
                 f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
@@ -185,12 +184,12 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def _z_of_draws(self) -> Reals:
-        """Z score of each draw among the others, shape (draws, points); NaN where these are too few."""
+        """Z score of each draw among the others, shape (draws, points); NaN for too few."""
         left = self.count - 1
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = left * self._sd**2
-            # What is left of the squares without the draw: below 1e-9 it is rounding.
+            # Squares without the draw; below 1e-9 they are rounding.
             others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
@@ -231,11 +230,11 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 
 
 def largest_of_chance(largest: Reals) -> float:
-    """Largest |z| of one more draw in 99 % of all cases, from the largest of each of five draws or more.
+    """Return the largest |z| of another draw in 99 % of cases, from the largest of five draws or more.
 
-    The quantile of Gumbel's distribution with their mean and deviation, widened because few draws determine
-    these poorly: without that, one draw more lies beyond in 2 % of all cases for 16 draws, 5 % for five. The
-    factor was fitted to simulated draws, to 1 %. It does not depend on location or scale.
+    The quantile of Gumbel's distribution with their mean and deviation is widened, because few draws
+    determine these poorly: otherwise 2 % of further draws exceed it with 16 draws, 5 % with five. The
+    factor was fitted to simulated draws.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -243,14 +242,14 @@ def largest_of_chance(largest: Reals) -> float:
 
 
 def z_limit(values: int) -> float:
-    """Largest |z| in 99 % of all cases among this many independent normal deviates."""
+    """Return the largest |z| in 99 % of cases among this many independent normal deviates."""
     return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 
 def ensemble_curves(
     measured: Sequence[Quantity], draws: Sequence[Sequence[Quantity]]
 ) -> tuple[EnsembleCurve, ...]:
-    """Set each measured quantity into the draws of the same name; what no draw has is left out."""
+    """Return each measured quantity with its draws; quantities without draws are left out."""
     found = []
     for each in measured:
         rows = [_alike(each, one) for draw in draws for one in draw if one.name == each.name]
@@ -260,7 +259,7 @@ def ensemble_curves(
 
 
 def _alike(measured: Quantity, drawn: Quantity) -> Reals:
-    """Return a draw's values where its motion is of the measured kind; equal places are the caller's."""
+    """Return a draw's values where its kind of motion is the measured one, at equal points."""
     if drawn.value.shape != measured.value.shape:
         return np.full(measured.value.shape, np.nan)
     if measured.state is None or drawn.state is None:
@@ -270,7 +269,7 @@ def _alike(measured: Quantity, drawn: Quantity) -> Reals:
 
 
 def _over_draws(values: Reals, reduce: object) -> Reals:
-    """Reduce over draws; NaN at points without any, silently."""
+    """Reduce over draws; NaN at points without draws, without a warning."""
     some = np.sum(np.isfinite(values), axis=0) > 1
     found = np.full(values.shape[1:], np.nan)
     if some.any():
@@ -290,10 +289,10 @@ class CurveDifference(Labelled):
     frequency_hz: Reals
     decibel: Reals
     standard_errors: Reals
-    """ln(measured / simulated) over the standard deviation of both; infinite where neither has any."""
+    """ln(measured / simulated) over the standard deviation of both; infinite if both are zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
-        """Keep some of the points."""
+        """Return some of the points."""
         return CurveDifference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
 
     @property
@@ -308,7 +307,7 @@ class CurveDifference(Labelled):
 
     @property
     def share_within_two(self) -> float:
-        """Part of the points within two standard errors; 0.95 when nothing but the stated scatter differs."""
+        """Share of points within two standard errors; 0.95 if only the stated scatter differs."""
         known = self.standard_errors[~np.isnan(self.standard_errors)]
         return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
 
@@ -323,18 +322,18 @@ def logarithmic_difference(
         return CurveDifference(frequency_hz, _PER_NEPER_DB * nepers, np.asarray(nepers / spread))
 
 
-# Motions that end by chance: told as a probability per second, not as an edge.
+# Motions that end by chance, described by a rate per second.
 #
 # Chaos that is a transient, and collisions that a sweep loses, end at another time in every run. Their ends
 # follow a rate of escape (Tel and Lai, Phys. Rep. 460 (2008), ch. 1), and one end is one draw of it.
 
 _ONE_EDGE_S = 2.0
-"""Runs that all stop within this share one edge, the end of the record perhaps, as near as it can be told."""
+"""Runs that all stop within this time share one edge, possibly the end of the record."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """One run of a motion, from when it could end to when it did, or until nobody looked any more."""
+    """One run of a motion, from when it could end to its end or the end of the record."""
 
     what: str
     """``"collisions"``, ``"irregular motion"``."""
@@ -346,7 +345,7 @@ class Ending:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """How often a motion ends, per second that it lasts."""
+    """Rate at which a motion ends."""
 
     DOCUMENT: ClassVar = (
         "what runs ends measured_ended=measured.ended measured_end_s=measured.stop_s counted_from_s=from_s "
@@ -355,19 +354,19 @@ class EscapeRate:
 
     what: str
     runs: int
-    """The measured one among them."""
+    """Number of runs including the measured one."""
     ends: int
     measured: Ending
     exposure_s: float
     """Time during which an end was counted, over all runs."""
     events: int
-    """Ends counted: where the beginning of the time counted is itself an end, that one is not."""
+    """Number of counted ends, without the one that starts the counted time."""
     from_s: float
-    """Since when ends are counted, as `Ending` counts time."""
+    """Start of the counted time."""
 
     @property
     def per_s(self) -> float:
-        """Ends over exposure: the likeliest rate."""
+        """Ends over exposure, the most likely rate."""
         return self.events / self.exposure_s
 
     @property
@@ -389,7 +388,7 @@ class EscapeRate:
 
 
 def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -> EscapeRate | None:
-    """Count ends over the measured run and its draws; None where none ended, or all stop at one edge."""
+    """Return the rate from the measured run and its draws; None if none ended or all stop at one edge."""
     if not measured:
         return None
     mine = measured[0]
@@ -397,7 +396,7 @@ def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -
     stops = np.array([each.stop_s for each in runs if each.ended])
     if len(runs) == 1 or not stops.size or np.ptp([each.stop_s for each in runs]) < _ONE_EDGE_S:
         return None
-    # Before the first end nothing shows that the motion could have ended there at all.
+    # Before the first end, the motion may not have been able to end.
     from_s = float(stops.min())
     exposure_s = sum(max(each.stop_s - from_s, 0.0) for each in runs)
     if exposure_s <= 0.0:

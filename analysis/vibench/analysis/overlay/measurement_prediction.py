@@ -1,4 +1,4 @@
-"""What the specimen is predicted to do under a plan: responses and where it collides."""
+"""Prediction of a plan: responses and collision bands of the specimen."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,47 +14,47 @@ from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
 
 MOST_POINTS = 60
-"""Frequencies that are simulated: some seconds of work."""
+"""Number of simulated frequencies, some seconds of work."""
 SIMULATED_S = 6.0
-"""Simulated from rest at each frequency; all but a thousandth of the transient has died out by half of it."""
+"""Duration from rest at each frequency; the transient decays to 0.1 % in half of it."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
-"""Where a sweep is followed: steps so small that they disturb little, and the time spent at each [s]."""
+"""Steps and time per step [s] to follow a sweep, small enough to disturb little."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPrediction(Labelled):
-    """Responses under sines of the base amplitude that the plan holds, or that the rig's model promises."""
+    """Responses under sines with the base amplitude of the plan or of the rig's model."""
 
     measurement: Measurement
     prediction: ResponsePrediction
     basis: str
-    """Where the base amplitude comes from."""
+    """Source of the base amplitude."""
     approach: Approach
-    """Where each simulated point begins."""
+    """Start of each simulated point."""
     specimen_name: str
     """Name of the specimen in the rig's configuration."""
 
     @property
     def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:
-        """Stretches of frequency in which the masses are predicted to strike."""
+        """Return the frequency bands with predicted collisions."""
         return bands_of(self.prediction.frequency_hz, self.prediction.is_colliding)
 
     @property
     def base_text(self) -> str:
-        """The base amplitude, or the range that it has over the frequencies."""
+        """Return the base amplitude or its range as text."""
         bounds = (np.min(self.prediction.amplitude_m), np.max(self.prediction.amplitude_m))
         return " to ".join(dict.fromkeys(f"{1e6 * each:.3g} µm" for each in bounds))
 
     @property
     def model(self) -> str:
-        """The model that said so, for a legend."""
+        """Return the name of the model for a legend."""
         gaps = " and ".join(f"{1e6 * each:g}" for each in dict.fromkeys(self.prediction.specimen.gaps_m))
         return f"{self.specimen_name}, gap {gaps} µm"
 
 
 def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrediction:
-    """Simulate the specimen of a rig over the band that a measurement excites."""
+    """Simulate the specimen of a rig over the excited band of a measurement."""
     specimen = rig.specimen.specimen()
     low_hz, high_hz = measurement.excitation.band_hz
     approach = measurement.excitation.approach
@@ -69,7 +69,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
 
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
-    """Stretches of rising frequencies whose points are inside; an edge lies half way to the next point."""
+    """Return bands of points that are inside; an edge lies half way to the next point."""
     middles = np.array([0.5 * (low + high) for low, high in pairwise(frequency_hz)])
     lows = np.concatenate([frequency_hz[:1], middles])
     highs = np.concatenate([middles, frequency_hz[-1:]])

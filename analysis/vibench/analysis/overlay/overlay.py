@@ -1,4 +1,4 @@
-"""The simulation overlaid on a measurement: draws of the same recording, same estimator, and agreement."""
+"""Overlay of a simulation on a measurement: draws with the same estimator, and agreement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,37 +44,37 @@ from .prediction import ResponsePrediction, paper_amplitude_m, predict
 PREDICTION_STEP_HZ = 2.0
 _FINE_STEP_HZ = 0.25
 _HIGHEST_PREDICTED_HZ = 700.0
-"""Above the highest mode (500 Hz) the curves fall smoothly; predicting there shows nothing."""
+"""Highest predicted frequency; above the highest mode (500 Hz) curves fall smoothly."""
 
 R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
 class AbstractOverlay(Labelled, Generic[R]):
-    """A measurement, and what the model says of it."""
+    """A measurement with its simulation."""
 
     DOCUMENT: ClassVar = "*run difference ensemble escape"
 
     run: SimulatedRun
     response: R
-    """Response of the first draw: under a voltage, one run as good as any other."""
+    """Response of the first draw, one of several equivalent runs."""
     ensemble: tuple[EnsembleCurve, ...]
-    """Every compared quantity, measured and in all draws; bands only where there are draws enough."""
+    """Every compared quantity, measured and in all draws, with bands if there are enough draws."""
     escape: EscapeRate | None
-    """How often the motion ends, where that is chance."""
+    """Rate at which the motion ends, if that is random."""
     difference: CurveDifference
     """Measured over simulated transmission, or Response II: over the median of all draws."""
     prediction: ResponsePrediction
-    """Under sines of the measured A0."""
+    """Prediction under sines of the measured A0."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """What has draws and is not compared."""
+        """Quantities with draws that are not compared."""
         return ()
 
     @property
     def agreement(self) -> tuple[str, ...]:
-        """Which quantities disagree with the twin, where any does, then each of them in numbers."""
+        """Return sentences on quantities that disagree with the twin, then on each quantity."""
         outside = [each.name for each in self.ensemble if not each.agrees]
         compared = sum(each.compared > 0 for each in self.ensemble)
         headline = [f"{len(outside)} of {compared} quantities disagree with the twin: {', '.join(outside)}"]
@@ -82,23 +82,23 @@ class AbstractOverlay(Labelled, Generic[R]):
         return (*(headline if outside else []), *(each.sentence for each in ordered))
 
     def quantity(self, name: str) -> EnsembleCurve | None:
-        """Return one quantity that has draws; None where it has none."""
+        """Return one quantity with draws; None without draws."""
         return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
 
 
 @dataclass(frozen=True, eq=False)
 class NoiseOverlay(AbstractOverlay[NoiseResponse]):
-    """A transmission, and what the model says of it."""
+    """A transmission with its simulation."""
 
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} resonances=response.resonances"
 
     amplitude_basis: str
-    """Where the sines' A0 comes from."""
+    """Source of the sines' A0."""
 
 
 @dataclass(frozen=True, eq=False)
 class SweepOverlay(AbstractOverlay[SweptMotion]):
-    """A sweep, and what the model says of it."""
+    """A sweep with its simulation."""
 
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} collision_regions=collisions.regions"
 
@@ -108,7 +108,7 @@ class SweepOverlay(AbstractOverlay[SweptMotion]):
 
 @dataclass(frozen=True, eq=False)
 class DwellOverlay(AbstractOverlay[DwellResponse]):
-    """A dwell, and what the model says of it."""
+    """A dwell with its simulation."""
 
     OWN_UNITS: ClassVar = {"displacement": "m"}
     DOCUMENT: ClassVar = (
@@ -120,7 +120,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     terminal: tuple[TerminalLevel, ...]
     """Both of the first draw."""
     spectrum: EnsembleCurve
-    """Spectrum of the displacement over A0; not compared: its floor is noise that the model does not know."""
+    """Spectrum of the displacement over A0; not compared, because the model has no noise floor."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
@@ -130,7 +130,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
 @dataclass(frozen=True, eq=False)
 class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
-    """A stepped sine, and what the model says of it."""
+    """A stepped sine with its simulation."""
 
     DOCUMENT: ClassVar = (
         f"{AbstractOverlay.DOCUMENT} response_i=response.response_i response_ii=response.response_ii"
@@ -144,7 +144,7 @@ TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", 
 def _difference(
     drawn: Drawn[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
 ) -> CurveDifference:
-    """Compare with the median of the draws, or with the one there is, and its own standard deviation."""
+    """Compare with the median of the draws, or with a single draw and its standard deviation."""
     (found,) = ensemble_curves([measured], drawn.quantities)
     if drawn.run.draws > 1:
         simulated = found.median, found.relative_sd
@@ -152,12 +152,12 @@ def _difference(
 
 
 def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
-    """Return what a draw of noise is compared by."""
+    """Return the quantities to compare a draw of noise."""
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
 
 def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> NoiseOverlay:
-    """Compare a transmission with those of the draws."""
+    """Compare a transmission with the draws."""
     noise = analysis.excitation
     measured, simulated = analysis.response.frequency_response, drawn.response.frequency_response
     amplitude_m, basis = equivalent_amplitude(analysis)
@@ -181,7 +181,7 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> Noise
 
 
 def prediction_grid(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Frequencies to predict at: every 2 Hz, and closer around the resonances, which are narrower."""
+    """Return the frequencies of a prediction: every 2 Hz, and closer around narrow resonances."""
     coarse = np.arange(low_hz, high_hz + PREDICTION_STEP_HZ / 2, PREDICTION_STEP_HZ)
     near = np.arange(-PREDICTION_STEP_HZ, PREDICTION_STEP_HZ + _FINE_STEP_HZ / 2, _FINE_STEP_HZ)
     middles = (*specimen.natural_frequencies_hz, *specimen.bound_frequencies_hz)
@@ -190,7 +190,7 @@ def prediction_grid(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
-    """Sine amplitude A0 to set beside a noise level, and where it comes from."""
+    """Return the sine amplitude A0 equivalent to a noise level, and its source."""
     setting_vpp = analysis.facts.measurement.excitation.amplitude_vpp
     paper = paper_amplitude_m(setting_vpp)
     if paper is not None:
@@ -213,13 +213,13 @@ def _sine_difference(
 
 
 _EDGE_S = 1.0
-"""How near the edge of a stretch of collisions a sweep's intervals are not compared."""
+"""Margin around edges of collision regions in which a sweep is not compared."""
 
 
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
-    """Return what a draw of a sweep is compared by: where one collides and another does not, nothing.
+    """Return the quantities to compare a draw of a sweep, where both collide or neither does.
 
-    Nor within a second of an edge, where an interval holds some of either motion.
+    Intervals within a second of an edge are left out, because they contain both motions.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))
@@ -232,7 +232,7 @@ def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity
 
 
 def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
-    """Return when the longest stretch of collisions ended, in seconds of the sweep."""
+    """Return the end of the longest collision region, in seconds of the sweep."""
     if not found.regions:
         return ()
     longest = max(found.regions, key=lambda each: each.stop.time_s - each.start.time_s)
@@ -240,7 +240,7 @@ def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
 
 
 def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOverlay:
-    """Compare a sweep with those of the draws."""
+    """Compare a sweep with the draws."""
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
     low, high = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
@@ -260,13 +260,13 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOv
 
 
 _LEAST_BAND = 1e-3
-"""Rms of a band re the drive's line below which it holds noise of generator and amplifier alone."""
+"""Level of a band relative to the drive's line below which it is noise of generator and amplifier."""
 
 
 def dwell_quantities(
     response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
 ) -> tuple[Quantity, ...]:
-    """Return what a draw of a dwell is compared by: both responses, and the bands that hold motion."""
+    """Return the quantities to compare a draw of a dwell: both responses, and bands with motion."""
     at = np.array([response.drive.frequency_hz])
     state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
     columns_hz, size = spectrum_columns(response)
@@ -290,7 +290,7 @@ def dwell_quantities(
 def dwell_overlay(
     analysis: DwellAnalysis, drawn: Drawn[DwellResponse], endings: Sequence[Ending]
 ) -> DwellOverlay:
-    """Compare a dwell with those of the draws; ``endings`` are the measured ones."""
+    """Compare a dwell with the draws; ``endings`` are the measured ones."""
     towards_hz = bound_frequencies_hz(analysis.facts)
     measured = analysis.response
     compared = dwell_quantities(measured, towards_hz, endings)
@@ -314,7 +314,7 @@ def dwell_overlay(
 
 
 def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
-    """Return what a draw of a stepped sine is compared by."""
+    """Return the quantities to compare a draw of a stepped sine."""
     return (
         Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
         Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),
@@ -336,11 +336,10 @@ def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]
 
 
 class Simulation(StrEnum):
-    """Whether measurements are compared with the model, and what moves it."""
+    """Comparison of measurements with the model, and the drive of the model."""
 
     UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
-    """Rig and specimen together under the recorded voltage; the specimen under the recorded base motion where
-    nothing is known of the shaker."""
+    """Rig and specimen under the recorded voltage, or base motion for an unknown shaker."""
     UNDER_BASE = "the specimen under the recorded base motion"
     """The specimen alone under the recorded base motion: for linear and coherent motion."""
     LEFT_OUT = "nothing"

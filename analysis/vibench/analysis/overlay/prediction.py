@@ -1,4 +1,4 @@
-"""What the model says a sine does: Responses I and II and the linear transmission, over frequency."""
+"""Predicted Responses I and II and linear transmission under sines, over frequency."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -26,11 +26,10 @@ PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
 """Without contact; same place."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
-"""Resonances with m1 stuck to m2; from the same section of the paper."""
+"""Resonances with m1 bound to m2; from the same section of the paper."""
 PREDICTION_S = 8.0
 WINDOW_S = 5.0
-"""The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that
-the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
+"""Settling time 3 s, which reduces the slowest transient to 3e-5, and 5 s of observation as in the paper."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +41,19 @@ class ResponsePrediction(Labelled):
     amplitude_m: Reals
     """Drive amplitude A0 at each point."""
     response_i: Reals
-    """NaN where the simulation did not reach its end."""
+    """NaN if the simulation did not finish."""
     response_ii: Reals
     linear: Reals
     """|x / U| without contact."""
     impacts: Integers
-    """Within the window."""
+    """Number of impacts within the window."""
     accuracy: Accuracy
     duration_s: float
     window_s: float
 
     @property
     def is_colliding(self) -> Flags:
-        """Where the masses strike within the window."""
+        """Points with collisions within the window."""
         return np.asarray(self.impacts > 0)
 
 
@@ -67,7 +66,7 @@ def predict(
     duration_s: float = PREDICTION_S,
     approach: Approach = Approach.REST,
 ) -> ResponsePrediction:
-    """Simulate a sine at each frequency: from rest on all cores, or one after the other as a sweep comes by.
+    """Simulate a sine at each frequency, from rest on all cores or in sequence like a sweep.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def predict(
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
-    # Led, half of the time is for the step from the last frequency to die away in.
+    # In a sequence, half of the time is for settling after the step in frequency.
     window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
 
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
@@ -115,9 +114,9 @@ def _follow_points(
     drives: Sequence[Harmonic],
     duration_s: float,
 ) -> Iterator[Response]:
-    """Let each point begin in the state in which the last one ended, the drive's phase going on.
+    """Start each point in the final state of the last one, with continuous drive phase.
 
-    The first begins at rest, and has the time that takes.
+    The first starts from rest and has time to settle.
     """
     state, turns = None, 0.0
     for drive in drives:
@@ -129,7 +128,7 @@ def _follow_points(
 
 
 def paper_amplitude_m(amplitude_vpp: float) -> float | None:
-    """A0 that the paper puts beside a voltage; None for other voltages than its three."""
+    """Return the A0 of the paper for one of its three voltages; otherwise None."""
     for voltage, amplitude in PAPER_AMPLITUDES_M.items():
         if np.isclose(voltage, amplitude_vpp, rtol=1e-3):
             return amplitude

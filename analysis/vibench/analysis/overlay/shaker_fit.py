@@ -1,4 +1,4 @@
-"""The shaker's numbers from weak noise: what the recorded voltage did to the loaded table."""
+"""Fit the shaker to weak noise, from the recorded voltage to the motion of the loaded table."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -20,37 +20,37 @@ from ..tables import plus_minus
 from .driven_rig import AMPLIFIER
 
 LARGEST_CHI2 = 3.0
-"""Per degree of freedom, beyond which no shaker explains the base: it collides, or something else moves."""
+"""Largest reduced chi square; more means collisions or other moving parts."""
 FEWEST_LINES = 30
 _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
-"""Where the search begins: a small electrodynamic shaker, in the order of its numbers."""
+"""Start of the search: a small electrodynamic shaker."""
 _REACH = np.log(300.0)
-"""How far each number may lie from there, as a natural logarithm."""
+"""Largest deviation of each parameter from there, as a natural logarithm."""
 _STARTS = 12
 _NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
 
 
 @dataclass(frozen=True, eq=False)
 class FittedShaker:
-    """A shaker with the uncertainty of its numbers."""
+    """A shaker with the uncertainty of its parameters."""
 
     shaker: Shaker
     covariance: Reals
-    """Of the logarithms of its first six numbers, shape (6, 6), widened by chi^2 where that is above 1."""
+    """Covariance of the logarithms of its first six parameters, shape (6, 6), widened by chi^2 above 1."""
     chi2: float
-    """Per degree of freedom."""
+    """Reduced chi square."""
     lines: int
     source: str
     """Name of the recording."""
 
     @property
     def relative_sd(self) -> dict[str, float]:
-        """Standard deviation of every number over its value."""
+        """Relative standard deviation of every parameter."""
         return dict(zip(_NUMBERS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def sentence(self) -> str:
-        """The numbers with two standard deviations."""
+        """Return a sentence on the parameters with two standard deviations."""
         said = ", ".join(
             f"{name} = {plus_minus(value := getattr(self.shaker, name), 2 * sd * value)}"
             for name, sd in self.relative_sd.items()
@@ -61,7 +61,7 @@ class FittedShaker:
         )
 
     def drawn(self, rng: np.random.Generator) -> Shaker:
-        """Return a shaker of this uncertainty."""
+        """Return a random shaker within this uncertainty."""
         logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
         return _shaker(logarithms)
 
@@ -72,8 +72,8 @@ def fit_shaker(
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
 
     With D(s) = k + d s + (m + M(s)) s^2, M the specimen's mass as the base feels it, the base's acceleration
-    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3). The search begins at the
-    shaker that is ``described``, else at several usual ones. Raises UnusableData when there are too few
+    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3). The search starts from
+    the ``described`` shaker, else from several typical ones. Raises UnusableData when there are too few
     lines, or no shaker explains them.
     """
     found = _over_voltage(recording, analysis)
@@ -87,10 +87,10 @@ def fit_shaker(
     frequency_hz = found.frequency_hz[known]
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
     measured = found.value[known] / s
-    # Mass that the base feels: what all masses' momentum is to the base's velocity, without contact.
+    # Apparent mass: total momentum of the masses over the base velocity, without contact.
     moved = base_transmissibility(specimen, frequency_hz)[:, :3]
     carried = np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
-    # A line's scatter is the same for both parts of ln(measured / modelled).
+    # The scatter is the same for both parts of ln(measured / modelled).
     sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
 
     def misfit(logarithms: Reals) -> Reals:
@@ -110,7 +110,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starts: the products of coil and table are known better than each."""
+    """Search from several starts, because the products of coil and table are known better than each."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -140,7 +140,7 @@ def _acceleration_per_volt(logarithms: Reals, s: Complexes, carried_kg: Complexe
 
 @dataclass(frozen=True, eq=False)
 class _VoltageAndBase(RecordedChannels):
-    """The voltage in the base's place and the base in m0's, as the estimators of noise take them."""
+    """Channels with the voltage as base and the base as m0, for the estimators of noise."""
 
     role: str = field(kw_only=True)
 
@@ -159,7 +159,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return s times the base's acceleration over the voltage: the estimators take it for displacements."""
+    """Return s times the base acceleration over the voltage, which the estimators treat as displacements."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:

@@ -1,4 +1,4 @@
-"""How alike two response curves are: the paper's difference of logarithms, and its rate of similar points."""
+"""Similarity of two response curves: the paper's difference of logarithms and rate of similar points."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,12 +12,12 @@ from ..tables import Labelled
 SIMILARITY_THRESHOLD = 0.1
 """Largest difference of similar points (Gong et al. 2025, section 4)."""
 DRAWS = 2000
-"""Resamples of a bootstrap: its limits then scatter by about a fortieth of the interval's width."""
+"""Number of bootstrap resamples; limits scatter by about a fortieth of the interval's width."""
 CONFIDENCE = 0.95
 
 
 class LogarithmOf(StrEnum):
-    """What the logarithm of eq. 6 is taken of. The paper does not say, and the rates depend on it."""
+    """Argument of the logarithm in eq. 6, which the paper does not state and the rates depend on."""
 
     NORMALISED = "normalised"
     """Response over drive amplitude, x / A0."""
@@ -35,7 +35,7 @@ class SimilarityCurve:
 
     frequency_hz: Reals
     response: Reals
-    """Response I or II, over the drive amplitude. NaN where there is none."""
+    """Response I or II over the drive amplitude; NaN if missing."""
     amplitude_m: float
     """Drive amplitude A0."""
 
@@ -53,9 +53,9 @@ class SimilarityCurve:
             )
 
     def at(self, frequency_hz: Reals) -> "SimilarityCurve":
-        """Read the curve at other frequencies, straight between its points in both logarithms.
+        """Interpolate the curve on logarithmic axes.
 
-        Raises InvalidRequest for frequencies outside of the curve: nothing is extrapolated.
+        Raises InvalidRequest for frequencies outside the curve.
         """
         low, high = self.frequency_hz[0], self.frequency_hz[-1]
         if frequency_hz[0] < low or frequency_hz[-1] > high:
@@ -67,7 +67,7 @@ class SimilarityCurve:
         return SimilarityCurve(frequency_hz, np.exp(between), self.amplitude_m)
 
     def logarithm(self, of: LogarithmOf) -> Reals:
-        """Take log10 of the response in the unit named, shape (points,)."""
+        """Return log10 of the response in the named unit, shape (points,)."""
         match of:
             case LogarithmOf.NORMALISED:
                 value = self.response
@@ -79,26 +79,26 @@ class SimilarityCurve:
 
 @dataclass(frozen=True, eq=False)
 class Similarity(Labelled):
-    """How alike a model is to the reference; arrays of shape (points,)."""
+    """Similarity of a model to the reference; arrays of shape (points,)."""
 
     frequency_hz: Reals
     difference: Reals
-    """|log10(model) - log10(reference)| over |log10(reference)| (eq. 6); NaN where either is missing."""
+    """|log10(model) - log10(reference)| over |log10(reference)| (eq. 6); NaN if either is missing."""
     logarithm_of: LogarithmOf
     threshold: float
     rate: float
-    """Part of the points that are similar (eq. 7)."""
+    """Share of similar points (eq. 7)."""
     low: float
     high: float
-    """95 % interval of the rate, had other frequencies of the same band been chosen."""
+    """95 % interval of the rate for other choices of frequencies in the same band."""
     block_points: int
-    """Neighbouring points resemble each other; this many were drawn together for the interval."""
+    """Block length of the bootstrap, because neighbouring points are correlated."""
     left_out: int
-    """Points where either curve has no value."""
+    """Number of points without a value in either curve."""
 
     @property
     def is_similar(self) -> Flags:
-        """Where the difference is at most the threshold."""
+        """Points whose difference is at most the threshold."""
         return np.asarray(self.difference <= self.threshold)
 
 
@@ -115,15 +115,15 @@ def similarity(
     Parameters
     ----------
     reference, model
-        The piece-wise model (or a measurement) and what is to stand in for it, at the same frequencies;
-        `SimilarityCurve.at` brings one to the other's.
+        The piece-wise model (or a measurement) and its substitute, at the same frequencies;
+        `SimilarityCurve.at` interpolates.
     logarithm_of
-        The paper leaves it open. Where the reference is 1 in this unit its logarithm is zero and the
-        difference infinite: such points are dissimilar unless both are equal.
+        The paper leaves it open. If the reference is 1 in this unit, the difference is infinite and the
+        point dissimilar unless both are equal.
     threshold
         Largest difference of a similar point.
     seed
-        Of the bootstrap (circular blocks; Politis and Romano 1992).
+        Seed of the bootstrap (circular blocks; Politis and Romano 1992).
 
     Raises
     ------
@@ -162,12 +162,12 @@ def similarity(
 def _relative(base: Reals, other: Reals) -> Reals:
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(other - base) / np.abs(base)
-    # Equal curves are similar even where the logarithm they are measured by is zero.
+    # Equal curves are similar even if the logarithm of the reference is zero.
     return np.where(other == base, 0.0, ratio)
 
 
 def _block_length(flags: Reals) -> int:
-    """Twice the correlation length of the flags, at least the cube root of their number."""
+    """Return twice the correlation length of the flags, at least the cube root of their number."""
     count = flags.size
     usual = int(np.ceil(count ** (1 / 3)))
     centred = flags - flags.mean()

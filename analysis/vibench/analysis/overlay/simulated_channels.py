@@ -1,6 +1,6 @@
-"""The specimen simulated under the base motion that was recorded, in the shape of a recording.
+"""Simulate the specimen under the recorded base motion, with the interface of a recording.
 
-The base's displacement from its recorded acceleration: what the simulated specimen is shaken by.
+The base displacement comes from its recorded acceleration.
 """
 
 from collections.abc import Callable
@@ -18,11 +18,9 @@ from ..signals.arrays import Complexes, Flags, Integers, Reals, Samples
 from ..signals.quantity import Quantity, converted_signal
 
 LOWEST_PART = 0.25
-"""The displacement is kept down to this part of the lowest frequency played: below it there is no drive,
-and double integration would turn a microvolt of drift into micrometres."""
+"""High-pass relative to the lowest played frequency, against drift by double integration."""
 HIGHEST_PART = 0.33
-"""... and up to this part of the sample rate, above all motion that matters and within the converter's
-pass band, its cosine edge included."""
+"""... and low-pass relative to the sample rate, within the converter's pass band."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +34,14 @@ class RecordedBaseMotion:
     high_hz: float
     """The band that was kept."""
     delay_s: float
-    """Delay of the accelerometer channel that was taken out: sample k is the motion at k / sample_rate_hz."""
+    """Corrected delay of the accelerometer channel: sample k is the motion at k / sample_rate_hz."""
 
 
 def recorded_base_motion(recording: Recording, measurement: Measurement) -> RecordedBaseMotion:
-    """Integrate the recorded acceleration twice, in the frequency domain, over the whole recording.
+    """Integrate the recorded acceleration twice in the frequency domain.
 
-    Whole, because it begins and ends in silence: there the missing past and future disturb nothing. Raises
-    UnusableData when samples were lost: a displacement cannot be followed across a hole.
+    The whole recording is used, because it starts and ends in silence. Raises UnusableData when samples
+    were lost.
     """
     acceleration = recording.read(BASE)
     lost = int(np.count_nonzero(np.isnan(acceleration)))
@@ -67,7 +65,7 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
 
 
 def lowest_frequency_hz(measurement: Measurement) -> float:
-    """Lowest frequency that a plan plays, its bench check not counted [Hz]."""
+    """Return the lowest played frequency of a plan without its bench check [Hz]."""
     plan = measurement.excitation.model_dump()
     named = [plan[key] for key in ("band_start_hz", "start_hz", "stop_hz", "frequency_hz") if key in plan]
     grid = plan.get("grid") or {}
@@ -76,7 +74,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Shift a signal forward in time by a fraction of a sample or more, by the phase of its spectrum."""
+    """Shift a signal forward in time by any number of samples, by the phase of its spectrum."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -85,26 +83,26 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 
 
 _PIECE_S = 5.0
-"""Simulated at a time: bounds the memory of a long recording."""
+"""Samples simulated at once, to bound memory."""
 _OVERLAP = 48
-"""Samples on either side of a piece: a spline forgets its ends by a factor of 0.27 per sample (1e-27)."""
+"""Extra samples on each side of a piece; the effect of a spline's ends decays by 0.27 per sample."""
 _VX = 3
 _STATE = 6
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedChannels:
-    """A draw of what was recorded, in the shape of the recording: the same estimator takes both."""
+    """A simulated draw with the interface of a recording, for the same estimator."""
 
     recorded: RecordedChannels
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
-    """Times since the first sample [s], and contacts started up to them."""
+    """Times since the first sample [s], and number of contacts until then."""
     response_delay_s: float
     """Lag of the response channel behind the base channel."""
     base_acceleration: Samples
-    """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
+    """Acceleration of the simulated table, or the recorded one if that drove, shape (samples,) [m/s2]."""
     sensors: Callable[[Reals], Complexes]
     """Gain of the response's sensor over that of the base's, without their delays."""
 
@@ -134,15 +132,15 @@ class SimulatedChannels:
         )
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Where the recording was overloaded: what is compared must rest on the same samples."""
+        """Return where the recording was overloaded, so that both use the same samples."""
         return self.recorded.overloaded(start, stop)
 
     def bridged(self, start: int, stop: int) -> Flags:
-        """Where the recording was bridged: what is compared must rest on the same samples."""
+        """Return where the recording was bridged, so that both use the same samples."""
         return self.recorded.bridged(start, stop)
 
     def played_impacts(self, label: str) -> tuple[float, float]:
-        """Count impacts inside the stretches of one label, and give the time those took [s]."""
+        """Return the number of impacts inside the stretches of one label, and their duration [s]."""
         rate = self.sample_rate_hz
         ends = np.array([(each.start / rate, each.stop / rate) for each in self.stretches(label)])
         if not ends.size:
@@ -157,22 +155,21 @@ def under_base_motion(
     specimen: Specimen,
     accuracy: Accuracy = Accuracy.STANDARD,
 ) -> SimulatedChannels:
-    """Shake a specimen, from rest, by the base motion of a whole recording, at its full sample rate.
+    """Simulate a specimen from rest under the base motion of a recording, at its full sample rate.
 
-    Nothing is decimated: an interval between samples costs a fraction of a microsecond. Raises UnusableData
-    when samples were lost, or the simulation did not reach the end.
+    Raises UnusableData when samples were lost, or the simulation did not finish.
     """
     base = recorded_base_motion(recording, measurement)
     velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
     counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
-    # The simulated response has no delay; the recorded base may have one.
+    # The simulated response has no delay, but the recorded base may have one.
     return SimulatedChannels(
         RecordedChannels(recording),
         velocity,
         counted,
         -base.delay_s,
         recording.read(BASE),
-        # What the base's sensor did is taken for the base's motion, and the response has no sensor.
+        # The base motion includes the effect of its sensor, and the response has no sensor.
         lambda frequency_hz: np.ones(frequency_hz.size, dtype=np.complex128),
     )
 
@@ -180,7 +177,7 @@ def under_base_motion(
 def shaken(
     specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
 ) -> tuple[Reals, Integers]:
-    """Return m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
+    """Return m0's velocity and the number of impacts at every sample of the base displacement."""
     count = displacement_m.size
     velocity = np.zeros(count)
     impacts = np.zeros(count, dtype=np.int64)
