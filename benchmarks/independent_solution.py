@@ -1,9 +1,9 @@
-"""A second opinion on any run, by a general method of high order on the plain equations. SI units.
+"""Independent solution of any run, by a general method of high order. SI units.
 
 scipy's DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, section
-II.10) takes the paper's equations step by step; where m1 touches or leaves a stop, the instant is found and
-the method begins again, so that no step runs over the kink that would cost its order. It shares no code with
-the engine, errs by some 1e-12 of (100 um, 0.1 m/s), and is slow: seconds for a second of motion.
+II.10) integrates the paper's equations. It restarts at every instant at which m1 touches or leaves a stop,
+so that no step crosses a kink. It shares no code with the engine, is accurate to some 1e-12 of (100 um, 0.1
+m/s), and takes seconds per second of motion.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from vibench.sim.accuracy_benchmark.equations import Law, Place, law_of, numbers
 from vibench.sim.specimen.state import Floats
 
 Rates = Callable[[float, Floats], Floats]
-"""(time, state) -> d state / dt, as general solvers ask for it."""
+"""(time, state) -> d state / dt, for general solvers."""
 Y, Z, VY, VZ = 1, 2, 4, 5
 
 
@@ -39,7 +39,7 @@ def place_of(state: Floats, law: Law) -> Place:
 
 
 def clearances_at(place: Place, state: Floats, law: Law) -> tuple[float, ...]:
-    """Return how far each end of a phase is: positive while it lasts; a flight may end at two."""
+    """Return the distance to each end of a phase, positive while it lasts."""
     below, above = _depths(state, law)
     match place:
         case Place.FLIGHT:
@@ -62,11 +62,11 @@ TOLERANCE = 1e-13
 STATE_UNITS = np.repeat([1e-4, 0.1], 3)
 """Errors of a state are in units of 100 um and 0.1 m/s, the size of gaps and of the speeds of impacts."""
 SMALLEST_PART = 1e-2
-"""A component counts as at least this part of its unit: one that passes zero needs no finer steps."""
+"""Least scale of a component relative to its unit, for zero crossings."""
 LONGEST_STEP_S = 2e-4
-"""A tenth of the shortest period of the free specimen: p turns once in a step at most."""
+"""Longest step, a tenth of the shortest period of the free specimen."""
 MOST_PHASES_PER_S = 100_000
-"""Flights and contacts: many times what the busiest motions need."""
+"""Most flights and contacts per second."""
 
 
 def state_error(state: ArrayLike, truth: ArrayLike) -> float:
@@ -81,9 +81,9 @@ def independent_state(
     initial_state: ArrayLike,
     tolerance: float = TOLERANCE,
 ) -> Floats:
-    """Follow a motion from time zero and give its state at the end, shape (6,).
+    """Integrate a motion from time zero and return its final state, shape (6,).
 
-    Raises ValueError for rigid stops, and ArithmeticError when the general method gives up.
+    Raises ValueError for rigid stops, and ArithmeticError when the solver fails.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def independent_state(
     initial_state
         x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
     tolerance
-        Relative error of a step. Ask with two to see the error of the answer itself.
+        Relative error of a step; compare two tolerances to estimate the error of the result.
     """
     law, numbers = law_of(specimen), numbers_of(specimen, drive)
     time_s, state = 0.0, np.array(initial_state, dtype=np.float64)
@@ -112,7 +112,7 @@ def independent_state(
 def _phase(
     rates: Rates, place: Place, law: Law, time_s: float, state: Floats, until_s: float, tolerance: float
 ) -> tuple[float, Floats, int | None]:
-    """March until a clearance is used up, and say which of them; None when the time was first."""
+    """Integrate until a clearance is used up; return which, or None at the end of the time."""
     solver = _solver(rates, time_s, state, until_s, tolerance)
     while solver.status == "running":
         before_s, before = solver.t, solver.y
@@ -143,7 +143,7 @@ def _solver(
 
 
 def _state_at(rates: Rates, before_s: float, before: Floats, end_s: float, tolerance: float) -> Floats:
-    """Take the last step again, just to its end: the method's interpolant is less exact than its steps."""
+    """Repeat the last step to its exact end, because the interpolant is less accurate."""
     if end_s <= before_s:
         return before
     solver = _solver(rates, before_s, before, end_s, tolerance, end_s - before_s)
@@ -169,7 +169,7 @@ def _first_end(
 
         for low, high in pairwise([before_s, *turn, solver.t]):
             if clearance(high) <= 0.0:
-                # Just after a contact begins or ends, rounding may leave no clearance to begin with.
+                # Just after the start or end of a contact, rounding may leave no clearance.
                 found.append((_root(clearance, low, high) if clearance(low) > 0.0 else low, which))
                 break
     return min(found, default=None)

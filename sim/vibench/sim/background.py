@@ -1,7 +1,7 @@
-"""Work in other processes: how far it is, its answer piece by piece, and its end.
+"""Jobs in other processes, with progress, results in pieces, and cancellation.
 
-A job is a function with its arguments, called in a spawned process that gives way to all others. The
-process ends with the one that asked, however that one ends.
+A job is a function call in a spawned process of low priority. The process ends with its parent, however
+that ends.
 """
 
 import math
@@ -24,22 +24,22 @@ from .operating_system.this import bound_memory, lower_priority
 
 NICE = 10
 MOST_BYTES = 6 << 30
-"""Memory of a process, where the system can bound it."""
+"""Most memory of a process, if the system can limit it."""
 MOST_WAITING = 200
-"""Messages of a process that wait for a poll before the process itself waits; a poll takes no more."""
+"""Most messages of a process that wait for a poll; then the process waits."""
 GRACE_S = 2.0
-"""A process that goes on with a dropped job is ended after this time [s]."""
+"""A process that continues a dropped job is ended after this time [s]."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far work has come."""
+    """Progress of a job."""
 
     done: int
     of: int
-    """0 where it is not known yet."""
+    """Total; 0 if unknown."""
     left_s: float | None = None
-    """Expected time until all is done [s]; None where it is not known."""
+    """Expected remaining time [s]; None if unknown."""
     note: str = ""
 
 
@@ -50,11 +50,11 @@ Cancelled = Callable[[], bool]
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Observe nothing."""
+    """Ignore the progress."""
 
 
 def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
-    """Report that a stage begins; return the function that reports how much is done, and of how much."""
+    """Report the start of a stage; return a function that reports its progress."""
     observer(Progress(0, 0, note=note))
     return lambda done, of: observer(Progress(done, of, note=note))
 
@@ -71,7 +71,7 @@ def _ignore(*_: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """Work for another process, and whom to call back from `Pool.poll`."""
+    """A job for another process, with callbacks from `Pool.poll`."""
 
     work: Callable[..., Any]
     on_part: Callable[[Any], None]
@@ -80,28 +80,28 @@ class Job:
     longest_s: float
     is_wanted: bool = True
     is_answered: bool = False
-    """Whether the answer or the error was handed over."""
+    """Whether result or error were delivered."""
     end_s: float = math.inf
-    """When its process is ended, if it still works on it."""
+    """Time at which its process is ended, if still working."""
     cancel: Callable[[], None] = _ignore
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more will come."""
+        """Return whether the job is over."""
         return self.is_answered or not self.is_wanted
 
     def drop(self) -> None:
-        """Ignore what comes from now on; end the work soon, or do not begin it."""
+        """Ignore further messages and cancel the job."""
         if not self.is_over:
             self.is_wanted, self.end_s = False, monotonic() + GRACE_S
             self.cancel()
 
 
 class Pool:
-    """Processes that do jobs; the thread that owns the pool calls `poll` regularly.
+    """Pool of worker processes; its thread calls `poll` regularly.
 
-    Functions, arguments and answers must be picklable. An error handed over is ChildProcessError when the
-    process ended, TimeoutError or MemoryError beyond a bound, else what the function raised.
+    Functions, arguments and results must be picklable. Errors are ChildProcessError when the process ended,
+    TimeoutError or MemoryError beyond a limit, else the function's own.
     """
 
     def __init__(self, workers: int, longest_s: float = math.inf) -> None:
@@ -113,11 +113,11 @@ class Pool:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job is waiting or under way."""
+        """Return whether a job is waiting or running."""
         return bool(self._waiting) or any(worker.job is not None for worker in self.workers)
 
     def prepare(self) -> None:
-        """Start the processes now, for that takes a moment."""
+        """Start the processes in advance."""
         while len(self.workers) < self._most:
             self.workers.append(Worker(self._arrived))
 
@@ -129,7 +129,9 @@ class Pool:
         *args: Asked.args,
         **kwargs: Asked.kwargs,
     ) -> Job:
-        """Call ``function`` elsewhere, for at most ``longest_s``; then ``on_answer`` or ``on_error`` here."""
+        """Call ``function`` in a worker, for at most ``longest_s``; then ``on_answer`` or ``on_error``
+        here.
+        """
         work = partial(_without_parts, partial(function, *args, **kwargs))
         return self.begin(Job(work, _ignore, on_answer, on_error, self._longest_s))
 
@@ -141,11 +143,11 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` elsewhere; ``on_part`` here with what it tells."""
+        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` here with its parts."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:
-        """Do a job as soon as a process is free; not at all when the pool was closed."""
+        """Start a job as soon as a process is free, unless the pool was closed."""
         self._waiting.append(job)
         if self._is_closed:
             job.drop()
@@ -153,7 +155,7 @@ class Pool:
         return job
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Call back with what has come, waiting at most ``wait_s`` for it; end what takes too long."""
+        """Deliver messages, waiting at most ``wait_s``; end jobs that take too long."""
         self._arrived.wait(wait_s)
         self._arrived.clear()
         for worker in tuple(self.workers):
@@ -164,7 +166,7 @@ class Pool:
         self._hand_out()
 
     def close(self) -> None:
-        """End the processes at once; jobs without an answer are dropped."""
+        """End the processes at once; unfinished jobs are dropped."""
         self._is_closed = True
         for job in (*self._waiting, *(worker.job for worker in self.workers)):
             if job is not None:
@@ -226,7 +228,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
 
 
 class Worker:
-    """One process, the job that it does, and the thread that receives its messages."""
+    """One process with its job and a thread that receives its messages."""
 
     def __init__(self, arrived: Event) -> None:
         context = get_context("spawn")
@@ -242,7 +244,7 @@ class Worker:
         self._thread.start()
 
     def begin(self, job: Job) -> None:
-        """Do this job, the only one."""
+        """Start this job; the worker must be idle."""
         self._send(job.work)
         self.job = job
         job.end_s = monotonic() + job.longest_s
@@ -260,7 +262,7 @@ class Worker:
         self._connection.close()
 
     def _send(self, order: Callable[..., Any] | None) -> None:
-        with suppress(OSError):  # it has ended, which the thread notices
+        with suppress(OSError):  # the process has ended, which the thread detects
             self._connection.send(order)
 
     def _receive(self) -> None:
@@ -270,14 +272,14 @@ class Worker:
                     self.messages.put(self._connection.recv())
                     self._arrived.set()
         finally:
-            said = "the process that worked on it has ended: somebody ended it, or memory was short"
+            said = "the process that worked on it has ended: it was killed, or memory was short"
             self.messages.put(("end", ChildProcessError(said)))
             self._arrived.set()
 
 
 def _serve(connection: Any) -> None:
-    """Do jobs until the other end of the pipe is closed. A thread does them, so that this one hears of it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C belongs to the process that asks
+    """Run jobs in a thread until the other end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     with suppress(OSError):
         lower_priority(NICE)
     bound_memory(MOST_BYTES)
@@ -291,7 +293,7 @@ def _serve(connection: Any) -> None:
             dropped = Event()
             done = executor.submit(_pack_answer, work, partial(_tell, connection), dropped.is_set)
             done.add_done_callback(partial(_send_answer, connection))
-    os._exit(0)  # what is under way would reach nobody
+    os._exit(0)  # nobody would receive the rest
 
 
 def _tell(connection: Any, part: object) -> None:

@@ -1,4 +1,4 @@
-"""What an error costs for one scene, by every method that can answer it, measured on this machine.
+"""Error over computing time for one scene, by every suitable method, measured on this machine.
 
 `vibench.sim.accuracy_benchmark.curve` has the curve of error over time, and
 `vibench.sim.accuracy_benchmark.equations` the paper's equations as a textbook writes them.

@@ -36,9 +36,9 @@ class CurvePoint:
     response_i: float
     response_ii: float
     is_stated: bool
-    """By the method itself; otherwise it is the difference from the best answer."""
+    """Whether the method states the error; otherwise it is the difference from the best answer."""
     is_chosen: bool = False
-    """What a request for the scene's error and time returns."""
+    """Whether it is the result for the requested error and time."""
 
 
 Answer = tuple[Floats, float | None]
@@ -46,12 +46,12 @@ Answer = tuple[Floats, float | None]
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
-    """Answer a scene with a target by every method that can, the answers to its target first.
+    """Solve a scene with a target by every suitable method, first to its target.
 
-    Methods that give no answer for the scene are left out. Raises ValueError when the scene has no target, or
+    Unsuitable methods are left out. Raises ValueError when the scene has no target, or
     cannot be followed in time.
     """
-    next(refine_scene(scene))  # what a process pays once is not counted
+    next(refine_scene(scene))  # one-time costs of a process are not counted
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)

@@ -1,9 +1,9 @@
-"""All periodic motions over drive frequency or level: found, followed, switched at bifurcations, told apart.
+"""Branches of periodic motions over drive frequency or level, with switching at bifurcations.
 
-`shot_branches` looks for motions from rest, from the motion between the stops and from random states, follows
-each one exactly, and switches where a period doubles or a symmetry breaks; `balanced_branches` does the same
-for harmonic balances, the paper's first-order ones among them. Branches are given one by one, as found: what
-nobody asks for is not computed. A motion on no branch that was known is the start of an isolated one.
+`shot_branches` searches motions from rest, from the motion between the stops and from random states,
+follows each exactly, and switches branches where a period doubles or a symmetry breaks. `balanced_branches`
+does the same for harmonic balances, including the paper's first-order ones. Branches are computed lazily,
+one by one. A motion on no known branch starts an isolated one.
 
 >>> from itertools import islice
 >>> from vibench.sim import FrequencyPath, gong2025

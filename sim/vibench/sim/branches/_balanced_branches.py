@@ -1,4 +1,4 @@
-"""Branches of harmonic balances: from every first-order solution of a power law, or from exact motions."""
+"""Branches of harmonic balances, from first-order solutions of a power law or from exact motions."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -37,15 +37,15 @@ def balanced_branches(
     Parameters
     ----------
     specimen
-        Not rigid stops: they push with no finite force. Of power laws every first-order solution at
-        ``search.places`` values begins a branch (Gong et al. 2025, eq. 5); of other laws every motion of the
+        Any law except rigid stops. For power laws, every first-order solution at ``search.places`` values
+        starts a branch (Gong et al. 2025, eq. 5); for other laws, every motion of the
         drive's period that `periodic_motions` finds there.
     path, low, high, steps
         As for `shot_branches`.
     options
         Harmonics from ``fewest`` to ``most``; 1 and 1 is the paper's first-order balance.
     search
-        Where branches begin.
+        Settings of the search for starts.
 
     Yields
     ------

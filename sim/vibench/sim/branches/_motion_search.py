@@ -16,29 +16,29 @@ from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
-"""A section repeats when it changes by less, over the state's scale: Newton's iteration does the rest."""
+"""Relative change of a section that repeats, small enough for Newton's iteration."""
 SAME_MOTION = 1e-5
-"""Two motions this close at one moment, over the state's scale, are one."""
+"""Relative distance at one moment below which two motions are equal."""
 SIMPLER = 1e-6
-"""And a motion this close to half its period, or to its mirror image, is that."""
+"""Relative distance below which a motion has half the period, or is its own mirror image."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
-"""Random starts lie between the stops, up to this part of each gap."""
+"""Range of random starts between the stops, as a share of each gap."""
 RANDOM_REACH = 3.0
-"""They spread over this many times the gap, or the motion without stops where that is larger."""
+"""Range of other coordinates in gaps, or the motion without stops if that is larger."""
 
 
 @dataclass(frozen=True)
 class MotionSearch:
-    """How many starts are tried, and for how long."""
+    """Settings of the search for periodic motions."""
 
     places: int = 8
-    """Values of the parameter at which motions are looked for, spread evenly, ends included."""
+    """Number of evenly spaced values of the parameter for the search, including the ends."""
     starts: int = 12
     """Random states at each of them, besides rest."""
     settling_periods: int = 300
     most_periods: int = 4
-    """Longest motion that is looked for, in drive periods."""
+    """Longest period to search, in drive periods."""
     most_branches: int = 60
     seed: int = 1
 
@@ -58,10 +58,10 @@ class MotionSearch:
 
 
 def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[PeriodicOrbit]:
-    """Find periodic motions at one drive, each once; stable ones first of all, unstable ones by good luck.
+    """Find periodic motions at one drive, mainly stable ones.
 
-    Each start is followed for ``search.settling_periods``; where it then repeats, or nearly so, Newton's
-    iteration finds the motion exactly. Of a motion and its mirror image one is given.
+    Each start is integrated for ``search.settling_periods``. If it then nearly repeats, Newton's iteration
+    finds the exact motion. Only one of a motion and its mirror image is returned.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def orbit_states(orbit: PeriodicOrbit) -> Floats:
 
 
 def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Vector]:
-    """Rest, the motion without stops where it keeps between them, then random states between the stops."""
+    """Yield rest, the motion without stops if it stays between them, then random states."""
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
@@ -112,7 +112,7 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 
 
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
-    """Draw a state between the stops by ``rng``, shape (6,) [m, m/s], that may lead to any motion.
+    """Return a random state between the stops, shape (6,) [m, m/s].
 
     m0 and m2 lie within three times the gap, or the motion without stops where that is larger; velocities
     spread as far, times 2 pi f.
@@ -153,7 +153,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Shoot for a motion of this many periods from a state; its simplest form, or None if lost."""
+    """Return the simplest motion of this many periods found from a state by shooting, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:
@@ -168,7 +168,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Tell a motion by the shortest map that it is a fixed point of."""
+    """Describe a motion by the shortest map of which it is a fixed point."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(

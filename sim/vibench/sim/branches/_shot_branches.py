@@ -1,4 +1,4 @@
-"""Branches of exact motions: from every motion that a search finds, and from every bifurcation on them."""
+"""Branches of exact motions, from a search and from bifurcations."""
 
 import math
 import time
@@ -26,11 +26,11 @@ as the tangent may turn between them."""
 SAME_MOTION = 1e-5
 """Over the state's scale."""
 LENGTHS = 10.0
-"""As many units long counts the parameter's range: as when a branch is followed."""
+"""Length of the parameter's range in units, as when following a branch."""
 
 
 class BranchOrigin(StrEnum):
-    """How a branch came to be known."""
+    """Method by which a branch was found."""
 
     SEARCH = "a motion found from rest, between the stops or from a random state"
     SYMMETRY_BREAKING = "switched to where a symmetry breaks"
@@ -41,7 +41,7 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """A branch, how its motions repeat, how it was found, and what it cost."""
+    """A branch with the kind of its motions, its origin and its cost."""
 
     branch: Branch
     shape: OrbitShape
@@ -49,13 +49,13 @@ class FoundBranch:
     """Drive periods of a motion."""
     origin: BranchOrigin
     has_twin: bool
-    """Another branch holds the mirror images of these motions."""
+    """Whether the mirror images of these motions form another branch."""
     elapsed_s: float = 0.0
-    """To find and follow it."""
+    """Time to find and follow it."""
 
     @property
     def is_isolated(self) -> bool:
-        """It closes on itself: no sweep leads there from outside."""
+        """Whether it closes on itself, so that no sweep leads there from outside."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -77,7 +77,7 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
 
 
 M = TypeVar("M")
-"""A motion, as the method knows it."""
+"""A motion in the method's own representation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ def branches_from(
     follow: Callable[[BranchStart[M]], FoundBranch],
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
 ) -> Iterator[FoundBranch]:
-    """Follow a branch from every start that lies on none that is known, and from all that leaves it."""
+    """Follow branches from every start on no known branch, and from their bifurcations."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -119,11 +119,11 @@ def branches_from(
 
 STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""How far from a bifurcation along the direction that leaves it a new branch is looked for, over the gap."""
+"""Distance from a bifurcation to search a new branch, relative to the gap."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""And how far beside it, as part of the range."""
+"""Distance of the parameter from a bifurcation for this search, relative to the range."""
 LEFT = 1e-4
-"""A motion this far from the simpler one, over the gap, has left it."""
+"""Distance from the simpler motion, relative to the gap, of a different motion."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,
@@ -149,7 +149,7 @@ def shot_branches(
     low, high
         Range of the parameter, ascending [Hz, or m].
     search
-        Where motions are looked for. A branch that the search misses is missing here: more starts find more.
+        Settings of the search; branches that it misses are missing, and more starts find more.
     steps
         Along the branches; the range is ten units long, a displacement of the gap one.
 
@@ -192,7 +192,7 @@ def _branch_switches(
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # A branch that joins a simpler one tells of an event of that one, not of its own.
+        # A branch that joins a simpler one has no event of its own there.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue
@@ -223,7 +223,7 @@ def _leaving(
 
 
 def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
-    """Direction, over the scales, of the multiplier nearest to -1; its largest part is 1."""
+    """Return the scaled direction of the multiplier nearest to -1; its largest component is 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
@@ -234,7 +234,7 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
 
 
 UPDATES_TO_HOLD = 10.0
-"""A loop holds what takes this many of its updates to grow by e: it must see a departure and answer it."""
+"""Least growth time by e that a loop can hold, in its updates."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
@@ -263,7 +263,7 @@ def least_growth_time_s(loop_time_s: float) -> float:
     Parameters
     ----------
     loop_time_s
-        From a motion to the drive that answers it [s].
+        Latency from motion to drive [s].
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Chains of vibro-impact cells: specimens whose m0 hang on one another, and their impacts.
+"""Chains of vibro-impact cells: specimens coupled at their m0.
 
-Cell i is a `Specimen`; its (k0, c0) join its m0 to that of the cell before, the first to the base; the far
-end is free. A run goes window by window: in a window each cell with contact is followed in its own time,
-the rest of the chain enters as a series and a memory (docs/decisions/0011-chains.md). Any drive;
-no orbits and no branches of chains. Exponents are those of two neighbouring motions.
+Cell i is a `Specimen`; its (k0, c0) couple its m0 to the previous cell, or to the base; the far end is
+free. A run proceeds in windows: in each, cells with contact are integrated separately, and the rest of the
+chain enters as a series (docs/decisions/0011-chains.md). Any drive is supported, but no orbits and
+branches. Exponents come from two neighbouring motions.
 
 >>> from vibench.sim import gong2025
 >>> from vibench.sim.chain import band_gaps, bloch_factor, chain_of, chain_transmissibility

@@ -1,4 +1,4 @@
-"""A chain of vibro-impact cells: specimens whose outer masses hang on one another. SI units.
+"""A chain of vibro-impact cells, coupled at their outer masses. SI units.
 
 Cell i is a `Specimen`; its (k0, c0) join its m0 to the m0 of the cell before, those of the first cell to
 the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2, z2, ...
@@ -17,7 +17,7 @@ from ..specimen.specimen import Matrix, Specimen, Triple
 MASSES_PER_CELL = 3
 """m0, m1, m2: a cell's displacements x, y, z."""
 MOST_CELLS = 1000
-"""The modes of more cells do not fit into an ordinary memory."""
+"""Most cells whose modes fit into ordinary memory."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Chain:
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
     cells: tuple[Specimen, ...]
-    """Index 0 hangs on the base through its own (k0, c0), cell i on cell i - 1."""
+    """Cell 0 is coupled to the base through its (k0, c0), cell i to cell i - 1."""
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.cells) <= MOST_CELLS:

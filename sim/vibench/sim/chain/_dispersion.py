@@ -1,6 +1,6 @@
-"""Waves in an endless chain without contact: bands, gaps, decay from unit to unit. SI units.
+"""Waves in an infinite chain without contact: bands, gaps, attenuation per unit. SI units.
 
-A unit is one cell or several, which then come again and again. Seen from its m0, the inner pair of a cell is
+A unit consists of one or several cells and repeats. The inner pair of a cell acts on its m0 as
 one dynamic stiffness S(w); with the link K = k0 + i w c0 to the cell before, displacement x of m0 and force f
 in the link pass from cell to cell by
 
@@ -20,16 +20,16 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Part of a frequency below which a gap is rounding: a unit of equal cells folds its bands there."""
+"""Relative width below which a gap is rounding, as for a unit of equal cells."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Ratio of the motion of a unit to that of the unit before, for the wave that goes (or decays) outwards.
+    """Return the ratio of the motion of a unit to the previous one, for the outgoing or decaying wave.
 
     Parameters
     ----------
     unit
-        The cells that come again; their contact laws and gaps play no part.
+        Cells of the unit; contact laws and gaps are ignored.
     frequency_hz
         Shape (n,) [Hz]; positive.
 
@@ -50,14 +50,14 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     for cell in unit.cells:
         across = _across(cell, omega) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
-    # The roots of q^2 - 2 cosine q + 1 multiply to 1: the larger is free of cancellation.
+    # The product of the roots of q^2 - 2 cosine q + 1 is 1, and the larger has no cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
 
 
 def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
-    """Return what a cell makes of displacement and force, shape (n, 2, 2)."""
+    """Return the transfer matrix of a cell for displacement and force, shape (n, 2, 2)."""
     outer, pushed, _, _ = reduce_to_m0(cell, omega)
     one = np.ones_like(outer)
     return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
@@ -77,7 +77,7 @@ class SeenFromOutside(NamedTuple):
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
-    """Reduce a cell without contact to its m0; finite where m1 alone resonates, too."""
+    """Reduce a cell without contact to its m0, finite also at the resonance of m1 alone."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping
@@ -104,7 +104,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
         raise ValueError(msg)
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
-    # The first cell's link leads to the last of the unit before, whose phase lags.
+    # The first cell is coupled to the last of the previous unit, whose phase lags.
     stiffness = np.tile(unit.stiffness_matrix.astype(np.complex128), (len(phase), 1, 1))
     stiffness[:, last, last] += link
     stiffness[:, first, last] -= link * np.exp(-1j * phase)
@@ -121,10 +121,9 @@ class BandGap(NamedTuple):
 
 
 def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
-    """Find the gaps of the endless chain without damping and contact.
+    """Find the gaps of the infinite chain without damping and contact.
 
-    Cells touch one another in one displacement only, so that a frequency of a band rises or falls all the way
-    from mu = 0 to mu = pi: its ends are there.
+    Cells are coupled in one displacement, so a band is monotone from mu = 0 to mu = pi and ends there.
     """
     ends = band_frequencies_hz(unit, [0.0, np.pi])
     lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -141,7 +140,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     Parameters
     ----------
     chain
-        Its contact laws and gaps play no part.
+        A chain; contact laws and gaps are ignored.
     frequency_hz
         Shape (n,) [Hz]; zero and above.
 
@@ -159,7 +158,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
         msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
         raise ValueError(msg)
     cells = [reduce_to_m0(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
-    # From the free end: what a cell is, and what hangs on it, as one stiffness at its m0.
+    # From the free end: each cell and the rest of the chain as one stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))

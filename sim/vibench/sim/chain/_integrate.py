@@ -24,7 +24,7 @@ MOST_WINDOWS = 10**11
 
 
 class ChainRun:
-    """One motion of a chain: where it is, and what was kept and observed on the way."""
+    """A run of a chain: its state, samples and observations."""
 
     def __init__(
         self,
@@ -38,10 +38,10 @@ class ChainRun:
         samples: int = 0,
         sample_rate_hz: float = 1.0,
     ) -> None:
-        """Make room for impacts, and for samples at ``start_time_s`` + k / ``sample_rate_hz``."""
+        """Allocate impacts, and samples at ``start_time_s`` + k / ``sample_rate_hz``."""
         engine, cells = native_engine(), chain.size
         self._states = engine.rows("CellState", cells)
-        # Only what has been filled is ever read.
+        # Only filled entries are read.
         self._times, self._places = np.empty(most_impacts), np.empty(most_impacts)
         self._samples = np.empty((samples, cells, STATES_PER_CELL))
         self.peaks_m, self._lines = np.zeros((cells, 2)), np.zeros(cells, np.complex128)
@@ -70,7 +70,7 @@ class ChainRun:
         fill_drive(self._motion["drive"], drive, chain.cells[0])
 
     def place(self, motion: Floats, time_s: float) -> None:
-        """Put the chain to x, y, z, vx, vy, vz of every cell, shape (cells, 6), at an instant."""
+        """Set x, y, z, vx, vy, vz of every cell, shape (cells, 6), at an instant."""
         x, y, z, vx, vy, vz = motion.T
         for name, values in {"x": x, "p": y - z, "z": z, "vx": vx, "vp": vy - vz, "vz": vz}.items():
             self._states[name] = values
@@ -78,7 +78,7 @@ class ChainRun:
         native_engine().call("start_chain", self._motion)
 
     def drive_by(self, pieces: Pieces) -> None:
-        """Be driven by these from now on, not by the harmonic drive."""
+        """Use these pieces instead of the harmonic drive from now on."""
         native_engine().fill(
             self._motion, pieces=pieces.terms, piece_start=pieces.start_s, piece_length=pieces.length_s
         )
@@ -100,7 +100,7 @@ class ChainRun:
 
     @property
     def time_s(self) -> float:
-        """How far the motion has come."""
+        """Current time of the motion."""
         return float(self._motion["clock_high"])
 
     @property
@@ -110,17 +110,17 @@ class ChainRun:
 
     @property
     def impacts(self) -> int:
-        """Contacts that began, so far."""
+        """Number of contacts so far."""
         return int(self._motion["impacts"])
 
     @property
     def impact_times_s(self) -> Floats:
-        """When they began: ascending but within a window."""
+        """Start times of contacts, ascending except within a window."""
         return self._times[: self.impacts]
 
     @property
     def impact_cells(self) -> NDArray[np.int64]:
-        """Where they began."""
+        """Cells of these contacts."""
         return self._places[: self.impacts].astype(np.int64)
 
     def samples(self, outcome: Outcome) -> Floats:
@@ -128,35 +128,35 @@ class ChainRun:
         kept = int(self._motion["samples_kept"])
         if outcome is not Outcome.REACHED_END:
             return self._samples[:kept]
-        # A sample that rounding puts at, or a hair beyond, the very end.
+        # Rounding may put the last sample just beyond the end.
         self._samples[kept:] = self.motion
         return self._samples
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Windows of a run times its cells: hours."""
+"""Most windows times cells of a run, which take hours."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChainImpacts:
-    """When and where a sphere touched a stop."""
+    """Times and cells of contacts."""
 
     times_s: Floats
     """Ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
     """Which cell, counted from 0 at the base; shape (count,)."""
     per_cell: NDArray[np.int64]
-    """How many in each cell, shape (cells,)."""
+    """Number in each cell, shape (cells,)."""
 
     @property
     def count(self) -> int:
-        """How many contacts began."""
+        """Number of contacts."""
         return len(self.times_s)
 
 
 @dataclass(frozen=True, eq=False)
 class ChainTrajectory:
-    """Where a chain went, where and when it struck, and how the run ended."""
+    """Motion, impacts and outcome of a run of a chain."""
 
     time_s: Floats
     """Shape (n,); empty when no sample rate was asked for."""
@@ -167,7 +167,7 @@ class ChainTrajectory:
     end_time_s: float
     impacts: ChainImpacts
     outcome: Outcome
-    """Look here first: only REACHED_END reached the time that was asked for."""
+    """Check this first: only REACHED_END reached the requested time."""
     accuracy: Accuracy
 
 
@@ -182,7 +182,7 @@ def integrate_chain(
     start_time_s: float = 0.0,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainTrajectory:
-    """Follow a chain of cells under a drive.
+    """Integrate a chain of cells under a drive.
 
     Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
     excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
@@ -202,9 +202,9 @@ def integrate_chain(
     sample_rate_hz
         Samples at start_time_s + k / sample_rate_hz up to the end; None keeps none.
     start_time_s
-        Time on the drive's clock at which the run begins: to go on from an earlier final state.
+        Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
-        A run whose cells strike more often than this, each on average, ends with TOO_MANY_IMPACTS.
+        Mean impact rate per cell above which a run ends with TOO_MANY_IMPACTS.
 
     Raises
     ------
@@ -250,7 +250,7 @@ def integrate_chain(
 
 
 def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
-    """Refuse a run of more windows, each ``window_s`` at most, than anybody waits for."""
+    """Raise ValueError for a run that would take hours, in windows of at most ``window_s``."""
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
         msg = (
@@ -275,7 +275,7 @@ def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
 
 
 def _of_one(run: Trajectory) -> ChainTrajectory:
-    """Return the motion of one cell, which is that of the specimen, as that of a chain."""
+    """Return the trajectory of a specimen as that of a chain of one cell."""
     impacts = run.impacts
     return ChainTrajectory(
         time_s=run.time_s,

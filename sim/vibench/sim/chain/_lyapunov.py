@@ -26,19 +26,19 @@ from ._tables import chain_tables, longest_window_s
 NEARNESS = 1e-6
 """Distance of the two motions over the size of the first."""
 SHORTEST_INTERVAL_S = 5e-3
-"""A growth of 100 per second then stays below 2: the motions remain near."""
+"""Time between readings, in which a growth of 100 per second stays below a factor of 2."""
 FEWEST_INTERVALS = 32
 """Intervals that must fit into the duration, so that a mean can have an error."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChainExponent:
-    """How fast neighbouring motions of a chain part. NaN where the run did not reach its end."""
+    """Largest Lyapunov exponent of a chain; NaN if the run did not finish."""
 
     drive: Harmonic
     accuracy: Accuracy
     exponent_per_s: float
-    """Mean growth [1/s]; negative where neighbours come together."""
+    """Mean growth [1/s]; negative for converging neighbours."""
     standard_error_per_s: float
     blocks: BlockedMean | None
     """How the mean and its error were taken [1/s]."""
@@ -64,7 +64,7 @@ def chain_lyapunov_exponent(
     seed: int = 0,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainExponent:
-    """Return whether neighbouring motions of a chain part, and how fast.
+    """Return the largest Lyapunov exponent of a chain.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from ._tables import chain_tables, longest_window_s
 
 @dataclass(frozen=True, eq=False)
 class ChainResponse:
-    """What one point of a chain's response curves says. NaN where the run did not reach its end."""
+    """Response of a chain at one drive; NaN if the run did not finish."""
 
     drive: Harmonic
     accuracy: Accuracy
@@ -69,7 +69,7 @@ def chain_response(
     *,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainResponse:
-    """Drive a chain for a while and say how large the motion of every mass is at the end.
+    """Integrate a chain and return the response of every mass at the end.
 
     The defaults are those of `vibench.sim.steady_response`, which also answers for one cell. A long
     chain settles more slowly than a cell.
@@ -184,7 +184,7 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     change
         Of the state times exp(-i omega t) from the start to the end of the lines, shape (6 cells,).
     line_s
-        How long they were [s].
+        Their length [s].
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix

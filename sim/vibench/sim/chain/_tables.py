@@ -1,4 +1,4 @@
-"""What a run of a chain needs ready: its cells as the engine takes them, and its windows. SI units."""
+"""Tables for a run of a chain: cells for the engine, and windows. SI units."""
 
 import math
 from collections.abc import Iterator
@@ -21,19 +21,19 @@ WINDOW_TURN = 0.2
 """Longest window, as the fastest rate of chain and drive times its length [rad]: the tenth integral of a
 force is then 1.4e-12 of the first."""
 COLLISION_TURN = 0.4
-"""Longest window where collisions are whole: 7e-10."""
+"""Longest window with whole collisions: 7e-10."""
 WHOLE_COLLISIONS = 1e-7
 """Least tolerance of whole collisions, as in native/collision.hpp."""
 MARKOV_TERMS = 11
-"""Taylor coefficients of the chain's answer to a unit impulse in a cell."""
+"""Number of Taylor coefficients of the chain's response to a unit impulse in a cell."""
 REACH = MARKOV_TERMS
-"""Cells to either side that hear of it in this many terms."""
+"""Cells on each side that it reaches in this many terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
 """Part of the tolerance that one cell's force may change another's rate within a window, unseen."""
 MOST_HALVINGS = 20
 KEPT = 2
-"""Windows that are tried before the shortest."""
+"""Number of windows tried before the shortest."""
 
 
 class ChainTables(NamedTuple):
@@ -48,7 +48,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Lengths of windows, long to short [s]."""
     clash: Vector
-    """In such a window, cells at most so far apart may not both be busy; shape (windows,)."""
+    """Least distance of cells that may both be in contact in such a window; shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:

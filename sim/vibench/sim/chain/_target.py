@@ -1,4 +1,4 @@
-"""Responses of a chain as exactly, or within the time, that was requested. SI units."""
+"""Responses of a chain to a requested error or within a requested time. SI units."""
 
 import math
 import time
@@ -25,7 +25,7 @@ LONGEST_S = 60.0
 
 
 class TargetedResponse(NamedTuple):
-    """What was seen in the later half of the windows."""
+    """Responses in the later half of the windows."""
 
     response: ChainResponse
     errors: Floats
@@ -37,7 +37,7 @@ class TargetedResponse(NamedTuple):
 def chain_response_to(
     chain: Chain, drive: Harmonic, error: float | None, time_s: float | None
 ) -> TargetedResponse:
-    """Observe windows one after the other until their later half tells the lines as exactly as requested.
+    """Observe windows until their later half determines the lines to the requested error.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def chain_response_to(
 
 
 def error_of_lines(lines: Complex) -> Floats:
-    """Find how far the amplitude of the mean of lines may be off, relatively, from shape (windows, cells).
+    """Return the relative error of the amplitude of the mean of lines of shape (windows, cells).
 
     Scatter of neighbouring pairs, by Student's interval; while a chain settles, the halves are apart.
     """

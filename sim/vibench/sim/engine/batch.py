@@ -1,7 +1,7 @@
-"""Motions of one specimen followed eight at a time in a processor's vector registers, by their states alone.
+"""SIMD batches: integrate eight motions of one specimen at a time.
 
-native/batch.hpp does the work, for Hertz's stops at *quick* and *standard*; what is observed are the states
-once a drive period (docs/decisions/0061-lanes.md). SI units.
+native/batch.hpp supports Hertz's stops at *quick* and *standard*, and returns the states once per drive
+period (docs/decisions/0061-lanes.md). SI units.
 """
 
 import math
@@ -75,9 +75,9 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp: about a second for each specimen.
+    """Return the `CollisionFit` of native/structures.hpp, in about one second per specimen.
 
-    None where stops are so soft that the other springs move on meanwhile, or the fit is not close enough.
+    None if stops are too soft, or the fit is not accurate enough.
     """
     with _ONE_THREAD:
         return _collision_fit(engine, specimen)
@@ -128,7 +128,7 @@ def _time_over_fifth_root(specimen: Specimen) -> float:
 
 
 def _box(specimen: Specimen) -> tuple[Vector, Vector]:
-    """Choose the collisions that are fitted: middle and half width of each variable."""
+    """Return the box of fitted collisions: middle and half width of each variable."""
     unit = min(specimen.gaps_m) * _fastest(specimen)
     shortest, longest = (
         _time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
@@ -140,7 +140,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return what the integrals of a force do to p, over what the second one does."""
+    """Return the effect of the integrals of a force on p, relative to the second one."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -174,7 +174,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
         misfit = (powers * free[:, None, :]).sum(axis=2) - np.einsum("nm,nmi->ni", weights, pushed)
         misfit[:, :POINTS] -= depths
         slopes = np.empty((len(depths), POINTS + 1, POINTS + 1))
-        # What comes after three integrals is small, and corrected with the rest.
+        # Terms after three integrals are small and corrected with the rest.
         slopes[:, :, :POINTS] = -np.einsum("nm,mki->nik", weights[:, 1:4], SHARES[1:4])
         slopes[:, :, :POINTS] *= (1.5 * HALF_FORCE * root)[:, None, :]
         slopes[:, range(POINTS), range(POINTS)] -= 1.0
@@ -211,7 +211,7 @@ LEAST_PART = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class BatchedMotion:
-    """Course of one motion."""
+    """Result of one motion."""
 
     states: Floats
     """Once a drive period, up to the end, shape (periods, 6). One within a short collision, unless it is the
@@ -221,12 +221,12 @@ class BatchedMotion:
 
 @cache
 def batches_pay() -> bool:
-    """Whether this processor follows motions in a batch in less time than one after the other."""
+    """Return whether batches are faster than single runs on this processor."""
     return native_engine().family in FUSING_FAMILIES
 
 
 def is_batchable(specimen: Specimen, tolerance: float) -> bool:
-    """Whether motions of such a specimen can be followed in a batch at such a tolerance."""
+    """Return whether batches support such a specimen and tolerance."""
     return (
         tolerance >= LEAST_TOLERANCE
         and _turns_in_p(specimen)
@@ -236,7 +236,7 @@ def is_batchable(specimen: Specimen, tolerance: float) -> bool:
 
 @lru_cache(maxsize=8)
 def _turns_in_p(specimen: Specimen) -> bool:
-    """Whether Hertz's stops are met by three modes that turn, and each moves p."""
+    """Return whether all three modes oscillate and move p."""
     if not isinstance(specimen.contact, Hertz) or not math.isfinite(sum(specimen.gaps_m)):
         return False
     modes = modal_form(specimen)
@@ -246,18 +246,18 @@ def _turns_in_p(specimen: Specimen) -> bool:
 
 
 def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[BatchedMotion | None]:
-    """Advance motions of a specimen that is batchable, each by a number of its drive periods.
+    """Advance motions of a batchable specimen, each by a number of its drive periods.
 
     Parameters
     ----------
     runs
         Each in flight, at a whole drive period, at the same tolerance. They carry no small changes.
     periods
-        How far each is followed, in its own drive periods.
+        Number of drive periods for each.
 
     Returns
     -------
-    What was seen of each; None of one that was lost, which stays where it was.
+    Results of each; None for a failed one, which is unchanged.
 
     Raises ValueError when the specimen is not batchable, or a motion is on a stop.
     """
@@ -267,7 +267,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     if fit is None:
         msg = "This specimen cannot be followed in a batch: use Hertz's stops and three modes that turn."
         raise ValueError(msg)
-    # The longest first, so that all lanes end at about the same time.
+    # Longest first, so that all lanes end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((count, DIRECTIONS)) for count in periods]
     motions = engine.rows("BatchMotion", len(runs))

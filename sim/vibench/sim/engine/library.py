@@ -1,4 +1,4 @@
-"""A library of the native engine: found, loaded, and called by `ctypes`, which releases Python's lock."""
+"""Find, load and call the native engine by `ctypes`, which releases Python's lock."""
 
 import ctypes
 import hashlib
@@ -66,10 +66,10 @@ def _fields(
 
 
 FOLDER = Path(__file__).parent / "libraries"
-"""Where the build puts libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
+"""Folder of the built libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
 CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
-"""Builds them; there in a checkout, not in an installed wheel."""
+"""Build script; in a checkout only, not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """File name ending of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
@@ -86,7 +86,7 @@ _Pointer = ctypes.c_void_p
 
 
 class EngineError(RuntimeError):
-    """The native engine cannot be used here; the text says what to do."""
+    """The native engine cannot be used; the text states what to do."""
 
 
 class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
@@ -144,9 +144,9 @@ class Engine:
         return self.path.name.split("-")[1]
 
     def new(self, name: str, **fields: object) -> Structure:
-        """Make a structure of the interface, zero where nothing is given; names as in native/structures.hpp.
+        """Create a structure of native/structures.hpp, with zero for missing fields.
 
-        An array that is a field is lent, not copied; it lives as long as the structure.
+        Arrays are referenced, not copied, and live as long as the structure.
         """
         structure = np.zeros((), self._types[name]).view(_Lending)
         structure.lent = {}
@@ -154,18 +154,18 @@ class Engine:
         return structure
 
     def rows(self, name: str, count: int) -> Structure:
-        """Make a row of structures, zero everywhere."""
+        """Create an array of zeroed structures."""
         return np.zeros(count, self._types[name])
 
     def fill(self, structure: Structure, **fields: object) -> None:
-        """Change fields of a structure that `new` made."""
+        """Change fields of a structure from `new`."""
         assert isinstance(structure, _Lending)
         structure.lent |= fields
         for field, value in fields.items():
             structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
 
     def call(self, function: str, structure: Structure) -> int:
-        """Call a function of native/api.cpp that takes one structure; returns what is described there.
+        """Call a function of native/api.cpp with one structure; return its result.
 
         Raises ValueError when the engine refuses the structure.
         """
@@ -180,7 +180,7 @@ class Engine:
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Make the tables of a scene; its shapes of collisions and steps must outlive them.
+        """Create the tables of a scene; its shapes of collisions and steps must outlive them.
 
         Raises ValueError when the engine refuses a number of the scene.
         """
@@ -192,7 +192,7 @@ class Engine:
         return tables
 
     def prepare_cubics(self, scene: Structure) -> Tables:
-        """Make the tables of a scene whose base is cubics on intervals, as `prepare` does."""
+        """Create the tables of a scene with cubic base motion; see `prepare`."""
         size = int(self._library.vibench_size_of_cubic_tables(int(scene["specimen"]["law"])))
         tables = np.zeros(size // 8, np.float64)
         if self._library.vibench_prepare_cubics(scene.ctypes.data, tables.ctypes.data) != 0:
@@ -253,7 +253,7 @@ class Engine:
 
 
 def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
-    """Return what the engine knows an array of numbers by; a structure as it is."""
+    """Return the address of an array; a structure unchanged."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -263,7 +263,7 @@ def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
 
 
 def library_path() -> Path:
-    """Find the library of the fastest family that runs here; in a checkout, build it where it is missing.
+    """Return the library of the fastest family for this processor; build it if missing in a checkout.
 
     Raises EngineError when there is none, or when it was built from other sources and cannot be rebuilt.
     """

@@ -1,4 +1,4 @@
-"""Which family of processors this computer's belongs to: the native engine is compiled for each.
+"""Family of this computer's processor; the native engine is compiled for each.
 
 The build hook reads this file too, so it needs nothing but the standard library.
 """
@@ -15,7 +15,7 @@ _X86 = {"x86_64", "amd64"}
 _V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
 _V4 = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
 _WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
-"""What IsProcessorFeaturePresent takes (winnt.h)."""
+"""Arguments of IsProcessorFeaturePresent (winnt.h)."""
 
 
 def usable_families() -> tuple[str, ...]:
@@ -30,7 +30,7 @@ def usable_families() -> tuple[str, ...]:
 
 
 def _level() -> int:
-    """Return 3 for AVX-512, 2 for AVX2, else 1; what the system does not tell counts as absent."""
+    """Return 3 for AVX-512, 2 for AVX2, else 1; unknown features count as absent."""
     if sys.platform == "win32":
         has = ctypes.windll.kernel32.IsProcessorFeaturePresent
         return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))

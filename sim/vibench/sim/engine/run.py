@@ -22,16 +22,16 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Steps of flight in a run: seconds of work, and two days of the paper's specimen. One whose fastest mode is
-a million times faster than its drive would be followed for weeks."""
+"""Most steps of flight in a run: seconds of work, two days of the paper's specimen. It limits specimens
+with far too fast modes."""
 MOST_IMPACTS = 1 << 26
-"""In one run: the memory of their times is half a gigabyte (none until they happen)."""
+"""Most impacts in one run: 0.5 GB for their times, allocated when they happen."""
 SPARE_IMPACTS = 100
-"""Allowed on top of the rate, for short runs."""
+"""Impacts allowed in addition to the rate, for short runs."""
 DIRECTIONS = 6
 """Number of directions of a state: the most small changes that can be carried along."""
 INSIDE = 1e-9
-"""A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
+"""Relative rounding within which a start beyond a rigid stop counts as on it."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -41,23 +41,23 @@ KNOWN_MOTION = (
     2.63303389e-02,
     -1.20895040e-02,
 )
-"""Where the paper's specimen is then, with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
+"""Known result for the paper's specimen with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
 KNOWN_TO = 1e-6
 """Part of 100 um and 0.1 m/s."""
 
 
 class Watch(IntEnum):
-    """What is observed on the way."""
+    """Quantities to observe."""
 
     NOTHING = 0
     PEAKS = 1
     """Extremes of x and p."""
     PEAKS_AND_LINES = 2
-    """Their components at the drive frequency as well."""
+    """Also their components at the drive frequency."""
 
 
 class RunRecord:
-    """What a run fills on its way. None of it changes a step."""
+    """Record of a run, which does not affect its steps."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class RunRecord:
         engine: Engine | None = None,
     ) -> None:
         """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
-        # Only what has been filled is ever read: to clear it first takes as long as a short run.
+        # Not cleared, because that takes as long as a short run; only filled entries are read.
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
@@ -91,7 +91,7 @@ class RunRecord:
 
     @property
     def impact_times_s(self) -> Floats:
-        """When they began."""
+        """Start times of contacts."""
         return self._times[: self.impacts]
 
     @property
@@ -100,13 +100,13 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return every sample there is room for: those that rounding puts beyond the end are ``last``."""
+        """Return all samples; those that rounding puts beyond the end are ``last``."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
     @property
     def steps_left(self) -> int:
-        """Steps that may still be made; the last one may have counted for more than were left."""
+        """Number of steps left."""
         return max(0, int(self.structure["steps_left"]))
 
     @property
@@ -131,7 +131,7 @@ class RunRecord:
 
 
 class NativeRun:
-    """One motion: where it is, and the small changes that are carried along with it."""
+    """One motion with its state and small changes (tangent vectors)."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class NativeRun:
         self.place(initial_state)
 
     def place(self, motion: ArrayLike) -> None:
-        """Put the motion to x, y, z, vx, vy, vz, shape (6,), now; a stop that is reached is found.
+        """Set x, y, z, vx, vy, vz, shape (6,), and find any contact.
 
         Raises ValueError when the motion is inside a rigid stop.
         """
@@ -169,7 +169,7 @@ class NativeRun:
             raise ValueError(msg)
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return a copy of the motion; one with another tolerance carries no small changes."""
+        """Return a copy; with another tolerance, without small changes."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
@@ -178,14 +178,14 @@ class NativeRun:
         return twin
 
     def carry(self, changes: Floats) -> None:
-        """Carry small changes of the state along from now on, shape (n, 6); none when n = 0."""
+        """Propagate small changes of the state from now on, shape (n, 6); none if n = 0."""
         self._tangent["changes"] = len(changes)
         self._tangent["rows"][: len(changes)] = changes
         self._tangent["growth"] = 0.0
 
     @property
     def changes(self) -> Floats:
-        """What became of the changes, shape (n, 6), over exp(`growth`)."""
+        """The propagated changes, shape (n, 6), divided by exp(`growth`)."""
         return np.array(self._tangent["rows"][: int(self._tangent["changes"])])
 
     @property
@@ -221,7 +221,7 @@ class NativeRun:
 
     @property
     def addresses(self) -> tuple[int, int]:
-        """Where its tables and its state lie, for a batch; they live as long as the run."""
+        """Addresses of tables and state for a batch; valid as long as the run."""
         return self._tables.ctypes.data, self._state.ctypes.data
 
     @property
@@ -230,7 +230,7 @@ class NativeRun:
         return float(self._state["clock_high"])
 
     def pass_over(self, length_s: float) -> None:
-        """Let time pass, in which the motion comes back to its state."""
+        """Advance the time by a period after which the motion repeats."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
@@ -247,10 +247,10 @@ class NativeRun:
 
 
 class GrowthReadings:
-    """How changes grow from instant to instant, made orthonormal in a metric."""
+    """Growth of changes between instants, orthonormalised in a metric."""
 
     def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
-        """Make room for readings at whole numbers of ``interval_s``, each cut in equal ``parts``."""
+        """Allocate readings at multiples of ``interval_s``, each in equal ``parts``."""
         self._growth = np.zeros((room, changes))
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
@@ -262,7 +262,7 @@ class GrowthReadings:
 
     @property
     def made(self) -> int:
-        """Readings so far."""
+        """Number of readings so far."""
         return int(self.structure["made"])
 
     @property
@@ -272,7 +272,7 @@ class GrowthReadings:
 
     @property
     def impacts(self) -> NDArray[np.int64]:
-        """In each interval, shape (n,)."""
+        """Impacts in each interval, shape (n,)."""
         return self._impacts[: self.made]
 
     @property
@@ -303,9 +303,9 @@ def most_impacts(rate_hz: float, duration_s: float) -> int:
 
 @lru_cache(maxsize=1)
 def native_engine() -> Engine:
-    """Load the engine of this processor; it has then answered a known scene.
+    """Load the engine of this processor and check it with a known scene.
 
-    Raises EngineError when there is none, or when its answer is wrong.
+    Raises EngineError when there is none or its result is wrong.
     """
     engine = Engine(library_path())
     check_known_answer(engine)
@@ -313,7 +313,7 @@ def native_engine() -> Engine:
 
 
 def check_known_answer(engine: Engine) -> None:
-    """Refuse an engine that was compiled wrongly, which can be silent and fast."""
+    """Raise EngineError for a wrong result, for example by a miscompiled engine."""
     specimen, drive = gong2025(contact="hunt_crossley:0.5"), Harmonic(130.0, 20e-6)
     run = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, engine=engine)
     outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
@@ -384,9 +384,9 @@ class CubicRun:
         pieces
             c0 ... c3 of the base's displacement on each, shape (intervals, 4).
         record
-            Filled on the way.
+            Record of the run.
         first_from_s, last_to_s
-            Where the run begins in the first interval and ends in the last, since their starts [s].
+            Start in the first interval and end in the last, since their starts [s].
         """
         drive = self._engine.new("CubicDrive", base=pieces, first_from=first_from_s)
         drive["last_to"] = self._interval_s if last_to_s is None else last_to_s
@@ -395,7 +395,7 @@ class CubicRun:
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance over whole intervals, as far as possible.
 
-        Returns motions at the ends of those that were passed, shape (passed, 6), and impacts in each.
+        ¶ Return motions at the ends of completed intervals, shape (passed, 6), and impacts in each.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)
@@ -423,12 +423,12 @@ class CubicRun:
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0
-"""Several times the busiest motions known of the paper's specimen: at 50 um 4300 impacts a second on Hertz's
-stops, 23000 in the chatter on rigid ones of restitution 0.8; chatter of 0.95 may need more."""
+"""Default limit of the impact rate, several times the largest known of the paper's specimen: at 50 um 4300
+per second on Hertz's stops, 23000 in chatter on rigid ones of restitution 0.8."""
 
 
 def start_motion(initial_state: ArrayLike | None) -> Floats:
-    """Check where a run starts; at rest when None."""
+    """Return the checked initial state; rest if None."""
     motion = np.zeros(6) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != (6,) or not bool(np.all(np.isfinite(motion))):
         msg = f"Initial state {motion} is not allowed: give six finite numbers x, y, z, vx, vy, vz."

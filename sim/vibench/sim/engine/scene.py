@@ -1,4 +1,4 @@
-"""A specimen and a harmonic drive as the native engine takes them: the modal forms are Python's part."""
+"""Convert a specimen and a harmonic drive for the native engine, including modal forms."""
 
 import cmath
 import math
@@ -66,13 +66,13 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
 
 
 def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
-    """Fill what a `Scene` or a `CubicScene` knows of a power law."""
+    """Fill the power law of a `Scene` or a `CubicScene`."""
     _fill_power(scene["power"], law)
     scene["power_shapes"] = power_structure(engine).ctypes.data
 
 
 def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
-    """Fill a `CellKind`: a cell of a chain and the link behind it [N/m], [N s/m]."""
+    """Fill a `CellKind`: a cell of a chain and the next link [N/m], [N s/m]."""
     fill_specimen(target["specimen"], cell)
     match cell.contact:
         case LinearGap():
@@ -84,7 +84,7 @@ def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_dam
 
 
 def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
-    """Fill a `Drive`: what it does to the m0 that hangs on the base."""
+    """Fill a `Drive`: its force on the m0 coupled to the base."""
     _, force = harmonic_motion(first, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
     target["frequency"] = drive.frequency_hz
     target["start"] = cmath.exp(1j * drive.phase_rad)
@@ -172,7 +172,7 @@ def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m:
 
 
 def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
-    """m1 on a stop that holds it: two bodies, and one condition, that the stop can only push."""
+    """Fill the case of m1 held on a rigid stop, which can only push."""
     bound = bound_motion(specimen, omega, amplitude_m)
     _fill_motion(target["motion"], bound[:-1, RATE], bound[:-1, SHAPE], bound[:-1, ROW], bound[-1, SHAPE])
     m1, m2 = specimen.masses[1:]
@@ -183,7 +183,9 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """m1 on a stop that is a spring: the specimen with that spring beside k1, about another place of rest."""
+    """Fill the case of m1 on a spring stop: a specimen with a spring parallel to k1 and another
+    equilibrium.
+    """
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]

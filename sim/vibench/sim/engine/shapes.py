@@ -18,9 +18,9 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""In phi. They find the duration to 1e-8, and the speed after to rounding."""
+"""Gauss points in phi, which determine the duration to 1e-8 and the speed to rounding."""
 TERMS = 8
-"""Number of terms of the series for all that is slow beside a collision."""
+"""Terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
 """Shapes stand at this many presses, from the first to the last. A press is the acceleration by all other
 springs, over speed^2 / depth."""
@@ -51,7 +51,7 @@ def _cardinal(at: Table, points: Vector) -> Table:
 
 
 def _about_middle() -> Table:
-    """Give what depths at the points add to the Taylor terms of their polynomial about the middle of phi."""
+    """Return the map from depths at the points to Taylor terms about the middle of phi."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
@@ -87,7 +87,7 @@ SHARES: Table = _shares()
 
 
 def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Table]:
-    """How far a collision of unit speed and depth is from its equations, and their derivative."""
+    """Return the residual of a collision's equations in unit speed and depth, and its derivative."""
     times = np.append(HEIGHTS, 1.0)
     root = np.sqrt(np.maximum(depths, 0.0))
     pushed = HALF_FORCE * (depths * root) @ SHARES[1]
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Solve the collisions of the row, each started from the one before."""
+    """Solve the tabulated collisions, each starting from the previous one."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without a press: 2.943 long, and close to half a sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
@@ -139,7 +139,7 @@ def _deepest(press: float) -> float:
 
 
 def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
-    """Newton's method to rounding."""
+    """Solve a collision by Newton's method to rounding."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)
         step = np.linalg.solve(slopes, found)
@@ -154,15 +154,15 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
 # (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
-"""In a step. With ten a step costs half as much again and is a tenth longer."""
+"""Gauss points in a step; ten would cost 50 % more for steps 10 % longer."""
 ORDER = 32
 """Terms of the series: the next is 1e-20 of the largest in the longest step."""
 POWER_QUADRATURE = 24
-"""Points of the integrals behind the series: exact for all terms."""
+"""Points of the integrals of the series, exact for all terms."""
 COURSE_DEGREE = 5
 """The first guess of F in a step is a polynomial of this degree, fitted to the step before."""
 END_WEIGHT = 3.0
-"""... and to where it ended, which counts this often."""
+"""... and to its end, with this weight."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
 """Gauss's points c_i on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]

@@ -1,8 +1,8 @@
-"""Opening HDF5 files that may have been damaged, or made to do harm, without being harmed.
+"""Open HDF5 files that may be damaged or malicious.
 
-HDF5 lets a file name other files whose bytes it then gives out as its own (external storage, external links,
-virtual datasets), and believes what a file says of its sizes. `opened_hdf5` refuses the first, unless
-`external_data_allowed`, and compares the second with the file's length before anything is read.
+HDF5 files can include data of other files (external storage, external links, virtual datasets), and HDF5
+trusts the sizes stated in a file. `open_hdf5` refuses the first, unless `allow_external_data` is active,
+and compares sizes with the length of the file before reading.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

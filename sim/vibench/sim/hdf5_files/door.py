@@ -1,4 +1,4 @@
-"""What every HDF5 file must pass before anything in it is read: its own data only, and sizes that can be."""
+"""Checks of an HDF5 file before reading: no external data, and possible sizes."""
 
 import errno
 import math
@@ -17,11 +17,11 @@ DEEPEST = 32
 """Groups in groups."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
-"""Largest chunk bytes of a foreign program's chunks; ours have 200 kB."""
+"""Largest chunk in bytes; ours have 200 kB."""
 LARGEST_RATIO = 1100
 """Deflate makes at most 1030 bytes of one (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
-"""What a dataset may declare without having anything stored."""
+"""Bytes that a dataset may declare without stored data."""
 OWN_FILTERS = frozenset(
     {
         h5py.h5z.FILTER_DEFLATE,
@@ -33,10 +33,10 @@ OWN_FILTERS = frozenset(
         h5py.h5z.FILTER_LZF,
     }
 )
-"""Any other filter is a plug-in: a library that HDF5 would look for on this machine and run."""
+"""Allowed filters; any other is a plug-in library that HDF5 would load and execute."""
 
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
-"""What h5py raises where the description of an object, or a type of numbers, cannot be read."""
+"""Errors of h5py for unreadable descriptions or number types."""
 
 _SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
 """In errors of HDF5; 22 means an address that cannot be, so that the file is wrong."""
@@ -46,7 +46,7 @@ _allowances: list[None] = []
 
 
 class UnsafeHdf5(ValueError):
-    """The file points outside itself, or says of itself what cannot be; the text does not name the file."""
+    """The file refers to other files or is inconsistent; the text does not name the file."""
 
 
 def system_error(error: BaseException) -> str:
@@ -58,7 +58,7 @@ def system_error(error: BaseException) -> str:
 
 @contextmanager
 def allow_external_data() -> Iterator[None]:
-    """Let every file that this process opens inside hand out the bytes of other files, as HDF5 does."""
+    """Allow files opened in this context to include data of other files."""
     _allowances.append(None)
     try:
         yield
@@ -67,7 +67,7 @@ def allow_external_data() -> Iterator[None]:
 
 
 def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
-    """Open a file for reading, and look at everything in it but the data.
+    """Open a file for reading, and check everything in it except the data.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups lie more than {DEEPEST} deep in one another")
-        links += len(item)  # before they are looked at: any number may lead to one object
+        links += len(item)  # counted first, because many links may lead to one object
         if links > MOST_OBJECTS:
             raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):

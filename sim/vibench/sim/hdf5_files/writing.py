@@ -1,4 +1,4 @@
-"""Writing an HDF5 file to a disk that may refuse: an error, never a crash and never a silent gap.
+"""Write an HDF5 file with reliable errors on a failing disk, without crashes and silent gaps.
 
 HDF5 2.0 crashes when it closes a file and a write fails, and h5py prints an error that it meets while it
 closes an object and goes on. So HDF5 writes to a file object that reports every write as done and keeps the
@@ -42,7 +42,7 @@ class _Disk(FileIO):
 def open_hdf5_to_write(
     path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
-    """Create (``x``) or change (``r+``) a file; raises OSError where the disk refuses any of it."""
+    """Create (``x``) or change (``r+``) a file; raises OSError if any write fails."""
     with _Disk(path, "x+" if mode == "x" else mode) as disk:
         try:
             with _interrupts(disk), h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
@@ -54,7 +54,7 @@ def open_hdf5_to_write(
 
 @contextmanager
 def _interrupts(disk: _Disk) -> Iterator[None]:
-    """Keep a KeyboardInterrupt of a signal as the refusal, and raise it at once only outside this module."""
+    """Store a KeyboardInterrupt during a write and raise it after closing the file."""
     is_reached = threading.current_thread() is threading.main_thread()
     found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
     handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}

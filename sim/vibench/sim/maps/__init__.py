@@ -1,8 +1,8 @@
-"""Maps: the motions there are over two parameters, over two coordinates of the start, or along one of them.
+"""Maps of motions over two parameters, over two coordinates of the start, or along one of them.
 
-A map is a `vibench.sim.study` plan whose points are settled motions: kind, period, responses, impacts. It is
-computed coarsely first and then only where neighbours differ; what is left out is filled in, and a random
-sample of it is computed after all, so that a map says how often filling in was wrong (docs/maps.md).
+A map is a `vibench.sim.study` plan whose points are settled motions: kind, period, responses, impacts. It
+is computed coarsely first, then where neighbours differ; the rest is filled in. A random sample of filled
+points is computed to estimate the error rate (docs/maps.md).
 
 >>> from vibench.sim.maps import Map, Range, solve_map
 >>> plan = Map(

@@ -1,4 +1,4 @@
-"""What a basin map says of its attractors: how rough their boundary is, and which kicks they survive."""
+"""Analysis of a basin map: uncertainty exponent of boundaries, and basin stability under kicks."""
 
 import math
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
 
 BLOCKS = 4
-"""Along each axis: the parts of a map that are left out one by one, to see how far an exponent scatters."""
+"""Parts along each axis for a jackknife of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Cells that must be uncertain at a distance for it to count."""
+"""Fewest uncertain cells at a distance to use it."""
 MOST_UNCERTAIN = 0.5
 """Largest share of all cells: beyond, neighbours are distinguished by their shares alone."""
 SPREAD = 4.0
@@ -105,10 +105,10 @@ def _slope(steps: Sequence[int], shares: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class KickStability:
-    """What becomes of a motion that is kicked: displacements and velocities of all masses at once."""
+    """Stability of a motion under kicks of all displacements and velocities."""
 
     motion: int
-    """Number of the motion in `MapResults.motion_numbers`."""
+    """Index of the motion in `MapResults.motion_numbers`."""
     size: float
     """Standard deviation of each displacement over the gap, and of each velocity over gap times 2 pi f."""
     returned: Share
@@ -129,7 +129,8 @@ def kick_stability(
     results
         A map in which only the start varies, complete.
     sizes
-        Of the kicks, drawn from a normal distribution (Menck, Heitzig, Marwan and Kurths, Nature Physics 9
+        Sizes of the kicks, drawn from a normal distribution (Menck, Heitzig, Marwan and Kurths, Nature
+        Physics 9
         (2013) 89, draw them from a box).
     kicks
         Of each size, at one instant of each motion: when the drive is where it was when a run ended.

@@ -1,4 +1,4 @@
-"""The points of a map as scenes: what each begins from, what is kept of it, and which are wanted."""
+"""Points of a map as scenes: their starts, stored results, and selection."""
 
 import math
 import os
@@ -36,7 +36,7 @@ from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
-"""Responses of neighbours that differ by more, relatively, are looked at more closely."""
+"""Relative difference of neighbouring responses that triggers refinement."""
 BASIN_JUMP = 2e-3
 """Where only the start varies, responses of one motion are the same except for what has not settled."""
 NOTHING = -1
@@ -44,11 +44,11 @@ NOBODY = -1
 
 
 BUNDLE_S = 0.3
-"""Worker time of scenes that are handed over together: lanes are full only if there are many."""
+"""Worker time of a bundle of scenes, large enough to fill SIMD lanes."""
 
 
 def map_solver(plan: Map) -> Solver:
-    """Choose what computes the points of a map: batches, or one point after the other.
+    """Return the solver of a map: SIMD batches, or point by point.
 
     Batches follow motions of one specimen that do not wait for each other, and pay where a processor has the
     registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one, as do
@@ -63,12 +63,12 @@ def map_solver(plan: Map) -> Solver:
 
 
 class MapPoints:
-    """The scenes of a map, made when they are asked for."""
+    """Scenes of a map, created on demand."""
 
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Asked here, and not of a plan, because files hold such maps of earlier versions.
+        # Checked here, not in the plan, because files contain such maps of earlier versions.
         of_start = [each.field for each in plan.varied if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
@@ -96,19 +96,19 @@ class MapPoints:
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
-        """Numbers of the points that are computed before anything is known."""
+        """Points of the first lattice."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Ask for the next cells of the lattice, from all their starts; for everything at once if told to."""
+        """Return the points of the next cells from all starts, or all points of a non-adaptive map."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
-        """Make the scene of a point whose predecessor, if it has one, is done."""
+        """Return the scene of a point whose predecessor, if any, is done."""
         before = continued_point(int(self.after[number]), arrays)
         place = self.grid.place(number)
         if before == NOBODY:
@@ -121,7 +121,7 @@ class MapPoints:
         )
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return what is kept of a prediction."""
+        """Return the stored results of a prediction."""
         found = solved.prediction
         numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
         cells: dict[str, Cell] = {
@@ -146,7 +146,7 @@ class MapPoints:
         )
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return what is kept of a scene that could not be computed."""
+        """Return the stored results of a failed scene."""
         return failed_point(number, error)
 
     def _cost_s(self, number: int, cost_s: Callable[[Scene, Solver], float]) -> float:
@@ -210,7 +210,7 @@ POINT_S = 2e-4
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """What a map will take; where it is adaptive, between its coarse lattice and all of its points."""
+    """Estimated time of a map; for an adaptive one, from its coarse lattice to all points."""
 
     points: int
     coarse_points: int
@@ -240,21 +240,21 @@ class MapEstimate:
 
     @property
     def first_s(self) -> float:
-        """Time until the first picture."""
+        """Time until the first lattice is done."""
         return self._elapsed_s(self.coarse_points, self.coarse_work_s)
 
     @property
     def most_useful_workers(self) -> int:
-        """More workers than this wait for the process that asked."""
+        """Number of workers above which they wait for the main process."""
         return max(1, math.floor(self.work_s / (self.points * POINT_S)))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
-        """Workers share the work; one process makes scenes and writes; the last point has no company."""
+        """Return the elapsed time: shared work, one main process, and the last point alone."""
         return max(work_s / self.workers + work_s / points, points * POINT_S)
 
     @property
     def sentence(self) -> str:
-        """Say it to a person."""
+        """Return the estimate as a sentence."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
             f"planned as {self.work_s:.2g} s of one core, as {self.known_from}. With "

@@ -1,4 +1,4 @@
-"""A map as it is asked for: numbers that are fixed, and one or two that vary."""
+"""Request for a map: fixed parameters, and one or two that vary."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -56,7 +56,7 @@ ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
-"""States once a drive period that are kept of a motion along one quantity, at most."""
+"""Most stored states per motion, one per drive period, along one quantity."""
 SECTION_COLUMNS = tuple(
     Column(f"section_{name}", "<f8", "m", f"{what} once a drive period", (), SECTION_STATES, "drive_period")
     for name, what in (("x", "displacement of m0"), ("p", "displacement of m1 against m2"))
@@ -83,13 +83,13 @@ _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
 
 
 def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Return which points came to the motion that nothing but the drive tells from rest."""
+    """Return which points have motions without impacts."""
     is_first = (arrays["motion"] == _PERIODIC) & (arrays["period"] == 1)
     return np.asarray(is_first & (arrays["impact_rate"] == 0.0))
 
 
 def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """Give the same number to motions of one kind and period; a motion without impacts has its own."""
+    """Return labels of motions by kind and period; motions without impacts have their own."""
     motion, period = (arrays[name].astype(np.int64) for name in ("motion", "period"))
     return np.where(without_impacts(arrays), _PERIODIC * LONGER, motion * LONGER + period)
 
@@ -111,7 +111,7 @@ def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None
 
 
 def section_cells(found: ScenePrediction) -> dict[str, Cell]:
-    """Take the last states once a drive period: as many as a motion has that repeats, else as are kept."""
+    """Return the last states once per drive period: one period of a repeating motion, else the maximum."""
     if found.section is None:
         return {}
     most = min(SECTION_STATES, found.period or SECTION_STATES)
@@ -123,7 +123,7 @@ def section_cells(found: ScenePrediction) -> dict[str, Cell]:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number of a scene that may be fixed or vary."""
+    """A parameter of a scene that may be fixed or vary."""
 
     field: str
     """Field of `Map`."""
@@ -156,7 +156,7 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""A file of 1 GB, and as much memory."""
+"""Most points: a file of 1 GB, and as much memory."""
 MOST_STEP = 16
 """Between the first points, where a map does not say."""
 FEWEST_STEPS = 8
@@ -166,7 +166,7 @@ RANDOM = "random"
 
 
 class Spacing(StrEnum):
-    """How the values of a range lie."""
+    """Spacing of the values of a range."""
 
     LINEAR = "linear"
     LOGARITHMIC = "logarithmic"
@@ -205,7 +205,7 @@ class Range(FrozenModel):
 
     @property
     def edges(self) -> tuple[float, ...]:
-        """Where the cells of its values meet, one more than there are values."""
+        """Edges of the cells of its values, one more than values."""
         if self.spacing is Spacing.LINEAR:
             half = 0.5 * (self.stop - self.start) / (self.points - 1)
             return tuple(np.linspace(self.start - half, self.stop + half, self.points + 1).tolist())
@@ -229,7 +229,7 @@ Positive = PositiveFloat | Range
 
 
 class Map(GridPlan):
-    """What motions there are: over two quantities, or along one. One or two fields are a `Range`."""
+    """Map of motions over two quantities or along one. One or two fields are a `Range`."""
 
     called: ClassVar[str] = "map"
     format: ClassVar[str] = "vibench-map"
@@ -255,16 +255,16 @@ class Map(GridPlan):
     hertz_stiffness: Positive | None = None
     """k of F = k d^(3/2) at a stop [N/m^1.5]."""
     x_m: Number = 0.0
-    """The start: displacements and velocities of m0, m1 and m2, absolute."""
+    """Start: absolute displacements and velocities of m0, m1 and m2."""
     y_m: Number = 0.0
     z_m: Number = 0.0
     vx_m_per_s: Number = 0.0
     vy_m_per_s: Number = 0.0
     vz_m_per_s: Number = 0.0
     chain: tuple[Literal[Start.UP, Start.DOWN], ...] = ()
-    """Instead of that start, the end of the point before it along the range: up, down, or both."""
+    """Start from the end of the previous point along the range: up, down, or both."""
     random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Random states beside it at every point: what tells how many motions there are, and their shares."""
+    """Random additional starts at every point, to find coexisting motions and their shares."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random states."""
     observe: tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...] = (Observable.RESPONSE,)
@@ -272,11 +272,11 @@ class Map(GridPlan):
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of every point."""
     error: TargetError | None = None
-    """Relative error that each point is to reach, 0.01 or "1 %"; the accuracy follows from it."""
+    """Requested relative error of each point, 0.01 or "1 %"; sets the accuracy."""
     time_s: TargetTime | None = None
-    """Time in which each point is answered as exactly as possible, 2 or "2 s"; a minute when absent."""
+    """Time limit per point, 2 or "2 s"; one minute by default."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
-    """Drive periods after which a motion that does not repeat is followed no longer."""
+    """Longest run in drive periods of a motion that does not repeat."""
     window_periods: Annotated[int, Field(ge=10)] = 200
     """Drive periods over which a motion that does not repeat is observed."""
     refinement: Refinement = Refinement.ADAPTIVE
@@ -320,7 +320,7 @@ class Map(GridPlan):
         return self
 
     def _refuse_unless_felt(self, quantity: Quantity) -> None:
-        """Refuse a range of what the contact law does not know: its picture would show chance, or nothing."""
+        """Refuse a range of a parameter that the contact law does not use."""
         if quantity not in OF_SPECIMEN:
             return
         span = self.range_of(quantity)
@@ -337,7 +337,7 @@ class Map(GridPlan):
 
     @property
     def varied(self) -> tuple[Quantity, ...]:
-        """What varies, one or two quantities: the first lies along the last axis."""
+        """The one or two varying quantities; the first is along the last axis."""
         return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
 
     def range_of(self, quantity: Quantity) -> Range:
@@ -348,7 +348,7 @@ class Map(GridPlan):
 
     @property
     def is_basin(self) -> bool:
-        """Whether only the start varies: every point is the same specimen under the same drive."""
+        """Whether only the start varies."""
         return all(each in START for each in self.varied)
 
     @property
@@ -358,7 +358,7 @@ class Map(GridPlan):
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether points may be left out: of two quantities, where none waits for its neighbour."""
+        """Whether points may be left out, for two quantities without chains."""
         may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
         return may_be and self.first_step > 1
 
@@ -390,9 +390,7 @@ class Map(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is kept of each point: errors only with a target, states once a drive period only along one
-        quantity.
-        """
+        """Stored columns: errors only with a target, sections only along one quantity."""
         errors = () if self.target is None else tuple(_OF_STUDIES[name] for name in ERRORS)
         return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
 

@@ -1,7 +1,7 @@
-"""Which cells of a map are computed: a coarse lattice first, then only where neighbours differ.
+"""Selection of the computed cells of a map: a coarse lattice first, then where neighbours differ.
 
-The plan is a pure function of what is known: it is made again from the coarse lattice on whenever all that it
-asked for has an answer. So a map that was stopped goes on to the same cells as one that never was.
+The plan is a pure function of the known results, recomputed from the coarse lattice whenever all requested
+cells are done. So a resumed map computes the same cells as an uninterrupted one.
 """
 
 from collections.abc import Iterator
@@ -17,13 +17,13 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Filled cells that are computed after all, drawn at random: they say how often filling in was wrong. This
-many at most, and this part of them at most."""
+"""Audit: largest number and share of filled cells, drawn at random, that are computed to find the error
+rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What is compared of the cells of a map, each array of shape (rows, columns)."""
+    """Compared quantities of the cells of a map, arrays of shape (rows, columns)."""
 
     is_known: Mask
     """Computed."""
@@ -37,7 +37,7 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """Cells of one level that were filled in: between which others, and how much each of those counts."""
+    """Filled cells of one level, with the cells and weights for interpolation."""
 
     cells: Indices
     """Flat numbers, shape (n,)."""
@@ -51,7 +51,7 @@ class Filling:
 
 @dataclass(frozen=True, eq=False)
 class RefinementPlan:
-    """What is to be computed now, and, once that is nothing, what was filled in."""
+    """Cells to compute next, and the filled cells once there are none."""
 
     missing: Indices
     """Flat numbers of the cells that are to be computed next."""
@@ -60,22 +60,22 @@ class RefinementPlan:
     fillings: tuple[Filling, ...] = ()
     """Coarse levels first."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Cells that would have been filled in, and were computed to see."""
+    """Audited cells: computed instead of filled in."""
     audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Computed cells whose motion these had been taken to have."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
-    """Return which cells are to be computed next; none when the map is done.
+    """Return the cells to compute next; none when the map is done.
 
     Parameters
     ----------
     seen
-        What is known so far.
+        Results so far.
     coarse
         Steps between the points of the first lattice, a power of 2.
     seed
-        Of the choice of cells that are audited.
+        Seed of the choice of audited cells.
     """
     shape = seen.is_known.shape
     sketch = _Sketch(seen)
@@ -108,7 +108,7 @@ def _audit_plan(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> 
 
 
 class _Sketch:
-    """The map as far as levels have been gone through: computed cells, and filled ones."""
+    """Computed and filled cells of the levels processed so far."""
 
     def __init__(self, seen: Seen) -> None:
         self.seen = seen
@@ -118,14 +118,14 @@ class _Sketch:
         self.donors = np.arange(seen.codes.size).reshape(seen.codes.shape)
 
     def compute(self, cells: Mask) -> None:
-        """Take these cells as they were computed."""
+        """Mark these cells as computed."""
         self.is_computed |= cells
         self.codes[cells] = self.seen.codes[cells]
         self.sizes[cells] = self.seen.sizes[cells]
         self.donors[cells] = np.flatnonzero(cells)
 
     def refine(self, fine: int, step: int) -> Mask:
-        """Go from a lattice to one twice as fine; gives the cells that have to be computed first, if any."""
+        """Refine a lattice by two; return the cells to compute first, if any."""
         cells = np.flatnonzero(lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step))
         corners, weights = _corners(self.codes.shape, cells, step)
         wanted = np.zeros_like(self.is_computed)
@@ -202,7 +202,7 @@ def _lines(length: int, step: int) -> Indices:
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return the cells on every so manyth line, the last line of the map included."""
+    """Return the cells on every n-th line, including the last line of the map."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found

@@ -1,4 +1,4 @@
-"""What a map has found: over its axes, computed or filled in, and which motions there are."""
+"""Results of a map over its axes, computed or filled in, and its motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
 
 @dataclass(frozen=True)
 class MapMotion:
-    """A motion that is found in a map, or at one of its points. Symmetric partners are one motion."""
+    """A motion of a map or of one of its points. Symmetric partners count as one motion."""
 
     motion: MotionKind
     period: int | None
@@ -40,7 +40,7 @@ class MapMotion:
 
 @dataclass(frozen=True)
 class Audit:
-    """How often filling in was wrong, on cells drawn at random from those filled in."""
+    """Error rate of filled cells, from a random sample."""
 
     filled: int
     """Cells of the map that were not computed, those that were audited among them."""
@@ -112,7 +112,7 @@ def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
 
 @dataclass(frozen=True, eq=False)
 class MapResults(GridResults[Map]):
-    """Everything that is known of a map. Axes in the order of ``plan.axes``."""
+    """Results of a map. Axes in the order of ``plan.axes``."""
 
     @property
     def is_complete(self) -> bool:
@@ -126,14 +126,14 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def audit(self) -> Audit | None:
-        """How often filling in was wrong; None of a map of which every point is computed, or not complete."""
+        """Error rate of filled cells; None if all points are computed or the map is incomplete."""
         if not (self.plan.is_adaptive and self.is_complete):
             return None
         return audit_of(self.motion_numbers, refinement_of(self.plan, dict(self.arrays)))
 
     @cached_property
     def motion_numbers(self) -> NDArray[np.int64]:
-        """Number of the motion that each point came to, over all axes; -1 where it is not known.
+        """Index of the motion of each point over all axes; -1 if unknown.
 
         Points have the same number if they are of one kind and period; motions without impacts have theirs.
         Where only the start varies the responses of periodic motions are distinguished too, so that each
@@ -148,7 +148,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motion_counts(self) -> Floats:
-        """How many motions the starts of each cell came to, NaN where none is known; starts are left out."""
+        """Number of motions in each cell over all starts; NaN if unknown."""
         shape = self.plan.grid.shape
         labels, sizes = self._labels.reshape(shape), self._sizes.reshape(shape)
         order = np.lexsort((sizes, labels), axis=-2)
@@ -248,7 +248,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the commonest the lowest number."""
+    """Renumber motions by frequency, the most common first."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")

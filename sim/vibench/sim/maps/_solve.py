@@ -1,4 +1,4 @@
-"""One call that makes a map: computed point by point as a study is, then filled in where it was left out."""
+"""Compute a map point by point, then fill in the rest."""
 
 from pathlib import Path
 from typing import Literal
@@ -47,12 +47,12 @@ def solve_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> MapResults:
-    """Compute a map, or what its file does not hold yet.
+    """Compute a map, or the missing part of its file.
 
     Parameters
     ----------
     plan
-        What is asked for.
+        The map.
     out
         The file that keeps the answers, ``NAME.h5``; in memory alone when None.
     existing
@@ -87,7 +87,7 @@ def compute_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute what a store misses of a map, until ``cancelled``, and fill in the rest.
+    """Compute the missing points of a map until ``cancelled``, and fill in the rest.
 
     The solver is `map_solver`.
     """
@@ -98,7 +98,7 @@ def compute_map(
 
 
 def fill_in(plan: Map, store: Store) -> None:
-    """Fill in what an adaptive map left out; what is filled already stays."""
+    """Fill in the points that an adaptive map left out."""
     if not plan.is_adaptive or np.all(store.arrays["state"] != PointState.MISSING):
         return
     found = refinement_of(plan, store.arrays)
@@ -111,7 +111,7 @@ def fill_in(plan: Map, store: Store) -> None:
 
 
 def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
-    """Give the cells of one level what their corners have, start by start."""
+    """Interpolate the cells of one level from their corners, for each start."""
     cells = points_of(filling.cells, plan.grid)
     starts = plan.grid.shape[-2]
     of_cells = points_of(filling.corners.reshape(-1), plan.grid).reshape(-1, 4, starts)
