@@ -129,9 +129,7 @@ class Pool:
         *args: Asked.args,
         **kwargs: Asked.kwargs,
     ) -> Job:
-        """Call ``function`` in a worker, for at most ``longest_s``; then ``on_answer`` or ``on_error``
-        here.
-        """
+        """Call ``function`` in a worker for at most ``longest_s``, then ``on_answer`` or ``on_error``."""
         work = partial(_without_parts, partial(function, *args, **kwargs))
         return self.begin(Job(work, _ignore, on_answer, on_error, self._longest_s))
 

@@ -22,8 +22,7 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most steps of flight in a run: seconds of work, two days of the paper's specimen. It limits specimens
-with far too fast modes."""
+"""Most steps of flight in a run: seconds of work, two days of the paper's specimen. """
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run: 0.5 GB for their times, allocated when they happen."""
 SPARE_IMPACTS = 100

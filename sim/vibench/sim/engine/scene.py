@@ -183,9 +183,7 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the case of m1 on a spring stop: a specimen with a spring parallel to k1 and another
-    equilibrium.
-    """
+    """Fill the case of m1 on a spring stop: a spring parallel to k1, with another equilibrium."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]

@@ -17,8 +17,7 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Audit: largest number and share of filled cells, drawn at random, that are computed to find the error
-rate."""
+"""Audit: largest number and share of filled cells that are computed to find the error rate."""
 
 
 @dataclass(frozen=True, eq=False)

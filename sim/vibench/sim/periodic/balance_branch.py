@@ -32,20 +32,20 @@ from .restoring_force import PowerSpring, RestoringForce
 from .shooting import SAMPLES, PeriodicOrbit
 
 TAIL = 4
-"""Left-out harmonics are judged up to this multiple of the highest one kept."""
+"""Neglected harmonics are checked up to this multiple of the highest one kept."""
 
 
 @dataclass(frozen=True)
 class BalanceOptions:
-    """How many harmonics, and how exactly."""
+    """Number of harmonics and tolerance."""
 
     kept: HarmonicSet = HarmonicSet.ODD
     fewest: int = 15
     """Highest harmonic of the first attempt."""
     most: int = 511
-    """Highest harmonic ever."""
+    """Highest harmonic allowed."""
     tolerance: float = 1e-4
-    """Part of the fundamental of p that the harmonics left out may move it by."""
+    """Largest relative change of the fundamental of p by neglected harmonics."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
@@ -59,7 +59,7 @@ class BalanceOptions:
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Where Newton's iteration begins: a motion of p in harmonics."""
+    """Start of Newton's iteration: a motion of p in harmonics."""
 
     harmonics: Harmonics
     relative: Complex
@@ -96,9 +96,9 @@ def balance(
     options: BalanceOptions = BalanceOptions(),
     start: Guess | None = None,
 ) -> Balance:
-    """Find one periodic motion of the drive's period, with as many harmonics as it needs.
+    """Find one periodic motion of the drive's period.
 
-    The number of harmonics doubles until those left out would move p by less than the tolerance.
+    The number of harmonics doubles until neglected ones change p by less than the tolerance.
 
     Parameters
     ----------
@@ -109,12 +109,12 @@ def balance(
     options
         Harmonics and tolerance.
     start
-        Which of several motions is found depends on it; `first_guess` when None. Strong contact needs
-        a near one, for instance a neighbour's or an integrated orbit's.
+        Start of the iteration, which selects one of several motions; by default `first_guess`. Strong
+        contact needs a near one, such as a neighbour's or an integrated orbit's.
 
     Returns
     -------
-    The motion; look at ``outcome`` first. After NO_SOLUTION its numbers are those of the best attempt.
+    The motion; check ``outcome`` first. After NO_SOLUTION it is the best attempt.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         msg = f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: both must be positive."
@@ -142,7 +142,7 @@ def balance(
 def balance_of_solution(
     problem: BalanceProblem, unknowns: np.ndarray, frequency_hz: float, amplitude_m: float, tolerance: float
 ) -> Balance:
-    """Turn a solution of the equations into motions of every mass, and judge what was left out."""
+    """Convert a solution to motions of every mass, with the truncation error."""
     omega = 2.0 * math.pi * frequency_hz
     harmonics, phasors = problem.harmonics, problem.phasors(unknowns)
     seen = condense(problem.structure, omega, harmonics)
@@ -171,7 +171,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Solutions of the balance at one number of harmonics; the last component is the parameter / scale."""
+    """Solutions with a fixed number of harmonics; the last component is the parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
@@ -212,7 +212,7 @@ class BalanceFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Twice the harmonics, the new ones of size zero."""
+        """Return the family with twice the harmonics, the new ones zero."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:

@@ -13,12 +13,11 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""A multiplier no further outside the unit circle than this lies on it, except for rounding: as all do
-without damping, where distances neither grow nor fall."""
+"""Rounding within which a multiplier counts as on the unit circle, as all do without damping."""
 
 
 class Parameter(StrEnum):
-    """What changes along a branch."""
+    """Parameter of a branch."""
 
     FREQUENCY = "frequency"
     """Drive frequency [Hz]."""
@@ -30,7 +29,7 @@ ParameterWord = Literal["frequency", "amplitude"]
 
 
 class BifurcationKind(StrEnum):
-    """What a special point of a branch is."""
+    """Kind of a special point of a branch."""
 
     FOLD = "fold"
     """The branch turns back: a swept response jumps here. One multiplier is +1."""
@@ -54,7 +53,7 @@ class BranchEvent:
     state: Floats
     """Displacements and velocities at the drive's time zero, shape (2 n,): to go on from there."""
     index: int
-    """It lies after this point of the branch, and before the next."""
+    """Index of the point of the branch before it."""
 
     def parameter(self, parameter: Parameter) -> float:
         """Frequency [Hz] or amplitude [m]."""
@@ -63,7 +62,7 @@ class BranchEvent:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Periodic motions in the order in which the branch runs through them; m points, n displacements."""
+    """A branch of periodic motions in order; m points, n displacements."""
 
     parameter: Parameter
     frequencies_hz: Floats
@@ -80,15 +79,15 @@ class Branch:
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Error estimate of each point as part of the fundamental of p, shape (m,): of a balance by the harmonics
-    left out, of a shot motion by how far it is from coming back."""
+    """Error estimate of each point relative to the fundamental of p, shape (m,): by neglected harmonics for
+    a balance, by the closure error for shooting."""
     contacts: NDArray[np.int64]
     """Contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]
     end: ArcEnd
-    """Why the branch was left at its last point."""
+    """Reason why the branch ends at its last point."""
     begin: ArcEnd | None = None
-    """Why it was left at its first, where it was followed both ways; None where it was started there."""
+    """Reason why it ends at its first point, if followed both ways; None if started there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
@@ -97,7 +96,7 @@ class Branch:
 
     @property
     def parameters(self) -> Floats:
-        """The one that changes, shape (m,)."""
+        """Values of the parameter, shape (m,)."""
         return self.frequencies_hz if self.parameter is Parameter.FREQUENCY else self.amplitudes_m
 
 
@@ -111,10 +110,10 @@ POINTWISE = (
     "left_out",
     "contacts",
 )
-"""Fields of a branch with one row a point."""
+"""Fields of a branch with one row per point."""
 
 
-# What happens to a periodic motion between two points of a branch, read off its Floquet multipliers.
+# Bifurcations between two points of a branch, from Floquet multipliers.
 #
 # Each test is a real number that changes sign: a multiplier passes -1 (product of mu + 1), a pair passes
 # the unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34
@@ -136,7 +135,7 @@ class Symmetry(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class OrbitSigns:
-    """What decides about events at one point of a branch."""
+    """Test functions for events at one point of a branch."""
 
     multipliers: Complex
     """Multipliers of the half map if mirrored, else of the period; shape (2 n,)."""
@@ -144,11 +143,11 @@ class OrbitSigns:
     """Crossings of the stops in a period."""
     symmetry: Symmetry
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """How far the motion is from a simpler one that such a branch may join, shape (6,); empty for none."""
+    """Distance from a simpler motion that the branch may join, shape (6,); empty for none."""
     joins: BifurcationKind | None = None
-    """What happens on the simpler one's branch where they are one."""
+    """Bifurcation on the simpler branch where both join."""
     grazing_distance: float = math.inf
-    """How far a contact is from beginning or ending, over the gap or the gap times 2 pi f."""
+    """Distance of a contact from its start or end (grazing), over the gap or the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -177,7 +176,7 @@ class OrbitSigns:
 
 
 def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[BifurcationKind]:
-    """Name what happens between two neighbouring points; folds apart."""
+    """Return the bifurcations between two neighbouring points, except folds."""
     found = []
     if before.contacts != after.contacts:
         found.append(BifurcationKind.GRAZING)
@@ -196,7 +195,7 @@ IS_SIMPLER = 1e-7
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Say whether a motion passed through a simpler one between two neighbouring points: its twin follows."""
+    """Return whether a motion passed through a simpler one between two points, so that its twin follows."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0
@@ -205,7 +204,7 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
-    """Return the number whose change of sign is the happening."""
+    """Return the test function of a kind, which changes sign at the event."""
     match kind:
         case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0

@@ -1,4 +1,4 @@
-"""Follow any family of periodic motions along a parameter, and gather what is on the way into a branch."""
+"""Follow any family of periodic motions along a parameter, and collect a branch."""
 
 import math
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class DrivePath(Protocol):
 
     @property
     def parameter(self) -> Parameter:
-        """What the number along the path is."""
+        """Parameter along the path."""
         ...
 
     def drive(self, value: float) -> tuple[float, float]:
@@ -44,12 +44,12 @@ class DrivePath(Protocol):
 
 @dataclass(frozen=True)
 class FrequencyPath:
-    """Along frequency, at one amplitude or at one that depends on frequency as it was recorded."""
+    """Path along frequency, with a constant amplitude or a recorded level."""
 
     amplitudes_m: tuple[float, ...]
-    """One for every frequency; a single one is held throughout."""
+    """One for every frequency; a single one is constant."""
     frequencies_hz: tuple[float, ...] = ()
-    """Ascending; between them the amplitude is a monotone cubic, outside of them that of the nearest."""
+    """Ascending; the amplitude is a monotone cubic between and constant outside."""
 
     def __post_init__(self) -> None:
         given = max(1, len(self.frequencies_hz))
@@ -112,7 +112,7 @@ class AmplitudePath:
 
 
 def path_from(parameter: Parameter, frequency_hz: float, amplitude_m: float) -> DrivePath:
-    """Hold the one and change the other."""
+    """Return the path along one parameter with the other constant."""
     if parameter is Parameter.FREQUENCY:
         return FrequencyPath((amplitude_m,))
     return AmplitudePath(frequency_hz)
@@ -126,7 +126,7 @@ def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class OrbitReport:
-    """What a branch keeps of one point."""
+    """Results of one point of a branch."""
 
     frequency_hz: float
     amplitude_m: float
@@ -182,7 +182,7 @@ RANGE_LENGTH = 10.0
 def branch_range(
     parameter: Parameter, frequency_hz: float, amplitude_m: float, stop: float
 ) -> tuple[float, float]:
-    """Give the value at which a branch to ``stop`` starts, and how much of it is a unit of length [Hz, m]."""
+    """Return the start of a branch to ``stop``, and its unit of length [Hz, m]."""
     value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
     if not 0.0 < stop < math.inf or stop == value:
         msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
@@ -191,12 +191,12 @@ def branch_range(
 
 
 def parameter_value(path: DrivePath, drive: Harmonic) -> float:
-    """Read where on a path a drive lies [Hz, or m]."""
+    """Return the parameter of a drive on a path [Hz, or m]."""
     return drive.frequency_hz if path.parameter is Parameter.FREQUENCY else drive.amplitude_m
 
 
 def range_scale(low: float, high: float, value: float) -> float:
-    """Return how much of a range [Hz, or m] is a unit of length."""
+    """Return the unit of length of a range [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         msg = f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
         raise ValueError(msg)
@@ -206,7 +206,7 @@ def range_scale(low: float, high: float, value: float) -> float:
 def follow(
     family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Branch:
-    """Follow a family from a point on it; the resolution rises where the error estimate asks for it.
+    """Follow a family from a point on it; refine the resolution if the error estimate requires it.
 
     Parameters
     ----------
@@ -236,18 +236,18 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""A branch lost with a contact this close to beginning or ending, over the gap, is lost by grazing."""
+"""Distance from grazing, relative to the gap, at which a lost branch ends by grazing."""
 
 
 def _end_branch(gathered: _Gathered, parameter: Parameter) -> Branch:
-    """End a branch that no step goes on from; at a rigid stop grazing does that, and is named."""
+    """End a branch that cannot be continued, and name grazing at a rigid stop."""
     if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
         gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
     return _branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT)
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
-    """Follow a family from a point on it to both ends; a branch that closes on itself, once round."""
+    """Follow a family from a point to both ends; a closed branch once."""
     onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
@@ -260,7 +260,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
 
 
 def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Turn one branch round and put it before another that begins at the same point."""
+    """Reverse a branch and join it to another from the same point."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
@@ -280,13 +280,13 @@ def _follow_at(
     steps: ArcSteps,
     gathered: _Gathered,
 ) -> tuple[ArcEnd | None, ArcPoint]:
-    """Follow at one resolution; gives why the branch ended (None: a finer one should go on), and where."""
+    """Follow at one resolution; return why (None: continue finer) and where the branch ended."""
     points = trace(family, start, toward, bounds, steps)
     before = next(points)
     first = family.report(before.point)
     signs = first.signs
     if not gathered.reports:
-        # Elsewhere the point at which a finer resolution took over is known already.
+        # The first point is known already if a finer resolution took over.
         gathered.reports.append(first)
     for here in points:
         if here.end is ArcEnd.STEP_TOO_SHORT:
@@ -319,7 +319,7 @@ def _add_simpler_end(
     steps: ArcSteps,
     gathered: _Gathered,
 ) -> None:
-    """End a branch on the simpler motion through which it would turn into its own twin."""
+    """End a branch on the simpler motion, after which its twin follows."""
 
     def measure(point: ArcPoint) -> float:
         return float(family.report(point.point).signs.apart @ signs.apart)

@@ -30,22 +30,22 @@ class Curve(Protocol):
 
 @dataclass(frozen=True)
 class ArcSteps:
-    """How finely a curve is followed."""
+    """Step lengths and tolerances."""
 
     first: float = 0.01
     """First step, along the curve."""
     longest: float = 0.05
     shortest: float = 1e-7
-    """A curve that needs a shorter step is given up."""
+    """Shortest step."""
     most_turn_rad: float = 0.3
-    """A step across which the tangent turns more is tried again, shorter."""
+    """Largest turn of the tangent in a step."""
     tolerance: float = 1e-10
     """Largest residual of a point on the curve."""
     most_points: int = 2000
 
 
 class ArcEnd(StrEnum):
-    """Why a curve was left."""
+    """Reason for the end of a curve."""
 
     REACHED_BOUND = "the parameter reached an end of its range"
     CLOSED = "the branch closed on itself: an isolated one"
@@ -76,15 +76,14 @@ NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
 """A step corrected in fewer iterations is followed by a longer one."""
 FARTHEST_ASIDE = 0.5
-"""A step corrected by more than this part of its length found another branch: the most that the tangent may
-turn moves the curve aside by a third of that."""
+"""Largest correction relative to the step; a larger one found another branch."""
 LEAP_GROWTH = 10.0
 """Factor between the lengths tried at a kink."""
 LONGEST_LEAP = 5.0
-"""A leap that lands further away than this many times its length found another branch."""
+"""Largest correction of a leap relative to its length."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
-"""What is sought (a tangent's component, a multiplier's distance) counts as zero below this."""
+"""Tolerance of test functions (a tangent's component, a multiplier's distance)."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
 """A curve that is followed in steps below this many of the shortest, this many in a row, is at a kink."""
 NEAR_START = 0.2
@@ -208,7 +207,7 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
 
 
 def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
-    """Return whether the step from one point to the next went through the start of the curve."""
+    """Return whether a step passed through the start of the curve."""
     step = ahead.point - here.point
     length = float(np.linalg.norm(step))
     part = float((start.point - here.point) @ step) / length**2
@@ -218,7 +217,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # The curve's own point across the start: another sheet of it may lie as near.
+    # Compare points of this curve, because another sheet may be as near.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
@@ -246,7 +245,7 @@ def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Factor from this step to the next, by how hard it was and how much the curve bends."""
+    """Return the factor to the next step, from the iterations and the turn."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))
@@ -265,7 +264,7 @@ def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSte
 
 
 class Measure(Protocol):
-    """A number that changes sign where something happens."""
+    """A test function that changes sign at an event."""
 
     def __call__(self, point: ArcPoint, /) -> float:
         """Evaluate at a point on the curve."""
@@ -320,7 +319,7 @@ def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance
 def _at_bound(
     curve: Curve, before: ArcPoint, after: ArcPoint, bounds: tuple[float, float], steps: ArcSteps
 ) -> ArcPoint:
-    """End exactly on the bound that was passed."""
+    """Return the point exactly on the passed bound."""
     bound = bounds[0] if after.point[-1] <= bounds[0] else bounds[1]
     span = after.point[-1] - before.point[-1]
     part = (bound - before.point[-1]) / span if span != 0.0 else 1.0

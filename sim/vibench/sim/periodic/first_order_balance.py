@@ -114,9 +114,9 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """False on the middle one of three branches, which no experiment sees.
+    """False on the middle one of three branches, which no experiment shows.
 
-    It says nothing of other instabilities: `vibench.sim.periodic` does.
+    Other instabilities are not included; see `vibench.sim.periodic`.
     """
 
 
@@ -128,7 +128,7 @@ def first_order_states(
     Parameters
     ----------
     structure, spring
-        What is shaken: `vibench.sim.periodic.harmonic_balance.structure_of` a specimen, and its power law.
+        Result of `vibench.sim.periodic.harmonic_balance.structure_of`, and the power law.
     frequency_hz, amplitude_m
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
 

@@ -1,8 +1,9 @@
-"""Is a periodic motion stable? Floquet multipliers from the variational equation along it. SI units.
+"""Stability of a periodic motion: Floquet multipliers from the variational equation. SI units.
 
 Small departures d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
-e = dF/d(dp/dt) along the motion; what one period makes of them is the monodromy matrix, whose eigenvalues
-decide (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Free stretches are one
+e = dF/d(dp/dt) along the motion; their map over one period is the monodromy matrix, whose eigenvalues
+determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Free
+stretches are one
 matrix exponential each; contacts begin and end exactly where p reaches a stop, and are crossed by
 fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253) that crowd at both ends, where
 the stiffness of a Hertz contact starts like a square root.
@@ -61,7 +62,7 @@ def multipliers(monodromy: NDArray[np.float64]) -> Complex:
 def transition(
     structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
-    """Find what the first ``span_rad`` of a period make of small departures (d, d'), shape (2 n, 2 n)."""
+    """Return the transition matrix of small departures (d, d') over ``span_rad``, shape (2 n, 2 n)."""
     system, spring_in = _state_form(structure)
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
     period = 1.0 / motion.frequency_hz

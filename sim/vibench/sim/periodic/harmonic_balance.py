@@ -2,9 +2,8 @@
 
 P_k + compliance_k F_k(P) = linear_k U for every harmonic kept (`vibench.sim.periodic`), the
 force by the alternating frequency-time scheme (`vibench.sim.periodic`), solved by damped
-Newton iteration with the exact Jacobian. Contact needs many harmonics (51 to 400); power laws need few. How
-many is decided by what the harmonics left out would have added, so that an answer that has not converged
-says so.
+Newton iteration with the exact Jacobian. Contact needs many harmonics (51 to 400); power laws need few. The
+effect of neglected harmonics determines the number, and shows whether the result has converged.
 """
 
 import math
@@ -228,7 +227,7 @@ ROUNDING = 1e-12
 
 
 class HarmonicSet(StrEnum):
-    """Which harmonics a solution may have."""
+    """Harmonics of a solution."""
 
     ODD = "odd"
     """Motions that mirror themselves after half a period: all that a symmetric specimen begins with."""
@@ -237,7 +236,7 @@ class HarmonicSet(StrEnum):
 
 
 class BalanceEnd(StrEnum):
-    """Whether a solution can be trusted, and what to change."""
+    """Outcome of a balance, with advice."""
 
     CONVERGED = "converged"
     TOO_FEW_HARMONICS = "the harmonics left out still matter: allow more, or loosen the tolerance"
@@ -320,7 +319,7 @@ def _real(phasors: Complex, harmonics: Harmonics) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """A periodic motion in harmonics, and how far to trust it."""
+    """A periodic motion in harmonics, with an error estimate."""
 
     frequency_hz: float
     amplitude_m: float
@@ -330,7 +329,7 @@ class Balance:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (m, n) [m]."""
     left_out: float
-    """What the force harmonics left out would have moved p by, over its fundamental: an error estimate."""
+    """Error estimate: effect of neglected force harmonics on p, relative to its fundamental."""
     outcome: BalanceEnd
 
     @property
@@ -365,7 +364,7 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
 
 
 def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
-    """Damped Newton iteration: a step is halved until the residual falls. Gives unknowns and success."""
+    """Solve by damped Newton iteration, halving steps; return unknowns and success."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearised(unknowns, omega, amplitude_m)
     error = _size(residual)

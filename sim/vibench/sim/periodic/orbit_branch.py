@@ -41,7 +41,7 @@ class OrbitFamily:
 
     @property
     def tolerance(self) -> float:
-        """None: the flow is exact, nothing can be left out."""
+        """None, because the flow is exact."""
         return math.inf
 
     @property
@@ -58,7 +58,7 @@ class OrbitFamily:
         return point[:-1] * self.scales
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """How far the motion goes in a period, and the derivatives by state and parameter."""
+        """Return the closure error over a period, and its derivatives by state and parameter."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state, own = self.drive_at(point), self.state_at(point), self.scales
@@ -102,7 +102,7 @@ class OrbitFamily:
 def periodic_branch(
     orbit: PeriodicOrbit, parameter: Parameter | ParameterWord, stop: float, steps: ArcSteps = ORBIT_STEPS
 ) -> Branch:
-    """Follow a periodic motion along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.
+    """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
     The branch ends at ``stop``, or back at its start's value where it turned round. Pseudo-arclength
     continuation (Keller 1977): steps along the curve, so that folds are passed.
@@ -136,8 +136,8 @@ def periodic_branch_within(
 
     Returns
     -------
-    The whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` say why it was
-    left at both ends. A branch that closed on itself has been gone round once.
+    The whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` are the
+    reasons for its ends. A closed branch is followed once.
 
     Raises
     ------

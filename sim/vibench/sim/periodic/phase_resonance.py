@@ -32,10 +32,9 @@ LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
 """A change of the frequency by this share counts as one unit of length."""
 FARTHEST = 20.0
-"""Units of length from the start, in frequency or level, beyond which an iteration has gone astray."""
+"""Largest distance of an iteration from the start, in units of frequency or level."""
 STRAYED = 1e3
-"""A state this many gaps away is none: an iteration that tries it has gone astray. On a hard spring it would
-swing many millions of times a period, and its run take minutes."""
+"""Largest state of an iteration in gaps; on a hard spring, larger ones would take minutes."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
 """Step of the differences by which the phase's slopes are taken, over each unknown's scale."""
@@ -77,7 +76,7 @@ class PhaseResonanceFamily:
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """How far the motion goes in a period and the phase is off, with the derivatives, shape (7, 8)."""
+        """Return the closure error over a period, the phase error, and their derivatives, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state, own = self.drive_at(point), point[:6] * self.scales, self.scales
@@ -94,7 +93,7 @@ class PhaseResonanceFamily:
         return np.append(gone, off), np.vstack([np.column_stack([by_state, by_frequency, by_level]), slopes])
 
     def _off(self, point: Vector) -> float:
-        """Sine of the angle by which the phase of x over the base is off."""
+        """Return the sine of the error of the phase of x over the base."""
         run = self.mapping.orbit(point[:6] * self.scales, self.drive_at(point), SAMPLES)
         count = self.mapping.periods * SAMPLES
         # The base A0 sin(w t) has the phasor -i A0.

@@ -1,7 +1,4 @@
-"""The nonlinear spring between m1 and m2 as a smooth function: its force, and the slopes of it. SI units.
-
-What harmonic balance and stability need of a contact law, whole arrays at a time.
-"""
+"""The nonlinear spring between m1 and m2: force and derivatives. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -106,7 +103,7 @@ class GapSpring:
     loss: float = 0.0
     """Hunt and Crossley's lambda over k [s/m]."""
     beside: float = 0.0
-    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
+    """Stiffness of a linear spring parallel to the stop [N/m]."""
 
     def __post_init__(self) -> None:
         if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
@@ -189,7 +186,7 @@ class NoForce:
 
 
 def spring_of(specimen: Specimen) -> RestoringForce:
-    """Turn a specimen's stops into the function that harmonic balance needs.
+    """Return the restoring force of a specimen's stops for harmonic balance.
 
     Raises ValueError when the stops are rigid, whose force is not finite.
     """

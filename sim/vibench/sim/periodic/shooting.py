@@ -28,7 +28,7 @@ from .branch import NEUTRAL, BifurcationKind, OrbitSigns, Symmetry
 from .floquet import multipliers
 from .harmonic_balance import phasors_of
 
-# What a whole or half period makes of a state, exactly, and of a small change of it. SI units.
+# Exact map of a state over a whole or half period, with derivatives. SI units.
 #
 # A mirrored motion comes back with all signs changed after half a drive period, so that it is a fixed point
 # of the half map: the flow over half a period, then the mirror. The derivative by the state is exact: it is
@@ -44,12 +44,12 @@ OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0,
 
 
 class OrbitShape(StrEnum):
-    """How a periodic motion repeats."""
+    """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """Its mirror image after half an odd number of drive periods; needs equal stops."""
+    """Mirrored after half an odd number of drive periods; needs equal stops."""
     REPEATED = "repeated"
-    """Itself after a whole number of drive periods."""
+    """Repeated after a whole number of drive periods."""
 
 
 OrbitShapeWord = Literal["mirrored", "repeated"]
@@ -88,7 +88,7 @@ class PeriodMap:
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
-        """State that the map makes of ``state``, shape (6,), at the drive's phase zero; NaN if lost."""
+        """Return the image of ``state``, shape (6,), at the drive's phase zero; NaN if lost."""
         if not self._may_start(state):
             return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)
@@ -129,7 +129,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
 
     def _may_start(self, state: Vector) -> bool:
-        """Refuse a start behind a rigid stop: an iteration that tries one has gone astray."""
+        """Return whether a start is not beyond a rigid stop, as in a diverging iteration."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -153,7 +153,7 @@ class PeriodMap:
 NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8
 RETURNED = 1e-9
-"""A motion is periodic when it comes back this close, over the state's scale."""
+"""Largest closure error of a periodic motion, over the state's scale."""
 FLOW_ERROR = 1e-10
 """Of a period at reference accuracy, over the state's scale: measured at a tenth of it (docs/accuracy.md)."""
 SAMPLES = 4096
@@ -163,7 +163,7 @@ SETTLING_PERIODS = 400
 
 
 class ShootingEnd(StrEnum):
-    """Whether a periodic motion was found, and what to change."""
+    """Outcome of shooting, with advice."""
 
     CONVERGED = "converged"
     NO_ORBIT = "no periodic motion near the start: start elsewhere, or ask for another shape or period"
@@ -179,10 +179,9 @@ class PeriodicOrbit:
     """x, y, z, vx, vy, vz at the drive's time zero, shape (6,)."""
     signs: OrbitSigns
     defect: float
-    """How far from itself the motion comes back, over the state's scale."""
+    """Closure error over the state's scale."""
     error: float
-    """How far the true motion may be, as part of the fundamental of p: the defect and the error of the flow,
-    multiplied as the map multiplies them. It grows beyond all bounds at a fold."""
+    """Error bound relative to the fundamental of p: closure and flow error, amplified by the map."""
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
@@ -225,7 +224,7 @@ def periodic_orbit(
 
     Returns
     -------
-    The motion; look at ``outcome`` first.
+    The motion; check ``outcome`` first.
 
     Raises
     ------
@@ -257,7 +256,7 @@ def periodic_orbit(
 def _damped_step(
     mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
 ) -> tuple[Vector, Vector, bool]:
-    """Halve the step until the motion comes back closer; gives the state, how far it goes, and success."""
+    """Halve the step until the closure error falls; return the state, the error, and success."""
     scales = state_scales(mapping.specimen, drive)
     for halving in range(MOST_HALVINGS):
         trial = state - 0.5**halving * step
@@ -317,7 +316,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
 
 
 def _missing(derivative: Table, gone: Vector) -> float:
-    """Bound how far the true motion is: the errors of flow and return, through the inverse of the map."""
+    """Return the error bound: errors of flow and closure, through the inverse of the map."""
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
@@ -365,7 +364,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
 
 
 class PhaseReference(StrEnum):
-    """Which motion of m0 has the phase of a resonance."""
+    """Motion of m0 that defines a phase resonance."""
 
     RELATIVE = "relative"
     """Against the base: of the lowest mode, and wherever contacts leave little of the motion."""

@@ -1,7 +1,7 @@
-"""A scene answered with its error: what is shaken, what is to be seen, how it is run, how far to trust it.
+"""Solve a scene with an error estimate.
 
-`Scene` holds specimen, drive, start, duration, observables and accuracy. `plan_scene` decides beforehand
-whether a closed form suffices and what has to be carried along; `solve_scene` runs it and measures the
-integration error against stricter steps and the scatter of chaotic windows (docs/accuracy.md). The answer,
-`ScenePrediction`, is one flat frozen value. Many scenes at once are the business of `study`.
+`Scene` contains specimen, drive, start, duration, observables and accuracy. `plan_scene` decides in advance
+whether a closed form suffices. `solve_scene` runs the scene and measures the integration error by stricter
+steps, and the scatter of chaotic windows (docs/accuracy.md). The result, `ScenePrediction`, is one flat
+frozen value. Use `study` for many scenes.
 """

@@ -1,6 +1,6 @@
-"""What runs of a scene's kind take on this machine: learnt from each, or tried where a scene has a target.
+"""Expected run times on this machine: learnt from previous runs, or from a pilot where a scene has a target.
 
-A ledger keeps, for every kind of run, what runs took over what was planned: its mean, and its scatter.
+A ledger keeps mean and scatter of actual over planned time for every kind of run.
 """
 
 import atexit
@@ -28,13 +28,13 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""This many runs later a run counts for a third of a new one."""
+"""Number of runs after which the weight of a run falls to a third."""
 SURPRISE = math.log(2.5)
-"""One run counts as farther off than this by no more: which motion is reached may be chance."""
+"""Limit of the deviation of one run, because the reached motion may be random."""
 FEWEST = 3
-"""Runs of a kind without which nothing is said of its scatter."""
+"""Fewest runs of a kind for an estimate of its scatter."""
 UNKNOWN_FACTOR = 10.0
-"""How far a plan may be off on a machine of which nothing is known."""
+"""Factor of uncertainty on an unknown machine."""
 LEAST_FACTOR = 1.5
 SURE, FEW = 2.0, 1.6
 """Standard deviations within which 19 of 20 runs are, and what is added where they are known from few
@@ -44,14 +44,14 @@ SAVED_EVERY_S = 5.0
 
 @dataclass(frozen=True)
 class _Kind:
-    """What runs of one kind have taken, in logarithms of what was planned."""
+    """Logarithms of actual over planned time for one kind."""
 
     runs: int = 0
     mean: float = 0.0
     variance: float = 0.0
 
     def off(self, ratio: float) -> float:
-        """Return how far one run is off, in logarithms; all of it while little is known."""
+        """Return the logarithmic deviation of one run, limited once enough runs are known."""
         off = math.log(ratio) - self.mean
         return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
 
@@ -65,21 +65,21 @@ class _Kind:
 
 @dataclass(frozen=True)
 class Expected:
-    """How long work will take."""
+    """Expected time of a job."""
 
     time_s: float
     """On one core of this machine."""
     factor: float
-    """19 of 20 runs of this kind took between this part and this multiple of it."""
+    """Factor that contains 19 of 20 runs of this kind."""
     runs: int
-    """From which it is known; 0 where nothing was measured yet."""
+    """Number of runs behind the estimate; 0 without any."""
 
     def __str__(self) -> str:
-        """Say it to a reader."""
+        """Return the estimate as text."""
         learnt = (
             f"as {self.runs} such runs took on this machine"
             if self.runs >= FEWEST
-            else "on a machine on which too few such runs were made to know better"
+            else "from too few such runs on this machine"
         )
         return (
             f"Estimated time on one core: {self.time_s:.1g} s within a factor of {self.factor:.2g}, {learnt}."
@@ -87,7 +87,7 @@ class Expected:
 
 
 class CostLedger:
-    """What runs have cost, by kind; one for all threads of a process."""
+    """Run times by kind, shared by all threads of a process."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -96,7 +96,7 @@ class CostLedger:
         self._saved_s = time.monotonic()
         self._is_new = False
         self._lately = deque[float](maxlen=MEMORY)
-        """How far the last runs of any kind were off: a machine that is slower now slows all kinds."""
+        """Recent deviation of all kinds, because a slower machine affects all."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
         """Return how long planned work of a kind will take here; a new kind as what its name begins with."""
@@ -110,7 +110,7 @@ class CostLedger:
         return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Note what a run took in a process that was prepared for its kind."""
+        """Record the time of a run in a process prepared for its kind."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
@@ -124,13 +124,13 @@ class CostLedger:
             self.save()
 
     def _known(self, kind: str) -> _Kind:
-        """Return what is known of a kind, or else of what its name begins with."""
+        """Return the data of a kind, or of the longest known prefix of its name."""
         enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
         return next((each for each in enough if each.runs >= FEWEST), _Kind())
 
     @property
     def _drift(self) -> float:
-        """How far the last runs of all kinds were off together; 0 unless that is certain."""
+        """Return the common recent deviation of all kinds; 0 unless significant."""
         if len(self._lately) < MEMORY:
             return 0.0
         mean = math.fsum(self._lately) / MEMORY
@@ -138,7 +138,7 @@ class CostLedger:
         return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
 
     def save(self) -> None:
-        """Keep what is new; where the folder cannot be written to, the next process begins again."""
+        """Save new data; ignore a folder that cannot be written."""
         with self._lock:
             self._saved_s = time.monotonic()
             if not self._is_new:
@@ -152,13 +152,13 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Return a kind, ``a/b/c``, and all that it begins with."""
+    """Return a kind, ``a/b/c``, and all its prefixes."""
     parts = kind.split("/")
     return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
 
 
 def _read(path: Path) -> dict[str, _Kind]:
-    """Read what was kept; nothing where there is no such file, or its content is not what is kept."""
+    """Read the saved data; empty without a valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         known = {
@@ -229,7 +229,7 @@ def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
 
 
 def _expected_cost(plan: ScenePlan, solver: Solver, planned_s: float) -> Expected:
-    """Go by what a solver's runs took, or else by those of `solve_scene`, which takes longest."""
+    """Return the expected time from a solver's runs, else from those of `solve_scene`."""
     own = cost_ledger().expected(_kind(plan, solver), planned_s)
     return own if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s)
 

@@ -1,7 +1,7 @@
-"""The course of a scene's motion: for a given time (`FixedCourse`), or until it settles (`SettlingCourse`).
+"""Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
-Both are gone through in three steps, so that many scenes can be followed side by side: first `way` is
-followed; `watch` then looks more closely, and returns what is to be followed on; `seen` observes the end. In
+Both have three steps, so that many scenes can run side by side: `way` is followed first, `watch` then
+classifies and returns any further motion to follow, and `seen` observes the end. In
 between, `StatesAlone.follow` follows one motion, `in_batches` those of many scenes. SI units.
 """
 
@@ -35,7 +35,7 @@ from .states_alone import StatesAlone
 
 @dataclass(frozen=True, eq=False)
 class SceneRun:
-    """A run's end, and what was learnt on the way."""
+    """End of a run and its findings."""
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
@@ -47,7 +47,7 @@ class SceneRun:
     settled_s: float | None
     """When it was known to be settled; None where that was not looked for, or not found."""
     ended: str
-    """Why it was followed no longer."""
+    """Reason for its end."""
     path: tuple[Stretch, ...]
     """From its beginning until it had settled, or until a small change had certainly grown without end."""
     grew: bool
@@ -60,7 +60,7 @@ class SceneRun:
 
 
 class FixedCourse:
-    """A motion at time zero that is followed for a given time and observed at its end.
+    """Run of a motion for a given time, observed at its end.
 
     It is looked at once a drive period. Where it has not started to repeat by the time that it should have
     forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
@@ -73,14 +73,14 @@ class FixedCourse:
 
     @property
     def way(self) -> StatesAlone | None:
-        """Motion up to where it should have settled; None where it is followed without looking."""
+        """Motion until it should have settled; None if followed without checks."""
         return self._lead.states
 
     def watch(self) -> None:
-        """Nothing more is to be followed."""
+        """Return nothing more to follow."""
 
     def seen(self) -> SceneRun:
-        """Observe the end of it."""
+        """Observe its end."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
         last = follow_with_section(run, duration.duration_s - duration.window_s)
@@ -92,7 +92,7 @@ class FixedCourse:
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # Its period was found only now: the window is gone through once more, for lines that do not leak.
+            # Its period was found only now, so the window is repeated for lines without leakage.
             begins = window.begins.apart()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
@@ -107,7 +107,7 @@ class FixedCourse:
 def classify(
     run: FollowedRun, window: ObservedWindow, before: Sequence[Stretch], pace: Pace, ended: str
 ) -> SceneRun:
-    """Return what a motion is, from its window and the stretches before it.
+    """Return the kind of a motion from its window and the stretches before it.
 
     Those before it that were watched are blocks as long as the window's own.
     """
@@ -138,7 +138,7 @@ LONGEST_SLICE = 1 << 16
 
 
 class Lead:
-    """A motion advanced to an instant, with some of its states on the way.
+    """A motion advanced to an instant, with some of its states.
 
     What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
     steps follow one another without a break nothing repeats so nearly.
@@ -179,7 +179,7 @@ DRIFT_SHARE = 0.25
 
 
 class SettlingCourse:
-    """A motion at time zero that is followed until it repeats or certainly never will, and observed then.
+    """Run of a motion until it repeats or certainly never will, and is then observed.
 
     A motion that repeats is observed over one of its own periods, which holds all there is to see. One that
     does not is observed over a window once it is certain that it never will. Because chaos can die out, it
@@ -225,7 +225,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Watch it until it repeats or certainly never will; returns chaos, or a drift, to be followed on."""
+        """Follow it until it repeats or certainly never will; return chaos or a drift to follow further."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -280,7 +280,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have settled on a torus, which does not repeat either: only growth tells the two apart.
+        # Chaos may have settled on a torus, which does not repeat either; only growth distinguishes them.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [
@@ -317,7 +317,7 @@ def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
 
 
 def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretch], pace: Pace) -> SceneRun:
-    """Observe one period of a motion that repeats, and say since when it has hardly changed any more."""
+    """Observe one period of a repeating motion, and find since when it is settled."""
     settled_s, begins = run.time_s, run.apart()
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)

@@ -1,4 +1,4 @@
-"""A motion under a harmonic drive, followed stretch by stretch, each watched in its own way. SI units."""
+"""A motion under a harmonic drive, followed in stretches with different observations. SI units."""
 
 import math
 import sys
@@ -29,9 +29,9 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 
-# What it costs to follow a motion on the machine of docs/accuracy.md: the measure of a budget. SI units.
+# Nominal cost of following a motion, on the machine of docs/accuracy.md, as the measure of budgets. SI units.
 #
-# It is not measured where it runs: the same scene with the same budget has the same answer everywhere.
+# It is not measured at run time, so that a scene with a budget has the same answer everywhere.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
 """Seconds for a second between contacts, and for one under a force at every p."""
@@ -74,7 +74,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """What was seen of a motion between two instants."""
+    """Observations of a motion between two instants."""
 
     start_s: float
     end_s: float
@@ -82,10 +82,10 @@ class Stretch:
     impacts: int
     """Contacts that began."""
     peak_x_m: float
-    """Largest abs(x); zero where it was not watched."""
+    """Largest abs(x); zero if not observed."""
     peak_p_m: float
     area_x: complex
-    """Integral of x exp(-i (omega t + phase)) [m s]; zero where it was not watched."""
+    """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
     area_p: complex
     samples: Samples
     """Which states were kept."""
@@ -100,14 +100,14 @@ class Stretch:
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Return the same with every so manyth state alone."""
+        """Return the same with every n-th state only."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
 
 
 class FollowedRun:
-    """A specimen under way; its state is advanced in place.
+    """A running motion of a specimen, advanced in place.
 
     Raises ValueError when the specimen cannot be followed in time, or cannot begin so.
     """
@@ -123,7 +123,7 @@ class FollowedRun:
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
         self.cost_s = 0.0
-        """What following it from its beginning has cost, by `nominal_cost_s`."""
+        """Nominal cost since its start; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
 
     @property
@@ -142,7 +142,7 @@ class FollowedRun:
         return self._run.motion
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Give the same motion, to be followed apart from this one, at a tolerance of its own if need be."""
+        """Return an independent copy, optionally with another tolerance."""
         twin = copy(self)
         twin.__dict__.update(_run=self._run.apart(tolerance))
         return twin
@@ -181,7 +181,7 @@ class FollowedRun:
         )
 
     def follow_tangent(self) -> None:
-        """Carry a small change along from now on, in no special direction."""
+        """Propagate a small change in a generic direction from now on."""
         self._run.carry((self._scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
@@ -290,7 +290,7 @@ whether or not a stretch precedes the first."""
 
 @dataclass(frozen=True)
 class Block:
-    """What was seen in the whole drive periods of a part of a motion."""
+    """Observations in the whole drive periods of a part of a motion."""
 
     peak_x_m: float
     """Largest abs(x)."""
@@ -302,7 +302,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class ObservedWindow:
-    """What was seen in a window. SI units."""
+    """Observations in a window. SI units."""
 
     begins: FollowedRun
     """The run as it was where the window begins."""
@@ -344,7 +344,7 @@ class ObservedWindow:
 
 
 def whole_periods(duration_s: float, frequency_hz: float) -> int:
-    """How many whole drive periods a duration holds."""
+    """Return the number of whole drive periods in a duration."""
     return math.floor(duration_s * frequency_hz * (1.0 + WHOLE))
 
 

@@ -1,4 +1,4 @@
-"""How a scene will be answered, decided before it is run: only what it requires is modelled. SI units."""
+"""Plan of a scene before it is run, with only what it requires. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -67,14 +67,14 @@ class LinearMotion:
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def share_left(self, time_s: float) -> float:
-        """How large the modes can still be, over the steady part, in x or in p, whichever is worse."""
+        """Return the largest remaining transient relative to the steady part, in x or in p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
         )
 
     def died_away_s(self, share: float) -> float:
-        """When the modes are below this share of the steady part, in x and in p; infinite if never."""
+        """Return when the transient is below this share of the steady part; infinite if never."""
         latest = 0.0
         for part, whole in self._parts:
             size = np.abs(part) * len(part) / (share * abs(whole))
@@ -110,7 +110,7 @@ def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> Line
 
 
 def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:
-    """Whether it is proved that no force of a stop ever acts."""
+    """Return whether a bound proves that no stop is ever touched."""
     match specimen.contact:
         case NoContact():
             return True
@@ -141,50 +141,50 @@ SLOW = 0.9
 """Drive frequency over the lowest natural one, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Where p would just reach a stop; it grows as the cube root of how far p would pass it."""
+"""Offset at which p just reaches a stop; grows as the cube root of the excess of p."""
 MICROMETRES = 1e6
 
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """How a scene will be answered, and what it will cost."""
+    """Method and cost of a scene."""
 
     method: Method
     sentences: tuple[str, ...]
-    """What is modelled, what is carried along, what is not, and why."""
+    """Sentences on what is modelled and computed, what is not, and why."""
     planned_s: float
-    """The work in it, in seconds of a machine that nobody has."""
+    """Estimated work [s] on a nominal reference machine."""
     longest_planned_s: float
     """The same if the motion never repeats and is followed to the end of an automatic duration."""
     kind: str
-    """What runs have taken is learnt for each kind, and for what it begins with."""
+    """Kind for learning run times, with all its prefixes."""
     largest_p_m: float
     """Bound on abs(p) while no stop is touched."""
 
     @property
     def alike(self) -> tuple[str, ...]:
-        """Two scenes with the same are answered in the same way, whatever their numbers."""
+        """Key of scenes that are solved in the same way, with any parameters."""
         return (self.method.value, *self.sentences[1:])
 
     @property
     def cost(self) -> "Expected":
-        """How long it will take on one core of this machine, by what such runs took lately."""
+        """Expected time on one core of this machine, from previous runs."""
         from .cost import cost_ledger  # noqa: PLC0415 - few plans are priced, and it reads a file
 
         return cost_ledger().expected(self.kind, self.planned_s)
 
     @property
     def cost_s(self) -> float:
-        """The same without how far it may be off [s]."""
+        """The same without uncertainty [s]."""
         return self.cost.time_s
 
     def explain(self) -> str:
-        """Say the plan to a reader."""
+        """Return the plan as text."""
         return "\n".join((*self.sentences, str(self.cost)))
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
-    """Decide how a scene is to be answered, without running it.
+    """Plan a scene without running it.
 
     Raises ValueError when the specimen cannot be followed in time.
     """
@@ -230,7 +230,7 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
 
 
 def transient_decay_s(motion: LinearMotion) -> float:
-    """When the start has no share in a motion without contact any more; infinite if never."""
+    """Return when the transient of a motion without contact has decayed; infinite if never."""
     return motion.died_away_s(DECAYED_SHARE)
 
 
@@ -323,7 +323,7 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
 
 
 def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
-    """Name the runs that take about as long as their plans say, or are all off alike."""
+    """Return the kind of a run; runs of one kind have similar ratios of actual to planned time."""
     contact = "free"
     if _share(scene, motion) > TOUCHING:
         contact = "slow" if _is_slow(scene, motion) else "touching"
@@ -374,5 +374,5 @@ def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
 
 
 def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Whether the drive is below all modes: most motions keep their start then, with or without impacts."""
+    """Return whether the drive is below all modes, where most motions depend on the start."""
     return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

@@ -1,4 +1,4 @@
-"""What a scene's answer says: one flat, frozen value that goes into tables, files and JSON. SI units."""
+"""Result of a scene: one flat, frozen value for tables, files and JSON. SI units."""
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -14,23 +14,23 @@ State = tuple[float, float, float, float, float, float]
 
 
 class MotionKind(StrEnum):
-    """What a motion has come to, as its states once a drive period tell."""
+    """Kind of a motion, from its states once per drive period."""
 
     PERIODIC = "periodic"
     """It repeats after `Prediction.period` drive periods."""
     QUASI_PERIODIC = "quasi-periodic"
-    """It neither repeats nor forgets where it began."""
+    """It neither repeats nor depends sensitively on its start."""
     CHAOTIC = "chaotic"
-    """It does not repeat, and forgets where it began."""
+    """It does not repeat, and depends sensitively on its start."""
     UNDECIDED = "undecided"
-    """It was not followed for long enough to tell."""
+    """Undecided: it was not followed for long enough."""
     CHAOTIC_SO_FAR = "chaotic so far"
     """Chaotic for as long as it was followed, which does not tell whether it stays so: the chaos of other
     starts died out, or all were followed for too short a time. `Ensemble.escape` says how long it lasts."""
 
 
 class StartMemory(StrEnum):
-    """Whether the start decides which motion is reached."""
+    """Whether the start determines which motion is reached."""
 
     KEPT = "kept"
     """A start a millionth of a gap away came the same way."""
@@ -43,7 +43,7 @@ class StartMemory(StrEnum):
 
 @dataclass(frozen=True)
 class FoundMotion:
-    """One of the motions that were reached from starts too near to each other to be told apart.
+    """One of the motions reached from indistinguishable starts.
 
     Motions are the same when kind and period are and all responses agree to a thousandth, or within the
     scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
@@ -69,14 +69,14 @@ class FoundMotion:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What became of a scene whose start was forgotten, from several starts a millionth of a gap apart."""
+    """Motions from several starts a millionth of a gap apart, for sensitive dependence on the start."""
 
     starts: int
-    """The one that was asked for among them."""
+    """Number of starts, including the requested one."""
     motions: tuple[FoundMotion, ...]
-    """Found, the one with the largest share first."""
+    """Motions found, the largest share first."""
     asked: int
-    """Which of them the start that was asked for came to."""
+    """Index of the motion from the requested start."""
     unseen_share: float
     """A motion that was not found has less than this share, in 39 cases of 40: also in the end, as starts
     that were chaotic so far, or undecided, may come to it."""
@@ -90,7 +90,7 @@ class Ensemble:
 
 @dataclass(frozen=True)
 class TargetReport:
-    """What was requested of an answer, and what was reached."""
+    """Requested and reached error and time."""
 
     wanted_error: float | None
     """Relative; None where none was requested, as the next."""
@@ -139,7 +139,7 @@ def _short(value: float) -> str:
 
 
 class Method(StrEnum):
-    """How a scene is answered."""
+    """Method of solving a scene."""
 
     CLOSED_FORM = "closed form"
     """No stop is ever touched, by a bound: the linear specimen's exact answer."""
@@ -151,7 +151,7 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class ScenePrediction:
-    """Responses of one scene and all that is needed to judge them. None where it was not asked, or not found.
+    """Responses of one scene with errors and facts. None if not requested or not found.
 
     Responses are over the drive amplitude, those called relative are of p = y - z.
     """
@@ -190,7 +190,7 @@ class ScenePrediction:
     lyapunov_error_per_s: float | None
     """Its standard error [1/s]."""
     start: str
-    """The state it began from: "rest", or as the scene calls it."""
+    """Name of the initial state: "rest", or the scene's name."""
     final_state: State
     outcome: Outcome
     method: Method
@@ -217,7 +217,7 @@ class ScenePrediction:
 
     @property
     def is_one_of_several(self) -> bool:
-        """The numbers are those of one motion, and other starts reached others."""
+        """Whether other starts reached other motions."""
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:

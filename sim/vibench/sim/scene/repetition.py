@@ -1,4 +1,4 @@
-"""What a motion has come to: told from its states once a drive period and the growth of a small change.
+"""Classify a motion from its states once per drive period and the growth of a small change.
 
 Whether it repeats is read from the states alone. A motion that does not repeat is chaotic when a small change
 grows without end, quasi-periodic when it does neither grow nor die (Lichtenberg and Lieberman, Regular and
@@ -43,11 +43,11 @@ FEWEST_NEUTRAL = 8.0
 
 @dataclass(frozen=True)
 class Repetition:
-    """After how many drive periods a motion repeats, and how nearly."""
+    """Period of a repeating motion, with the remaining distance."""
 
     period: int
     distance: float
-    """How far it still has to go, over its size."""
+    """Remaining distance relative to its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """What counts as the same, over the size of a motion."""
+    """Tolerances relative to the size of a motion."""
 
     tolerance: float
     """Distance still to go that counts as there."""
@@ -130,7 +130,7 @@ def _returns_nowhere(points: Floats, tolerance: float) -> bool:
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Find since when the end of a section has come back, nearly, after a period: that many states before."""
+    """Return the number of states before the end during which a section nearly repeats after a period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
@@ -177,7 +177,7 @@ def longest_section(forgetting_periods: float) -> int:
 
 
 def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
-    """Judge a motion; one that may still be settling, within eight times ``fading_s``, is undecided."""
+    """Return the kind of a motion; undecided if it may still be settling, within eight times ``fading_s``."""
     if repeats is not None:
         return MotionKind.PERIODIC
     times = growth.duration_s / fading_s
@@ -215,7 +215,7 @@ period. Measured: 70 at most (p^7 at 130 Hz and 20 um)."""
 
 @dataclass(frozen=True)
 class Pace:
-    """What decides how long is long, for one drive."""
+    """Time scales and tolerances for one drive."""
 
     frequency_hz: float
     forgetting_s: float
@@ -233,7 +233,7 @@ class Pace:
 
     @property
     def attractor_s(self) -> float:
-        """When a motion that does not repeat is taken to be on its attractor."""
+        """Time after which a non-repeating motion counts as on its attractor."""
         return max(FORGETTING * self.forgetting_s, FEWEST_PERIODS / self.frequency_hz)
 
     @property
@@ -243,7 +243,7 @@ class Pace:
 
     @property
     def settling_s(self) -> float:
-        """What a motion takes, from wherever it was, to be seen to repeat."""
+        """Time needed to detect that a motion repeats."""
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:

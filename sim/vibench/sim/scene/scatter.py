@@ -1,4 +1,4 @@
-"""How much Response I differs from one look to the next, where a motion never repeats. SI units.
+"""Scatter of Response I between windows of a motion that never repeats. SI units.
 
 It is the largest value of a window, one draw from an extreme-value distribution: in chaos it scatters by a
 few per cent whatever the accuracy. One run tells its scatter by the extremes of its blocks, many runs from
@@ -24,7 +24,7 @@ FEWEST_BLOCKS = 4
 
 @dataclass(frozen=True)
 class WindowScatter:
-    """How much the largest value of one window differs from that of another."""
+    """Scatter of the largest value between windows."""
 
     relative: float
     """Standard deviation over the mean."""

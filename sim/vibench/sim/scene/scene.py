@@ -1,4 +1,4 @@
-"""A scene: what is shaken, how, and what is to be seen of it. SI units."""
+"""A scene: specimen, drive and observables. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ _STRICT = ConfigDict(extra="forbid")
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 """Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
 BUDGET_S = 1.0
-"""What a scene may cost on top of its own run."""
+"""Default budget of a scene in addition to its own run."""
 CLEAR, FEWEST, MOST = 8, 16, 64
 """Starts that are followed, that which was asked for among them: the first where all of them settled on one
 motion, or chaos certainly lasts; the last where they came to more than one motion, and the budget allows."""
 
 
 class Observable(StrEnum):
-    """What is looked at."""
+    """Observed quantity."""
 
     RESPONSE = "response"
     """Responses I and II of m0 and of p."""
@@ -35,7 +35,7 @@ class Observable(StrEnum):
     POINCARE = "poincare"
     """States once a drive period."""
     SCATTER = "scatter"
-    """How much Response I differs between starts that hardly do; the scene is run several times more."""
+    """Scatter of Response I between nearly equal starts; takes several more runs."""
 
 
 MOST_PERIODS = 1e12
@@ -89,7 +89,7 @@ class AutomaticDuration:
 
 @dataclass(frozen=True)
 class Target:
-    """What an answer is to reach: an error, within a time. One of the two is enough."""
+    """Requested error or time, or both."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -112,7 +112,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Rest:
-    """Begin with nothing moving."""
+    """Start from rest."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -131,7 +131,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Given:
-    """Begin in a state of one's own."""
+    """Start from a given state."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -149,7 +149,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Scene:
-    """What one simulation is asked."""
+    """Request for one simulation."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 

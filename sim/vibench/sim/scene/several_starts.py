@@ -1,4 +1,4 @@
-"""What becomes of a scene from starts too near to each other to be told apart. SI units.
+"""Motions of a scene from indistinguishable starts. SI units.
 
 After transient chaos it is chance which motion is reached, and when: starts a millionth of a gap apart are
 draws of it. They are followed round by round until all have settled, until it is known that chaos lasts, or
@@ -47,7 +47,7 @@ LASTING_S = 300.0
 
 @dataclass(frozen=True, eq=False)
 class ReachedMotion:
-    """What one start came to."""
+    """Motion reached from one start."""
 
     run: FollowedRun
     """At its end."""
@@ -103,7 +103,7 @@ def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Draw:
-    """How many starts are followed, and at what cost."""
+    """Number and cost of starts."""
 
     clear: int = CLEAR
     """That which was asked for among them; enough where they leave no doubt."""
@@ -122,9 +122,9 @@ MORE_S = 1.0
 
 
 class SeveralStarts:
-    """Starts beside the one that was asked for, and what they came to.
+    """Additional starts and their motions.
 
-    They are followed as far as that one was asked to be.
+    They are followed as far as the requested one.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class SeveralStarts:
 
     @property
     def reached(self) -> tuple[ReachedMotion, ...]:
-        """What the starts came to, the one that was asked for first."""
+        """Motions of the starts, the requested one first."""
         return tuple(self._reached)
 
     @property
@@ -161,7 +161,7 @@ class SeveralStarts:
 
     @property
     def escape(self) -> EscapeRate | None:
-        """How often chaos died out; None where no motion wandered long enough to tell.
+        """Rate at which chaos dies out; None if no motion was irregular for long enough.
 
         A motion that wanders when it should have been on its attractor is taken to be chaotic from there on:
         until it is known to have settled, or as long as a small change certainly grows. Any other may have
@@ -183,7 +183,7 @@ class SeveralStarts:
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
     def follow(self) -> None:
-        """Follow as many starts as the budget allows, as far as it takes, and observe them."""
+        """Follow as many starts as the budget allows, as far as needed, and observe them."""
         asked, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = asked.cost_s * min(1.0, self._first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
@@ -283,7 +283,7 @@ CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Sort what starts came to into motions, each with the start first that shows it best."""
+    """Group the starts by motion, each with its best start first."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -349,7 +349,7 @@ ErrorOf = Callable[[ReachedMotion], float | None]
 def ensemble_of(
     several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
 ) -> Ensemble:
-    """Sort what the starts came to into motions, and count them.
+    """Group the starts by motion and count them.
 
     Parameters
     ----------
@@ -405,7 +405,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Call chaos so only where none of it died out, and it certainly lasts."""
+    """Return chaotic only if none of it died out and it certainly lasts."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S

@@ -1,4 +1,4 @@
-"""How well shares and rates are known that were counted: intervals that hold in 19 cases of 20."""
+"""Intervals of counted shares and rates, valid in 19 cases of 20."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -56,7 +56,7 @@ UNSURE = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """A share of starts, and the interval that holds it."""
+    """A share of starts with its interval."""
 
     share: float
     low: float
@@ -64,7 +64,7 @@ class Share:
 
 
 def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
-    """Find the share that ``count`` of ``trials`` stand for, by Wilson's interval.
+    """Return the share for ``count`` of ``trials`` with Wilson's interval.
 
     It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
     Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
@@ -130,7 +130,7 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """How often chaos dies out: one over its mean lifetime, counted over several starts."""
+    """Rate at which chaos dies out, one over its mean lifetime, from several starts."""
 
     rate_per_s: float
     """Escapes over the time in chaos [1/s]."""

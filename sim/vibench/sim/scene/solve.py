@@ -1,4 +1,4 @@
-"""The answer to a scene: what was seen, and how far to trust it. SI units."""
+"""Solve scenes, with error estimates. SI units."""
 
 import math
 import time
@@ -54,7 +54,7 @@ EXPONENT_PRECISION = 0.2, 0.01
 
 
 class Question(StrEnum):
-    """What is asked of a scene."""
+    """Kind of question about a scene."""
 
     ANSWER = "answer"
     """Its responses with their errors, and what other starts come to where its own is forgotten."""
@@ -77,7 +77,7 @@ Solver = Callable[[Scene], ScenePrediction] | InBatches
 
 
 def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
-    """Run a scene as planned, and say what was seen and how far to trust it.
+    """Solve a scene as planned, with error estimates.
 
     Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
     accuracy may lie; ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md): where
@@ -107,7 +107,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
 
 def settle_scene(scene: Scene) -> ScenePrediction:
-    """Run a scene as planned, and say what it came to, but neither errors nor what other starts come to.
+    """Solve a scene as planned, without errors and other starts.
 
     It is the same motion that `solve_scene` describes, in a third of the time or less. Chaos is followed on
     for as long as the scene's duration allows. One of an automatic duration ends after whole drive periods.
@@ -123,7 +123,7 @@ MOST_HELD = 2e7
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What a scene came to that was solved beside others."""
+    """Result of a scene that was solved together with others."""
 
     prediction: ScenePrediction
     taken_s: float
@@ -332,7 +332,7 @@ class _Begun:
                 )
 
     def answer(self, follow: Follow) -> ScenePrediction:
-        """Judge what was seen of the motion; other starts are followed by ``follow``."""
+        """Return the result of the motion; ``follow`` follows other starts."""
         scene, seen = self._scene, self.course.seen()
         if self._question is Question.MOTION:
             return self._found(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
@@ -368,7 +368,7 @@ class _Begun:
     def _found(
         self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
     ) -> ScenePrediction:
-        """Write down what was seen of the motion."""
+        """Return the prediction for the observed motion."""
         scene, run, window, amplitude = self._scene, self.run, seen.window, self._scene.drive.amplitude_m
         is_whole = run.outcome is Outcome.REACHED_END
         exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
@@ -436,7 +436,7 @@ def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pa
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Call a motion chaotic that was asked to be followed until it has settled only if it lasts."""
+    """Return the kind; with an automatic duration, chaotic only if chaos lasts."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:

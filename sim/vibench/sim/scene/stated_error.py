@@ -1,11 +1,10 @@
-"""How far each response of an answer may be off: measured, by the kind of question that was asked. SI units.
+"""Measured errors of the responses of a scene. SI units.
 
-A motion that has settled forgets the errors of its steps as they come: it is taken on from its end with a
-far smaller tolerance until that has been forgotten too, and what was answered is compared with that. A
-motion that has not settled carries its errors along: it is followed once more from its start with that
-tolerance, and observed in the same window. Where the two part on the way, growth has forgotten
-the start, and another run is another draw: what two draws differ by is found from the parts of the window if
-the motion has become stationary by then, else from a few starts that nobody can tell apart.
+A settled motion loses the errors of earlier steps. It is continued from its end with a far smaller
+tolerance until their effect has decayed, and compared. A motion that has not settled accumulates errors. It
+is repeated from its start with that tolerance and observed in the same window. If both runs diverge,
+another run is another draw: the difference of two draws is estimated from the parts of the window if the
+motion is stationary, else from a few indistinguishable starts.
 """
 
 import math
@@ -31,7 +30,7 @@ STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE:
 FORGETTING = 4.0
 """Forgetting times that a motion which repeats is followed before it is compared."""
 SHORTER = 4
-"""Shorter windows that are compared with one. Other lines leak into theirs this many times as much."""
+"""Number of shorter windows to compare with one, whose leakage is that many times larger."""
 LOOKS = 8
 """Periods of it, or drive periods of a motion that does not repeat, that are compared."""
 SAFETY = 2.0
@@ -60,7 +59,7 @@ class StatedErrors:
     """Relative errors, of Response I and II of x, then of p; NaN where they are not known."""
 
     stated: Floats
-    """What each response may be off by, shape (4,)."""
+    """Error of each response, shape (4,)."""
     integration: float
     """The largest that a stricter accuracy would lessen, as it was measured."""
 
@@ -153,7 +152,7 @@ def _difference_of_draws(
     slowest_rate: float,
     follow: Follow,
 ) -> Floats:
-    """Find what two draws differ by, relatively, shape (4,)."""
+    """Return the relative difference of two draws, shape (4,)."""
     memories = -slowest_rate * seen.window.begins.time_s
     if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
         drawn = draws_apart(seen.blocks, len(seen.window.blocks))
@@ -250,7 +249,7 @@ def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
 
 
 def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
-    """Whether two runs are at the same place, as far as the stops can tell."""
+    """Return whether two runs have the same state within a share of the gap."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
     apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
@@ -285,5 +284,5 @@ def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
 
 
 def finite_or_none(value: float) -> float | None:
-    """Return a number, or None where there is none."""
+    """Return a finite number, otherwise None."""
     return value if math.isfinite(value) else None

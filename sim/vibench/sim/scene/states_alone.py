@@ -35,7 +35,7 @@ REMEMBERED = 16.0
 
 
 class StatesAlone:
-    """A run without a tangent, looked at now and then.
+    """A run without a tangent, checked at intervals.
 
     Parameters
     ----------
@@ -167,10 +167,9 @@ AUTOMATIC_S = 10.0
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
-    """Whether batches follow this many motions of one specimen faster than the scalar engine.
+    """Return whether batches are faster for this many motions of one specimen.
 
-    It hangs on what is asked for and on the processor, and not on what runs took lately: who asks twice has
-    the same answer twice.
+    It depends on request and processor only, not on previous run times, so that results are reproducible.
     """
     each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
@@ -185,10 +184,9 @@ TRIES = 8
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
-    """Follow motions in batches where the specimen allows, else one by one.
+    """Follow motions in SIMD batches if the specimen allows, else one by one.
 
-    Batches follow states and nothing else: whether a motion repeats is found, and its last state reached,
-    as it is without them.
+    Batches only compute states; repetition is found as without them.
     """
     alike = defaultdict[tuple[Specimen, float], list[StatesAlone]](list)
     for each in several:

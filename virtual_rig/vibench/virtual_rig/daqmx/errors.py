@@ -51,7 +51,6 @@ def unsupported_value(property_name: str, requested: object, allowed: str) -> Da
     )
 
 
-
 @dataclass(frozen=True, eq=False)
 class Fault:
     """A rule that makes calls with a name fail with a code."""
