@@ -1,6 +1,5 @@
-"""The check of a bench before it is armed: silence, a small sine, silence again, and what has changed.
+"""Check of a bench before it is armed: silence, a small sine, silence again, and changes.
 
-Findings compare noise, gains, signs, clocks and identities with the configuration and with the last
-check, which is kept in the user's state folder; a bench is admitted on a check that is recent, passed and
-of the same configuration. Knows no campaign.
+Findings compare noise, gains, signs, clocks and identities with the configuration and with the last check,
+stored in the user's state folder. A bench is admitted by a recent passed check of the same configuration.
 """

@@ -1,7 +1,7 @@
-"""Whether this bench may be armed: only on a check that is recent, passed, and of the same configuration.
+"""Admission of a bench by a recent passed check of the same configuration.
 
-The last check of each rig is kept in the user's state folder, one JSON file a rig; what has changed since is
-said in decibels (gains) and ppm (clock).
+The last check of each rig is a JSON file in the user's state folder; changes since then are reported in
+decibels (gains) and ppm (clock).
 """
 
 import hashlib
@@ -27,12 +27,12 @@ from .loop import DRIVE_LEFT, LASTING, Lasting
 
 
 class CheckRule(StrEnum):
-    """How fresh the check of a bench must be."""
+    """Required check of a bench."""
 
     FRESH = "fresh"
-    """One that passed within the last ``check_valid_h`` hours, on this very configuration."""
+    """A check passed within the last ``check_valid_h`` hours with the same configuration."""
     NOW = "now"
-    """One made now."""
+    """A new check."""
     WAIVED = "waived"
     """No check; recordings contain the result of the last check, if there is one."""
 
@@ -42,9 +42,9 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Name the file of a rig's last check: its name as far as files allow it, and a hash of the whole of it.
+    """Return the file of a rig's last check: its name in allowed letters, and a hash of it.
 
-    ``passed``: of the last that did not fail.
+    With ``passed``, the last check that did not fail.
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
     digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
@@ -52,7 +52,7 @@ def archive_path(rig_name: str, *, passed: bool = False) -> Path:
 
 
 def last_check(rig_name: str) -> CheckResult | None:
-    """Return the last check of a rig; None when there is none, or none that this version can read.
+    """Return the last check of a rig; None if it is missing or unreadable by this version.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed(rig: Rig) -> CheckResult | None:
-    """Return the last check of a rig, as it is configured now, that did not fail; None when there is none."""
+    """Return the last check of a rig with its current configuration that did not fail; None without one."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each
@@ -78,7 +78,7 @@ def _read(path: Path) -> CheckResult | None:
 
 
 def keep(result: CheckResult) -> Path:
-    """Replace the last result; a reader finds either of the two, complete.
+    """Replace the last result atomically.
 
     Raises RecordingError when the state folder cannot be written.
     """
@@ -114,9 +114,9 @@ _ADVICE = (
 
 
 def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, ...]:
-    """Compare every level of a check with the same of the last one.
+    """Compare every level of a check with the last one.
 
-    The sine is equally loud in both, since the configuration is the same (the caller ensures that).
+    Both have the same sine level, because the configuration is the same.
     """
     before = {finding.name: finding for finding in last.findings}
     since = f"since {ago(at - last.checked)}"
@@ -157,7 +157,7 @@ Clock = Callable[[], datetime]
 
 
 def utc_now() -> datetime:
-    """Tell the computer's time."""
+    """Return the computer's time."""
     return datetime.now(UTC)
 
 
@@ -176,13 +176,13 @@ def check_bench(
     bench
         Open.
     folder
-        Where recordings would go: its disk is looked at.
+        Folder for recordings, whose disk is checked.
     clock
-        What time it is.
+        Returns the current time.
     switch
         Ends the check from another thread.
     new_reference
-        Compare with nothing: what has changed since was meant.
+        Accept all changes since the last check.
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed(bench.rig)
@@ -201,10 +201,10 @@ def require_fresh(
     clock: Clock = utc_now,
     switch: StopSwitch | None = None,
 ) -> CheckResult | None:
-    """Admit a bench to be armed, on its last check or on one made now; recordings then carry the result.
+    """Admit a bench by its last check or by a new one, whose result is stored in recordings.
 
-    A virtual rig without a check that holds is checked at once; a real one plays nothing unasked. A recording
-    that is played back needs none.
+    A virtual rig without a valid check is checked at once; a real one never plays without a request. A
+    recording that is played back needs no check.
 
     Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass (nothing
     was played then), or the one made now does not pass; InstrumentError when an instrument fails meanwhile.
@@ -214,7 +214,7 @@ def require_fresh(
     bench
         Open, and not sampling.
     folder
-        Where recordings will go.
+        Folder for recordings.
     switch
         Lets others end a check that is made now.
     """
@@ -249,9 +249,9 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
 
 
 def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
-    """Admit a bench on its last check without playing anything; a virtual one needs none.
+    """Admit a bench by its last check without playing anything; a virtual one needs none.
 
-    Raises CheckFailed when a real bench has no check that holds.
+    Raises CheckFailed when a real bench has no valid check.
     """
     if bench.rig.plays_back:
         return
@@ -264,7 +264,7 @@ def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
 
 
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
-    """Return why a check does not hold for a rig, in one clause; None when it does."""
+    """Return the reason why a check is not valid for a rig; None if it is."""
     if last is None:
         return f"the bench {rig.name!r} was never checked on this account"
     when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"
@@ -287,7 +287,7 @@ def _require_passed(result: CheckResult) -> CheckResult:
 
 
 def _output_after(result: CheckResult) -> str:
-    """Return whether the output is off, as far as the check has measured it."""
+    """Return a clause on the measured state of the output."""
     left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
     if left is None or left.verdict is Verdict.FAIL:
         return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"

@@ -1,4 +1,4 @@
-"""The check of a whole bench before a day's work: silence first, then a small sine, then silence again."""
+"""Check of a whole bench: silence first, then a small sine, then silence again."""
 
 import shutil
 from collections.abc import Callable
@@ -22,30 +22,30 @@ from ..stopping.stop import Cause, StopSwitch
 from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
-"""Level of the sine at most, of the bench's amplitude limit: far below anything that clips."""
-# An AC coupling of 0.5 Hz has forgotten a step after this time.
+"""Largest level of the sine relative to the bench's amplitude limit, far below clipping."""
+# After this time a step has decayed in an AC coupling of 0.5 Hz.
 _SETTLE_S = 1.5
 _READ_S = 2.0
 _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
-"""rms of a silent channel, of its full scale."""
+"""RMS of a silent channel relative to its full scale."""
 _MEDIAN_OF_NORMAL = 0.6745
-"""Of a normal variable's size, over its standard deviation."""
+"""Median of |normal variable| over its standard deviation."""
 _IN_MOMENTS = 0.2
-"""Usual noise over the rms of all, below which moments make it."""
+"""Ratio of usual noise to total rms, below which the noise is intermittent."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
-"""Mean of a silent channel, of its full scale."""
+"""Mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Latency of one verified setting: it bounds how fast the generator can be stopped."""
+"""Latency of one verified setting, which limits how fast the generator can be stopped."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Recording time that the disk should hold, negative since more is better [h]."""
+"""Recording time that the disk should have space for, negative since more is better [h]."""
 
 
 def bench_report(
     bench: Bench, folder: Path, switch: StopSwitch | None = None, amplitude_vpp: float | None = None
 ) -> BenchReport:
-    """Check everything that can be known before a measurement; the generator is silent afterwards.
+    """Check a bench before measurements; the generator is silent afterwards.
 
     Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
 
@@ -62,7 +62,7 @@ def bench_report(
     switch
         Lets others end the check, within a block of samples.
     amplitude_vpp
-        Of the sine; absent, two per cent of the amplitude limit, or less, so that no stop is touched [V].
+        Amplitude of the sine [V]; by default at most 2 % of the amplitude limit, without contact.
     """
     if bench.rig.plays_back:
         raise ConfigurationError(
@@ -89,7 +89,7 @@ def bench_report(
 
 
 class _BlockReader:
-    """Reads a bench in blocks, between which the check can be stopped."""
+    """Reads a bench in blocks; the check can be stopped between them."""
 
     def __init__(self, bench: Bench, switch: StopSwitch) -> None:
         self._bench = bench
@@ -108,7 +108,7 @@ class _BlockReader:
             digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, as the check of a run does, and read the settled channels."""
+        """Play the sine without a ramp, like the check of a run, and read the settled channels."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)

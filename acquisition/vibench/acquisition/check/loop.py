@@ -1,4 +1,4 @@
-"""One sine round the loop: whether every channel detects it, as loud as generator, knob and model say."""
+"""Loop check by one sine: detection and levels in every channel."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ class SineFit:
 
     amplitude: float
     uncertainty: float
-    """Standard uncertainty of the amplitude, from what the sine leaves."""
+    """Standard uncertainty of the amplitude, from the residual."""
     phase_rad: float
     """Phase of a cosine, at the first sample."""
 
 
 @dataclass(frozen=True)
 class ClockRatio:
-    """How fast one clock runs against another."""
+    """Ratio of two clocks."""
 
     ppm: float
     uncertainty_ppm: float
@@ -60,7 +60,7 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
 
 
 def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> ClockRatio:
-    """Frequency of a sine that should be at ``frequency_hz``, as parts in a million of it.
+    """Return the deviation of a sine from ``frequency_hz`` [ppm].
 
     A straight line through the phases of twenty stretches; its slope is the offset in frequency.
     """
@@ -79,7 +79,7 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 
 
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
-"""Drive deviation of the measured drive from the setting."""
+"""Deviation of the measured drive from the setting."""
 GAIN_DB = Bounds(1.0, 3.0)
 """Deviation of the amplifier's gain from its knob's."""
 BASE_DB = Bounds(1.5, 3.0)
@@ -87,14 +87,14 @@ BASE_DB = Bounds(1.5, 3.0)
 CLOCK_PPM = Bounds(100.0, 500.0)
 """Two oscillators of 50 ppm each."""
 DETECTED = 10.0
-"""The sine counts as detected when it is this many times its uncertainty."""
+"""Least ratio of the sine to its uncertainty for detection."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Deviation of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""The same of m0: a specimen is known less well than a shaker, so that nothing FAILs."""
+"""The same for m0, without FAIL, because a specimen is known less well than a shaker."""
 LEFT_OVER = Bounds(0.02, 0.05)
-"""Share of the drive that may be left when the output is off."""
+"""Largest remaining share of the drive with the output off."""
 
 AMPLIFIER_GAIN = "amplifier gain"
 DRIVE_CLOCK = "drive's clock"
@@ -109,7 +109,7 @@ def hears_name(role: Role) -> str:
 
 
 class Lasting(Enum):
-    """What stays the same from one check to the next."""
+    """Quantities that are compared between checks."""
 
     GAIN = auto()
     """In decibels."""
@@ -128,7 +128,7 @@ LASTING: Mapping[str, Lasting] = {
 
 
 class LoopCheck:
-    """What a small sine shows on its way from the generator round to the inputs."""
+    """Findings from a small sine from the generator to the inputs."""
 
     def __init__(self, bench: Bench, amplitude_vpp: float, during: Samples, after: Samples) -> None:
         self._rig = bench.rig
@@ -143,11 +143,11 @@ class LoopCheck:
         self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
-        """Answer what can be answered with the channels that there are."""
+        """Return the findings of the existing channels."""
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
-        # What detects nothing has no frequency and no gain: it has been found fault with already.
+        # Channels that do not detect the sine are reported already.
         if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):

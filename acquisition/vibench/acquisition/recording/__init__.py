@@ -1,11 +1,10 @@
-"""The HDF5 recording: its layout, writing, finishing, recovering and reading.
+"""HDF5 recordings: layout, writing, finishing, recovery and reading.
 
-While it is made it is ``NAME.h5.part``: one writer thread commits samples, syncs, then commits the
-counters, so that a kill or power cut costs at most the last second. Finished, it is compressed,
-checksummed ``NAME.h5``; nothing is overwritten. Samples are the converter's int32 counts with scale
-factors to SI units; lost ones are marked. Readable without this code: docs/recording-format.md; reasons:
-docs/decisions/0003-recording-format.md and 0020. It knows blocks of samples and instruments' identities,
-and nothing of rigs, plans (kept as JSON) and runs.
+During the run the file is ``NAME.h5.part``: one writer thread commits samples, syncs, then commits the
+counters, so that a kill or power cut costs at most the last second. The finished ``NAME.h5`` is compressed
+and checksummed; nothing is overwritten. Samples are the converter's int32 counts with scale factors to SI
+units; lost ones are marked. Format: docs/recording-format.md; reasons:
+docs/decisions/0003-recording-format.md and 0020.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

@@ -1,7 +1,7 @@
-"""The writer's own thread: it takes batches from a queue and makes them safe, in an order that cannot lie.
+"""Writer thread that commits batches from a queue in a safe order.
 
-Order of a commit: samples and rows -> sync -> counters -> sync. Whatever moment the process or
-the power ends, a counter never counts what is not there.
+Order of a commit: samples and rows -> sync -> counters -> sync. If process or power end at any moment,
+counters never exceed the stored data.
 """
 
 import threading
@@ -23,16 +23,16 @@ from ._layout import Column, encode, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
-"""Half of the promised second; the other half is for a slow disk."""
+"""Commit interval [s], half of the promised second; the other half is for a slow disk."""
 CLOSING_PATIENCE_S = 30.0
-"""How long the last commit may take [s]: a network folder that has gone away never returns."""
+"""Time limit of the last commit [s], since a lost network folder never returns."""
 QUEUE_PATIENCE_S = 2.0
-"""How long a full queue is waited for before the disk is called too slow."""
+"""Time to wait for a full queue before the disk counts as too slow [s]."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """What belongs together: writes, and the counters that make them count."""
+    """Writes that belong together, with the counters that validate them."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """(offset, data)."""
@@ -45,7 +45,7 @@ class Batch:
 
 
 class Committer:
-    """Writes batches behind the caller's back and reports the first failure at the next call."""
+    """Writes batches in a thread and reports the first failure at the next call."""
 
     def __init__(self, disk: Disk, queue_samples: int, interval_s: float = COMMIT_INTERVAL_S) -> None:
         self._disk = disk
@@ -58,7 +58,7 @@ class Committer:
         self._is_closing = False
         self._is_abandoned = False
         self.failure: OSError | None = None
-        """What the disk refused, if it did."""
+        """Error of the disk, if any."""
         self._is_failure_seen = False
         self._counters: dict[int, int] = {}
         self._written_samples = 0
@@ -83,7 +83,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. Legal at any time.
 
-        Raises RecordingError when the disk does not return; nothing that touches it must be tried then.
+        ¶ Raises RecordingError when the disk does not respond; do not access it then.
         """
         with self._changed:
             self._is_closing = True
@@ -98,7 +98,7 @@ class Committer:
             )
 
     def raise_unseen_failure(self) -> None:
-        """Raise a failure that no call has reported yet, so that none stays unseen."""
+        """Raise a failure that no call has reported yet."""
         if self.failure is not None and not self._is_failure_seen:
             self._require_health(has_room=True)
 
@@ -137,7 +137,7 @@ class Committer:
         finally:
             with self._changed:
                 self._changed.notify_all()
-            if self._is_abandoned:  # the disk is back, and nobody waits for it any more
+            if self._is_abandoned:  # the disk is back, but the caller no longer waits
                 with suppress(OSError):
                     self._disk.close()
 
@@ -150,9 +150,9 @@ class Committer:
         return not is_last
 
     def _next(self) -> tuple[Batch | None, bool]:
-        """Next batch, or None when a commit is due or everything is done; and whether it is done."""
+        """Return the next batch, or None when a commit is due or all is done; and whether all is done."""
         with self._changed:
-            # Nothing to commit: no reason to wake before something arrives.
+            # Nothing to commit: wait for the next batch.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
             timeout_s = None if remaining_s is None else max(remaining_s, 0.0)
             self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)
@@ -188,7 +188,7 @@ Cell = str | int | float
 
 
 class TableWriter:
-    """Counts the rows of one table and says where each goes."""
+    """Row counter and positions of one table."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
@@ -201,7 +201,7 @@ class TableWriter:
         return self._places.table.capacity - self.rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:
-        """Make the writes of one more row; raises RecordingError when the table is full."""
+        """Return the writes of another row; raises RecordingError when the table is full."""
         if not self.free_rows:
             raise RecordingError(
                 f"The recording's table of {self._places.table.name} is full:"
@@ -212,7 +212,7 @@ class TableWriter:
         return self.replace(self.rows - 1, cells)
 
     def replace(self, row: int, cells: Sequence[Cell]) -> Batch:
-        """Make the writes of a row that is already there."""
+        """Return the writes that replace a row."""
         columns = self._places.table.columns
         writes = [
             (offset + row * np.dtype(column.dtype).itemsize, _raw(column, cell))
@@ -228,7 +228,7 @@ def _raw(column: Column, cell: Cell) -> bytes:
 
 
 Number = int | float | str
-"""What a segment may carry: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
+"""Numbers of a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ class OpenSegment:
 
 
 class Journal:
-    """Keeps the four tables and answers with the writes that each addition needs."""
+    """The four tables; each addition returns its writes."""
 
     def __init__(self, places: Mapping[str, TablePlaces], roles: tuple[str, ...]) -> None:
         self._events = TableWriter(places[layout.EVENTS.name])
@@ -259,7 +259,7 @@ class Journal:
         self._dropped_events = 0
 
     def event(self, kind: str, text: str, sample: int) -> Batch:
-        """Note that something happened. A full table keeps counting in its last row."""
+        """Add an event. A full table counts further ones in its last row."""
         if self._events.free_rows > 1:
             return self._events.append((sample, time.time(), kind, text))
         self._dropped_events += 1
@@ -298,10 +298,10 @@ class Journal:
         return self._gaps.append((first_sample, last_sample))
 
     def overload(self, overload: Overload) -> Batch:
-        """Note an overload; one that continues the channel's last makes that longer.
+        """Add an overload, or extend the channel's last one if it continues.
 
-        When the table is full the channel's last range grows to hold the new one: too much is
-        then called overloaded, never too little.
+        In a full table the channel's last range is extended to the new one, so that overloads are never
+        understated.
         """
         if overload.channel not in self._roles:
             raise RecordingError(
@@ -310,7 +310,7 @@ class Journal:
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))
         continues = row >= 0 and overload.first_sample <= last.last_sample + 1
-        # A row is kept free for every channel that has had none, so that "grows" always finds one.
+        # A row is reserved for every channel without an overload, so that there is always one to extend.
         untouched = len(self._roles) - len(self._last_overload)
         must_grow = row >= 0 and self._overloads.free_rows <= untouched
         if continues or must_grow:

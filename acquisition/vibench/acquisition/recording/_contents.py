@@ -1,4 +1,4 @@
-"""Models of a recording's attributes and texts, checked once, when it is opened."""
+"""Models of a recording's attributes and texts, validated when it is opened."""
 
 import json
 import math
@@ -24,9 +24,9 @@ from ._layout import (
 )
 
 DEEPEST_JSON = 40
-"""Lists and objects in one another; a plan has about five."""
+"""Deepest nesting of JSON; a plan has about five levels."""
 SAME_SCALE = 1e-9
-"""How far scale_factor and add_offset may lie from what the other attributes give; they are exact copies."""
+"""Tolerance of scale_factor and add_offset relative to the other attributes; they are exact copies."""
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -56,7 +56,7 @@ def _unknown_as_none(value: object) -> object:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Unknown = BeforeValidator(_unknown_as_none)
-"""NaN in the file where a number is not known."""
+"""Number that is NaN in the file if unknown."""
 Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
 """From a sample in a fortnight to a terahertz [1/s]."""
 
@@ -106,7 +106,7 @@ class ChannelFacts(_AbstractFacts):
 
 
 class ConfigurationFacts(_AbstractFacts):
-    """Texts of the group ``/configuration``, as what they say."""
+    """Parsed texts of the group ``/configuration``."""
 
     model_config = ConfigDict(strict=False)
 
@@ -120,7 +120,7 @@ class ConfigurationFacts(_AbstractFacts):
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Read the attributes of the file; ``found`` replaces what a growing one says elsewhere."""
+    """Read the attributes of the file; ``found`` replaces those that a growing one stores elsewhere."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 
@@ -151,7 +151,7 @@ def configuration_facts(file: h5py.File) -> ConfigurationFacts:
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """Read a JSON object of finite numbers that is not deeper than any of ours; raises ValueError."""
+    """Read a JSON object with finite numbers and limited depth; raises ValueError."""
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except RecursionError as error:

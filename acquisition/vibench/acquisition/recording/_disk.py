@@ -1,4 +1,4 @@
-"""Writing at known places of a file, in a known order, on a disk that may be full or lose power."""
+"""Write at known places of a file in a known order, on a disk that may be full or lose power."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ from ..errors import RecordingError
 
 
 class Disk(Protocol):
-    """What the committer needs of a file."""
+    """File operations of the committer."""
 
     def write(self, offset: int, data: Buffer) -> None:
         """Put ``data`` at ``offset``, in the system's cache at least."""
@@ -24,7 +24,7 @@ class Disk(Protocol):
         """Return when everything written so far would survive a power cut."""
 
     def reserve(self, offset: int, size: int) -> None:
-        """Claim room, so that later writes there cannot find the disk full."""
+        """Reserve space, so that later writes there do not fail on a full disk."""
 
     def close(self) -> None:
         """Release the file."""
@@ -38,7 +38,7 @@ class PositionedFile(OpenFile):
         self.lock_in_use()
 
     def sync(self) -> None:
-        """Push data and what is needed to find it to the disk; a file without a name can never be found."""
+        """Sync data and metadata to the disk; raises OSError if the file was removed."""
         super().sync()
         if not self.has_a_name:
             raise FileNotFoundError(errno.ENOENT, "the file, or its folder, was removed")
@@ -46,7 +46,7 @@ class PositionedFile(OpenFile):
 
 @contextmanager
 def sole_use(path: Path) -> Iterator[None]:
-    """Hold a file that nobody records to; for the time of a recovery.
+    """Lock a file that is not being recorded, for a recovery.
 
     Raises RecordingError when another process is recording to it.
     """
@@ -72,10 +72,9 @@ Heal = Callable[[], None]
 
 
 class DiskTrouble:
-    """What is wrong with the disk at the moment; any thread may change it.
+    """Simulated fault of the disk; any thread may change it.
 
-    The first refusal comes at once, so that the recording hears of it before anything else happens. From the
-    second one on, ``on_refusal`` is called before the refusal is raised.
+    From the second refusal on, ``on_refusal`` is called before the error is raised.
     """
 
     def __init__(self, on_refusal: Callable[[], None] = lambda: None) -> None:
@@ -86,21 +85,21 @@ class DiskTrouble:
         self._delay_s = 0.0
 
     def fill(self, refusals: float = inf) -> Heal:
-        """Refuse everything as a full disk does, until healed or as often as ``refusals`` says."""
+        """Refuse writes like a full disk, until healed or ``refusals`` times."""
         with self._changed:
             self._refusals, self._has_refused = refusals, False
         return self._make_room
 
     def slow_down(self, delay_s: float) -> Heal:
-        """Let every write and every sync take that much longer, on the wall's clock [s]."""
+        """Delay every write and every sync by this time [s]."""
         with self._changed:
             self._delay_s = delay_s
         return self._speed_up
 
     def meet(self) -> None:
-        """Be as slow, and fail, as the disk does now; raises OSError (ENOSPC) when it is full."""
+        """Apply the current fault; raises OSError (ENOSPC) when the disk is full."""
         with self._changed:
-            # A slow disk takes time; one that is well again lets go at once.
+            # A slow disk takes time, but a healed one continues at once.
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
             is_refused = self._refusals > 0
             self._refusals -= is_refused
@@ -122,7 +121,7 @@ class DiskTrouble:
 
 
 class TroubledDisk:
-    """A disk that meets the trouble before every operation."""
+    """A disk with the simulated fault before every operation."""
 
     def __init__(self, disk: Disk, trouble: DiskTrouble) -> None:
         self._disk = disk
@@ -139,7 +138,7 @@ class TroubledDisk:
         self._disk.sync()
 
     def reserve(self, offset: int, size: int) -> None:
-        """Claim room."""
+        """Reserve space."""
         self._trouble.meet()
         self._disk.reserve(offset, size)
 
@@ -149,12 +148,12 @@ class TroubledDisk:
 
 
 _installed: list[DiskTrouble] = []
-"""Troubles of the virtual rigs that are on in this process; all recordings of a process share one disk."""
+"""Active faults of virtual rigs in this process; all recordings share one disk."""
 
 
 @contextmanager
 def troubled_disks(trouble: DiskTrouble) -> Iterator[None]:
-    """Let every recording of this process that is opened inside meet ``trouble``."""
+    """Apply ``trouble`` to every recording opened in this context."""
     _installed.append(trouble)
     try:
         yield
@@ -171,6 +170,6 @@ def open_disk(path: Path) -> Disk:
 
 
 def meet_trouble() -> None:
-    """Fail as a full disk does before a whole file is written; nothing happens on a sound one."""
+    """Apply the current fault before a whole file is written."""
     for trouble in tuple(_installed):
         trouble.meet()

@@ -1,8 +1,8 @@
-"""Moments in which the vibrometer lost its light: found in the velocity, and bridged from both sides.
+"""Drop-outs of the vibrometer, found in the velocity and bridged from both sides.
 
-Speckle leaves the laser without light for a fraction of a millisecond; the decoder then shows any velocity.
-It leaves the motion within a sample and comes back to it. No motion does: an impact changes the velocity and
-does not take that back, and what rings has many turns.
+Speckle interrupts the laser's signal for a fraction of a millisecond, and the decoder shows an arbitrary
+velocity. The signal departs within one sample and returns. Motion does not: an impact changes the velocity
+for good, and ringing oscillates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,46 +20,46 @@ from ._reader import Recording
 Places = NDArray[np.int64]
 
 LONGEST_S = 4e-3
-"""What is longer is no drop-out that the motion on both sides tells anything of."""
+"""Longest drop-out that can be bridged [s]."""
 LOWEST_RATE_HZ = 20_000.0
-"""Below it an impact and its answer may lie within a few samples."""
+"""Lowest sample rate [Hz]; below it, an impact and its response may lie within a few samples."""
 _FAR = 60.0
-"""How far the fourth difference lies from its usual size where light is lost."""
+"""Fourth difference of a drop-out, relative to its usual size."""
 _HEARD = 6.0
-"""How far it lies where the converter's filter still rings of it."""
+"""Fourth difference of ringing of the converter's filter, relative to its usual size."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
-"""Between two runs of sharp corners, which may be edges of one drop-out or of two."""
+"""Least distance between runs of sharp corners of different edges."""
 _MOST_RUNS = 12
-"""Close to each other; this many corners are made by the motion."""
+"""Number of close corners that indicate motion."""
 _FLANK_S = 1e-3
-"""Length of motion on either side by which a drop-out is recognised."""
+"""Length of motion on each side to recognise a drop-out [s]."""
 _LEAST_HELD = 8
-"""Equal samples in a row that no motion shows between two changes of `_QUANTA`."""
+"""Equal samples in a row, between two changes of `_QUANTA`, that indicate a drop-out."""
 _QUANTA = 4.0
 """Change from sample to sample, over the smallest of the channel, at both ends of equal samples."""
 _LEAST_OF_FLANK = 0.25
-"""Part of it that another drop-out close by must leave."""
+"""Least share of it without other drop-outs."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
-"""Length of motion behind a sample that tells whether it was measured."""
+"""Length of motion after a sample needed to decide about it [s]."""
 _OUTSTANDING = 8.0
-"""Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
+"""Least distance from the bridge relative to the residual of its fit to the flanks."""
 _JUMP = 4.0
-"""Change from sample to sample where light goes, over the fastest of the flanks."""
+"""Change between samples at the edge of a drop-out, relative to the fastest of the flanks."""
 _STEEP = 0.2
-"""The same change over the largest distance from the bridge: between clipped peaks a motion takes longer."""
+"""The same change relative to the largest distance from the bridge; clipped peaks change more slowly."""
 _MOST_PER_S = 400.0
-"""What comes more often is made by the motion."""
+"""Largest rate of drop-outs; more indicate motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
-"""Samples on each side that the linear prediction is taken from."""
+"""Samples on each side for the linear prediction."""
 _TOGETHER = 4 * _CONTEXT
-"""Samples that are solved for at once."""
+"""Most samples solved at once."""
 _BLOCK_S = 1.0
 
 
 class Dropout(NamedTuple):
-    """Samples that show no motion, the converter's ringing about them included."""
+    """Samples of a drop-out, including ringing of the converter."""
 
     first: int
     stop: int
@@ -67,14 +67,14 @@ class Dropout(NamedTuple):
 
 
 def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
-    """Find what leaves the motion and comes back to it.
+    """Find drop-outs, which leave the motion and return to it.
 
     Parameters
     ----------
     velocity
-        A second of it or so, shape (samples,); lost samples are NaN.
+        About one second of velocity, shape (samples,); lost samples are NaN.
     sample_rate_hz
-        Of the samples; nothing is found below 20 kHz.
+        Sample rate; nothing is found below 20 kHz.
     """
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
@@ -104,7 +104,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
 
 
 def _held(velocity: Samples, longest: float) -> list[Dropout]:
-    """Find where the decoder holds one value; noise may hide the edges of such a drop-out."""
+    """Find drop-outs in which the decoder holds one value, whose edges noise may hide."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
@@ -117,7 +117,7 @@ def _held(velocity: Samples, longest: float) -> list[Dropout]:
 
 
 def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
-    """Join drop-outs that leave less than a flank between them: what lies there may be dark as well."""
+    """Join drop-outs with less than a flank between them."""
     joined: list[Dropout] = []
     for each in found:
         if joined and each.first - joined[-1].stop < flank:
@@ -128,7 +128,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Say from which sample on only what comes will tell whether a drop-out has started; else their number.
+    """Return the sample from which a drop-out may have started undetected; else the number of samples.
 
     Parameters
     ----------
@@ -189,17 +189,16 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
 
 
 def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
-    """For how many samples from here on the converter's filter is heard, `_SILENT` of them in a row not."""
+    """Return the length of the ringing of the converter's filter, until `_SILENT` quiet samples in a row."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
 def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
-    """Say what one smooth motion through both flanks leaves of them, mean square; infinite for no drop-out.
+    """Return the mean square residual of one smooth motion through both flanks; infinite for no drop-out.
 
-    What lies between jumps far from that motion. A clipped peak is far from it too, and gets there at the
-    motion's own pace.
+    A drop-out jumps far from that motion. A clipped peak is far from it too, but changes more slowly.
     """
     near = velocity[dropout.first - before : dropout.stop + after]
     if not np.all(np.isfinite(near)):
@@ -220,7 +219,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 
 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
-    """Return the velocity, shape (samples,), with what a linear prediction makes likeliest in drop-outs.
+    """Return the velocity, shape (samples,), with drop-outs bridged by linear prediction.
 
     Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
     prediction error, for a predictor from the samples about them.
@@ -258,7 +257,7 @@ def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int
 
 
 def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
-    """Solve for the samples that are not known, given a predictor from the others, if those are enough."""
+    """Return the most likely unknown samples from a linear predictor, if enough others are known."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
     windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))
@@ -276,14 +275,14 @@ def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
 
 
 _FOUND: WeakKeyDictionary[Recording, dict[tuple[str, int], tuple[Dropout, ...]]] = WeakKeyDictionary()
-"""What was found in each second of an open recording: facts, estimators and tracks ask for the same."""
+"""Cache of the drop-outs in each second of an open recording."""
 
 
 @dataclass(frozen=True, eq=False)
 class BridgedChannel:
-    """The vibrometer's channel of a recording without its drop-outs.
+    """The vibrometer's channel of a recording with bridged drop-outs.
 
-    They are looked for in seconds counted from the first sample, so that whatever is read says the same.
+    They are found second by second from the first sample, so that results do not depend on the range read.
     """
 
     recording: Recording
@@ -294,7 +293,7 @@ class BridgedChannel:
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
-        # With their neighbours, which are no context to learn from.
+        # With their neighbours, which cannot be used as context.
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
@@ -326,6 +325,6 @@ class BridgedChannel:
         heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
-        if end == stop + margin:  # else a recording that grows may tell more
+        if end == stop + margin:  # a growing recording may contain more later
             known[self.role, place] = found
         return found

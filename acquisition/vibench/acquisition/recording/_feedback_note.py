@@ -1,4 +1,4 @@
-"""What a feedback controller notes in a recording, and analysis reads back: one model for each note.
+"""Notes of a feedback controller in a recording, one model for each kind.
 
 A note is an event: its kind is the event's, its text one JSON object of everything else. An event's text
 is short, so that notes of the first version name no version.
@@ -18,11 +18,11 @@ VERSION: Final = 1
 
 
 class Steadiness(StrEnum):
-    """What kind of settled motion it is."""
+    """Kind of a settled motion."""
 
     PERIODIC = "periodic"
     APERIODIC = "aperiodic"
-    """Stationary, but without a period that was looked for: quasi-periodic or chaotic."""
+    """Stationary without a short period: quasi-periodic or chaotic."""
     UNSETTLED = "unsettled"
 
 
@@ -35,7 +35,7 @@ class Held(StrEnum):
 
 
 class JumpSide(StrEnum):
-    """On which branch of a jump a response lies."""
+    """Branch of a response at a jump."""
 
     BEFORE = "before"
     AFTER = "after"
@@ -62,12 +62,12 @@ class LockResult(StrEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> "LockResult | None":
-        """Read what recordings said before periods were counted."""
+        """Read values of older recordings."""
         return cls.LOST if value == "not met within the tries" else None
 
 
 SixFigures = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
-"""A number that is kept to six figures: the recording's table is narrow."""
+"""A number stored to six digits, because the recording's table is narrow."""
 Way = Literal["up", "down"]
 
 
@@ -90,7 +90,7 @@ class AbstractNote(BaseModel):
 
 
 class SettledNote(AbstractNote):
-    """What was found at a frequency after waiting."""
+    """Settled motion at a frequency."""
 
     kind: Literal["settled"] = "settled"
     frequency_hz: float
@@ -108,7 +108,7 @@ class SettledNote(AbstractNote):
 
 
 class SegmentNote(AbstractNote):
-    """The base and the motion over a segment that was recorded once settled."""
+    """Base and motion over a recorded segment."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.STEP, SegmentLabel.SEARCH, SegmentLabel.RESONANCE]
@@ -165,7 +165,7 @@ class ExcursionNote(AbstractNote):
 
 
 class JumpNote(AbstractNote):
-    """What a search between two settled frequencies of a pass came to."""
+    """Result of a search for a jump between two settled frequencies."""
 
     kind: Literal["jump"] = "jump"
     direction: Way
@@ -181,7 +181,7 @@ class JumpNote(AbstractNote):
 
 
 class ResonanceNote(AbstractNote):
-    """What was found of a mode at one level of the base."""
+    """Resonance of a mode at one level of the base."""
 
     kind: Literal["resonance"] = "resonance"
     level: int
@@ -203,7 +203,7 @@ class ResonanceNote(AbstractNote):
     periods: int = 0
     """Drive periods that the search, or the phase-locked loop, took; 0 in recordings that do not say."""
     mode_hz: SixFigures | None = None
-    """Natural frequency; left out where the flanks do not tell it."""
+    """Natural frequency; absent if the flanks do not determine it."""
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
@@ -215,7 +215,7 @@ class ResonanceNote(AbstractNote):
 
 
 class NoiseNote(AbstractNote):
-    """How near the base's spectrum came to the one that was asked for, over one realisation."""
+    """Error of the base's spectrum over one realisation."""
 
     kind: Literal["spectrum"] = "spectrum"
     realisation: int
@@ -229,13 +229,13 @@ class NoiseNote(AbstractNote):
     worst_db: SixFigures
     worst_hz: SixFigures
     notched: SixFigures
-    """Share of the lines that are lowered for the response's sake."""
+    """Share of lines that are lowered to limit the response."""
     kurtosis: SixFigures
     """Kurtosis of the base's acceleration; 3 of Gaussian noise."""
 
 
 class HeldResponseNote(AbstractNote):
-    """What was held of the response at one frequency, and what the base did for it."""
+    """Controlled response at one frequency, and the base level."""
 
     kind: Literal["held_response"] = "held_response"
     frequency_hz: float
@@ -249,7 +249,7 @@ class HeldResponseNote(AbstractNote):
 
 
 class BranchEnd(StrEnum):
-    """Why a branch was left."""
+    """Reason for the end of a branch."""
 
     RANGE = "its frequency left the range"
     POINTS = "it has as many points as were asked for"
@@ -257,7 +257,7 @@ class BranchEnd(StrEnum):
 
 
 class BranchPointNote(AbstractNote):
-    """One motion of a branch, as a fast loop held it; amplitudes are peaks of fundamentals."""
+    """One motion of a branch held by a fast loop; amplitudes are peaks of fundamentals."""
 
     kind: Literal["branch_point"] = "branch_point"
     point: int
@@ -275,21 +275,21 @@ class BranchPointNote(AbstractNote):
     residue_acceleration: SixFigures
     """The same of its acceleration."""
     reference_v: SixFigures
-    """First coefficient of what the controller was told [V]."""
+    """First coefficient of the controller's target [V]."""
     tries: int
 
 
 class Stability(StrEnum):
-    """What a motion would do if the base moved as it should, and no feedback held it."""
+    """Stability of a motion under prescribed base motion without feedback."""
 
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """Its bounds lie on both sides of 1, or the motion was not the same afterwards."""
+    """Undecided: the bounds include 1, or the motion changed."""
 
 
 class BranchStabilityNote(AbstractNote):
-    """What small changes of what was played told of one motion of a branch."""
+    """Stability of one motion of a branch from small perturbations."""
 
     kind: Literal["branch_stability"] = "branch_stability"
     point: int
@@ -314,7 +314,7 @@ class BranchEndNote(AbstractNote):
 
 
 class UntilNote(AbstractNote):
-    """How well results are known of a stretch that is recorded until they are, now or when it ended."""
+    """Bounds of results of a stretch that is recorded until they are met."""
 
     kind: Literal["until"] = "until"
     stretch: int
@@ -335,18 +335,18 @@ class UntilNote(AbstractNote):
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Bound over wish of each result; infinite where no bound is known."""
+        """Bound relative to the requested one for each result; infinite if unknown."""
         found = {name: inf if bound is None else bound for name, bound in self.bounds.items()}
         return tuple(found.get(name, inf) / wish for name, wish in self.wishes.items())
 
     @property
     def is_reached(self) -> bool:
-        """Whether every wish is met."""
+        """Whether all requested bounds are met."""
         return max(self.shares) <= 1.0
 
     @property
     def sentence(self) -> str:
-        """Bounds, wishes, and the time left or what was recorded, in words."""
+        """Return a sentence on bounds, requests, and remaining or recorded time."""
         said = ", ".join(
             f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} of {100 * wish:.2g} %"
             for name, wish in self.wishes.items()
@@ -389,7 +389,7 @@ _KINDS = frozenset((*_FOUND, *_FOLLOWED, "until"))
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:
-    """Read an event as a note; None when it is another event, or was cut short in the file.
+    """Read a note from an event; None for other or truncated events.
 
     Raises RecordingError when it is a note of a version that this program does not know.
     """

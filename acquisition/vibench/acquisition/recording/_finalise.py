@@ -1,7 +1,7 @@
-"""A recording becomes ``NAME.h5``: compressed, sealed, checked, named, and then ``NAME.h5.part`` is let go.
+"""Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
-HDF5's own filter pipeline runs on one core under a global lock. zlib releases the interpreter, so the same
-bytes are made here in threads: shuffle (all first bytes, all second bytes, ...), then deflate.
+HDF5's filters run on one core under a global lock. zlib releases Python's lock, so threads produce the same
+bytes here: shuffle (all first bytes, all second bytes, ...), then deflate.
 """
 
 import hashlib
@@ -40,14 +40,13 @@ from ._reader import open_recording
 from ._seal import SealDepth, SealKey, SealState, check_seal, seal_key, write_seal
 from ._tables import Columns
 
-# A recording as programs of others open it: a labelled curve a channel, as NeXus describes plots.
-#
-# Such programs apply no scale to counts, so that the extremes of every bin stand here once more, in
-# physical units, one after the other in time: drawn as a line they are the envelope of the recording.
+# Labelled curves for other programs, one per channel, as NeXus plots.
+# Such programs do not scale counts, so the extremes of every bin are stored again in physical units; as a
+# line they form the envelope of the recording.
 
 SIGNAL = "values"
 FIRST_CHOICE = "m0_"
-"""Beginning of the role that is plotted where nobody chooses a channel; without it, the first one."""
+"""Prefix of the role that is plotted by default; otherwise the first one."""
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
@@ -66,7 +65,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     counts = np.column_stack((overview.low, overview.high)).ravel()
     values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
     physical = np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)
-    # silx names no vertical axis: the unit stands in the title as well.
+    # silx has no label for the vertical axis, so the title contains the unit too.
     write_text_dataset(data, "title", f"{title}: {role.replace('_', ' ')} [{channel['units']}]")
     write_attributes(
         data.create_dataset(SIGNAL, data=physical, compression="gzip", shuffle=True),
@@ -76,7 +75,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
             "comment": f"smallest and largest of every {BIN_SAMPLES} samples, by turns",
         },
     )
-    # One dataset of times, which each channel's group has under its own name.
+    # One dataset of times, linked from each channel's group.
     times = next((each[layout.TIME] for each in view.values() if layout.TIME in each), None)
     if times is None:
         time_s = np.arange(counts.size) * (0.5 * BIN_SAMPLES / float(file.attrs["sample_rate_hz"]))
@@ -86,7 +85,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
 
 
 IN_FLIGHT_PER_WORKER = 4
-"""Chunks that wait for a worker or for the disk: enough to keep both busy, little memory."""
+"""Number of queued chunks, enough to keep workers and disk busy."""
 
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:
@@ -126,7 +125,7 @@ def _compress(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
 
 
 def _submit(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[bytes]:
-    """Compress a piece in the pool, or here where the system starts no more threads."""
+    """Compress a piece in the pool, or here if the system starts no more threads."""
     try:
         return pool.submit(_chunk, piece, length)
     except RuntimeError:
@@ -150,10 +149,10 @@ INT32_SAMPLES = 2**31
 
 
 def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None = None) -> Path:
-    """Make ``NAME.h5`` of ``NAME.h5.part``, which stays for :func:`discard`, and seal it.
+    """Create and seal ``NAME.h5`` from ``NAME.h5.part``, which :func:`discard` deletes later.
 
-    The caller holds the file: its writer, or a recovery. ``written`` has the checksum of each channel as it
-    was handed over; a recovery does not know them. Raises RecordingError when ``NAME.h5`` exists, the disk
+    The caller has locked the file. ``written`` contains the checksum of each channel's samples; a recovery
+    does not know them. Raises RecordingError when ``NAME.h5`` exists, the disk
     refuses (it may be full), or what was written does not read back the same. ``NAME.h5.part`` is untouched.
     """
     final = part.with_suffix("")
@@ -167,7 +166,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         rename(tmp, final)
     # HDF5 reports a full disk as one or the other.
     except (OSError, RuntimeError, KeyboardInterrupt) as error:
-        # Incomplete, and made by this call; everything in it is in the .part.
+        # An incomplete file of this call, whose content is in the .part.
         with suppress(OSError):
             tmp.unlink()
         if isinstance(error, (RecordingError, KeyboardInterrupt)):
@@ -180,7 +179,7 @@ def whereabouts(part: Path, error: Exception) -> str:
     """Return where the committed samples are after an error of the disk, and what to do."""
     try:
         is_there = part.exists()
-    except OSError:  # the folder does not answer
+    except OSError:  # the folder does not respond
         is_there = False
     # Another file may have the name of one that was removed.
     if is_there and not isinstance(error, FileNotFoundError):
@@ -192,7 +191,7 @@ def whereabouts(part: Path, error: Exception) -> str:
 
 
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` once the name ``NAME.h5`` survives a power cut; one that stays harms nobody."""
+    """Delete ``NAME.h5.part`` once ``NAME.h5`` would survive a power cut; a remaining one is harmless."""
     try:
         sync_folder(part.parent)
         part.unlink()
@@ -238,7 +237,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
 def _write_time(
     copy: h5py.File, samples: int, sample_rate_hz: float, digests: dict[str, str]
 ) -> h5py.Dataset:
-    """Write the time axis: sample numbers with the sample interval as scale, so that it compresses well."""
+    """Write the time axis as sample numbers with the sample interval as scale, which compresses well."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
     settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
     dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
@@ -313,7 +312,7 @@ def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
 
 
 def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype[np.generic]:
-    """Find the type that holds a column's values; text no wider than its longest, for the reader's sake."""
+    """Return the narrowest type for a column's values."""
     if values.dtype.kind != "S":
         return values.dtype
     longest = max((len(value) for value in values.tolist()), default=0)
@@ -322,10 +321,10 @@ def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype
 
 
 def recover(path: Path | str) -> Path:
-    """Finish what an interrupted recording left; returns the path of ``NAME.h5``.
+    """Finish an interrupted recording; return the path of ``NAME.h5``.
 
-    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. What a crash left behind is distinguished by itself:
-    samples that were never compressed, a compressed copy that was never completed, or a complete
+    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. The state after the crash is detected: uncompressed
+    samples, an incomplete compressed copy, or a complete
     one whose ``.part`` was not yet deleted.
 
     Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not ours.
@@ -357,13 +356,13 @@ def _finish(part: Path, final: Path, key: SealKey | None) -> None:
                 raise RecordingError(f"{part} is a finished recording; rename it to {final.name}")
             is_done = final.exists() and _holds(final, source.recording_id, part)
         if not is_done:
-            # Left by a crash while the copy was made; everything in it is in the .part.
+            # Left by a crash during the copy; its content is in the .part.
             layout.tmp_of(final).unlink(missing_ok=True)
             finalise(part, key)
 
 
 def _holds(final: Path, recording_id: str, part: Path) -> bool:
-    """Whether the finished file is the copy of this very recording, and whole."""
+    """Return whether the finished file is an intact copy of this recording."""
     with open_recording(final) as copy:
         same, seal = copy.recording_id == recording_id, copy.check_seal(SealDepth.WHOLE)
     if not same:

@@ -1,4 +1,4 @@
-"""What is known before the first sample: channels, rates, plan, bench, instruments, provenance."""
+"""Facts before the first sample: channels, rates, plan, bench, instruments, provenance."""
 
 import json
 import math
@@ -30,7 +30,7 @@ GIT_PATIENCE_S = 5.0
 
 @dataclass(frozen=True)
 class Provenance:
-    """What is needed to make the same recording again, apart from plan and bench."""
+    """Software and machine of a recording."""
 
     started_utc: str
     """ISO 8601, with microseconds, from the computer's clock."""
@@ -39,13 +39,13 @@ class Provenance:
     process: int
     python: str
     packages: Mapping[str, str]
-    """Version of each package that has a say in the data; of the native engine the digest of its sources."""
+    """Version of each package that affects the data, and digest of the native engine's sources."""
     commit: str
     """Git commit when run from a checkout (``+changes`` when files differ from it), else empty."""
 
 
 def collect_provenance() -> Provenance:
-    """Look at this process, machine and installation, now."""
+    """Return the provenance of this process, machine and installation."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="microseconds"),
         host=platform.node(),
@@ -70,7 +70,7 @@ def _package_versions() -> Mapping[str, str]:
 
 @cache
 def _commit() -> str:
-    """Commit of the checkout this code runs from; an installed wheel lies in none."""
+    """Return the commit of the checkout; empty for an installed wheel."""
     if not (CHECKOUT / ".git").exists():
         return ""
     commit = _git("rev-parse", "HEAD")
@@ -102,7 +102,7 @@ _AC_CUT_HZ = 0.5
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
-"""``expected_samples`` in the file when the recording lasts until somebody stops it."""
+"""``expected_samples`` in the file for a recording without a planned end."""
 
 FINE_STEP = 2.0**-30
 """Step of a channel without a converter step, as a fraction of its range.
@@ -113,7 +113,7 @@ Twice the range still fits an int32, and 2^-30 lies 36 dB below a 24-bit convert
 
 @dataclass(frozen=True)
 class ChannelHeader:
-    """One recorded channel: where it comes from and how its counts become a physical value.
+    """One recorded channel: source and scale of its counts.
 
     ``physical = physical_per_volt * volts + physical_offset``
     """
@@ -125,7 +125,7 @@ class ChannelHeader:
         "volts_at_zero_count": "V",
         "sensitivity": "{0.sensitivity_unit}",
     }
-    """Units of values whose name says none; ``{0.unit}`` is the channel's own."""
+    """Units of values without a unit in their name; ``{0.unit}`` is the channel's."""
 
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""
@@ -139,7 +139,7 @@ class ChannelHeader:
     range_v: float
     """Full scale of the input, plus and minus [V]."""
     volts_per_count: float | None = None
-    """Step of the converter [V]; None when it is not known: volts are then kept to 2^-30 of the range."""
+    """Step of the converter [V]; None if unknown: volts are then stored to 2^-30 of the range."""
     volts_at_zero_count: float = 0.0
     """Offset of the converter's calibration [V]."""
     physical_offset: float = 0.0
@@ -147,13 +147,13 @@ class ChannelHeader:
     """``"AC"`` or ``"DC"``."""
     iepe_current_a: float = 0.0
     sensitivity: float | None = None
-    """As the calibration sheet says it, in ``sensitivity_unit``."""
+    """Sensitivity from the calibration sheet, in ``sensitivity_unit``."""
     sensitivity_unit: str = ""
     serial: str = ""
     calibration_date: str = ""
     """ISO date of the sensor's calibration."""
     delay_s: float = 0.0
-    """How late the channel shows what happened (a vibrometer's decoder, for example)."""
+    """Delay of the channel, for example of a vibrometer's decoder."""
     long_name: str = ""
 
     def __post_init__(self) -> None:
@@ -221,27 +221,27 @@ class ChannelHeader:
 
 @dataclass(frozen=True)
 class RecordingHeader:
-    """Everything that is written before the first sample."""
+    """Data written before the first sample."""
 
     channels: tuple[ChannelHeader, ...]
     """In the order of the rows of a block."""
     sample_rate_hz: float
-    """The rate that the hardware really runs at."""
+    """Actual sample rate of the hardware."""
     expected_samples: int | None
-    """Planned length; None for a recording that lasts until somebody stops it."""
+    """Planned length; None for a recording without a planned end."""
     origin: Origin
     plan_json: str = "{}"
     """The measurement's plan, complete, as JSON."""
     bench_json: str = "{}"
     """The bench configuration, complete, as JSON."""
     requested_sample_rate_hz: float | None = None
-    """What the plan asked for; None when that is what it got."""
+    """Requested sample rate; None if it equals the actual one."""
     instruments: Mapping[str, Identity] = field(default_factory=dict)
-    """Who answered, by the instrument's part in the bench (``"generator"``, ``"digitizer"``)."""
+    """Identities of the instruments by their role (``"generator"``, ``"digitizer"``)."""
     confirmations: Mapping[str, str | float] = field(default_factory=dict)
-    """What the operator confirmed by hand: amplifier gain, vibrometer range and filters."""
+    """Settings confirmed by the operator: amplifier gain, vibrometer range and filters."""
     bench_check_json: str = "{}"
-    """What the last check of the whole bench found, and when, as JSON; ``{}`` when there was none."""
+    """Result of the last bench check as JSON; ``{}`` if there was none."""
     provenance: Provenance = field(default_factory=collect_provenance)
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
-"""The names, shapes and version of the file format: the one place where the layout is spelled out.
+"""Names, shapes and version of the file format.
 
-``docs/recording-format.md`` describes the same for a stranger with h5py or MATLAB.
+``docs/recording-format.md`` describes it for users of h5py or MATLAB.
 """
 
 import json
@@ -17,11 +17,11 @@ from ..errors import RecordingError
 
 FORMAT = "vibench-recording"
 FORMAT_VERSION = 1
-"""Raised whenever an older reader would misunderstand the file."""
+"""Incremented whenever an older reader would misunderstand the file."""
 
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""Superblock 0: what every HDF5 reader since 1.8 understands, MATLAB's included."""
+"""Superblock 0, which every HDF5 reader since 1.8 understands, including MATLAB's."""
 
 SUFFIX = ".h5"
 PART_SUFFIX = ".part"
@@ -35,7 +35,7 @@ DEFLATE_LEVEL = 1
 COUNT_DTYPE = "<i4"
 COUNTER_DTYPE = "<i8"
 MISSING_COUNT = -(2**31)
-"""Stands for a sample that was lost; CF's ``_FillValue``, so that readers show it as NaN."""
+"""Value of a lost sample; CF's ``_FillValue``, so that readers show NaN."""
 LARGEST_COUNT = 2**31 - 1
 
 N_VALID = "n_valid"
@@ -55,13 +55,13 @@ SETTINGS = "settings"
 ROLE_WIDTH = 64
 STATE_WIDTH = 16
 TEXT_WIDTH = 480
-"""Bytes kept of an event's text or of the reason for an end; longer ones are cut with an ellipsis."""
+"""Maximum bytes of an event's text or of a reason; longer ones are cut with an ellipsis."""
 KIND_WIDTH = 32
 NUMBERS_WIDTH = 512
 
 
 class RecordingState(StrEnum):
-    """How a recording ended, or that it has not."""
+    """State of a recording, or how it ended."""
 
     RECORDING = "recording"
     COMPLETE = "complete"
@@ -150,7 +150,7 @@ def part_of(path: Path) -> Path:
 
 
 def tmp_of(path: Path) -> Path:
-    """``NAME.h5.tmp``: the compressed copy while it is being made; and the ``.part`` before it is ready."""
+    """``NAME.h5.tmp``: the incomplete compressed copy, or the incomplete ``.part``."""
     return path.with_name(path.name + TMP_SUFFIX)
 
 
@@ -158,7 +158,7 @@ ELLIPSIS = "…"
 
 
 def encode(text: str, width: int) -> bytes:
-    """UTF-8 bytes of ``text``, at most ``width`` of them; what does not fit gives way to an ellipsis."""
+    """Return at most ``width`` UTF-8 bytes of ``text``, cut with an ellipsis."""
     raw = text.replace("\0", "").encode("utf-8", "replace")
     if len(raw) <= width:
         return raw
@@ -174,7 +174,7 @@ def decode(raw: bytes) -> str:
 Attribute = str | int | float
 
 ATTRIBUTE_BYTES = 60_000
-"""HDF5 keeps an attribute in the object header, which ends at 64 KiB."""
+"""Largest attribute, because HDF5's object header ends at 64 KiB."""
 
 
 def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> None:
@@ -187,11 +187,11 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
 
 
 READ_KINDS = "iufS"
-"""Numbers and text of fixed length. HDF5 believes any length that a variable one claims, up to 16 GB."""
+"""Allowed types: numbers and fixed-length text. HDF5 trusts the stated length of variable ones."""
 
 
 def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:
-    """Every scalar number and text attached to an object, text as ``str``."""
+    """Return every scalar number and text attached to an object, text as ``str``."""
     values: dict[str, Attribute] = {}
     for name in target.attrs:
         found = target.attrs.get_id(name)

@@ -1,7 +1,7 @@
-"""The smallest and largest count of every 128 samples: what a picture of the whole recording needs.
+"""Overview: the smallest and largest count of every 128 samples, for pictures of whole recordings.
 
-Made while a recording is finished, when every sample passes by anyway, and kept in the file's group
-``overview``: a viewer then opens hours as fast as seconds. A file without it is read whole, once.
+It is computed when a recording is finished, and stored in the group ``overview``, so that a viewer opens
+hours as fast as seconds. Without it, a file is read completely once.
 """
 
 from collections.abc import Iterator
@@ -44,32 +44,32 @@ def extremes(counts: Counts) -> CountOverview:
 
 
 class OverviewSums:
-    """Takes a channel piece by piece; every piece but the last is a whole number of bins."""
+    """Overview of a channel that arrives in pieces of whole bins, except the last."""
 
     def __init__(self) -> None:
         self._low: list[Counts] = []
         self._high: list[Counts] = []
 
     def summed(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
-        """Hand pieces on unchanged, and take note of them."""
+        """Yield pieces unchanged while adding them."""
         for piece in pieces:
             self.add(piece)
             yield piece
 
     def add(self, piece: Counts) -> None:
-        """Take the next counts."""
+        """Add the next counts."""
         found = extremes(piece)
         self._low.append(found.low)
         self._high.append(found.high)
 
     def overview(self) -> CountOverview:
-        """Return the extremes of everything taken."""
+        """Return the extremes of all counts."""
         nothing = [np.empty(0, dtype=layout.COUNT_DTYPE)]
         return CountOverview(np.concatenate(self._low or nothing), np.concatenate(self._high or nothing))
 
 
 def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_rate_hz: float) -> None:
-    """Keep a channel's overview beside its samples, scaled like them for readers of netCDF."""
+    """Write a channel's overview, scaled like its samples for readers of netCDF."""
     group = file.require_group(layout.OVERVIEW)
     bins = overview.low.size
     if layout.BIN not in group:
@@ -90,12 +90,12 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
 
 
 def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | None:
-    """Read a channel's overview; None in a file that has none that fits: the samples are there anyway."""
+    """Read a channel's overview; None if it is missing or does not fit."""
     group = file.get(layout.OVERVIEW)
     if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
         return None
     extremes = [group.get(role + suffix) for suffix in (LOW_SUFFIX, HIGH_SUFFIX)]
-    # How many bins the samples fill, the last perhaps in part.
+    # Number of bins; the last may be partly filled.
     if any(
         not isinstance(each, h5py.Dataset)
         or each.shape != (-(-samples // BIN_SAMPLES),)

@@ -1,7 +1,7 @@
-"""The file before its first sample: everything known is written, and room for the rest is claimed.
+"""Create the file before its first sample, with all known facts and reserved space.
 
-After this, nothing but bytes at known places is written until the recording ends: HDF5 itself has
-closed the file, so that no crash can catch it between two steps.
+Afterwards, only bytes at known places are written until the recording ends. HDF5 has closed the file, so
+that no crash can leave it inconsistent.
 """
 
 import os
@@ -29,24 +29,24 @@ from ._layout import Table, write_attributes, write_text_dataset
 
 MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
-"""A plan may run over by 5 % or 10 s, whichever is longer."""
+"""Margin of the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""And be held this long: declared, but given by the disk only as samples come."""
+"""Additional length for a hold; reserved on the disk only as samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length of a recording without a planned end; the disk fills only as samples come."""
+"""Declared length without a planned end; space is reserved only as samples arrive."""
 RESERVE_AHEAD_S = 60.0
-"""How much room a recording claims on the disk at once when it outgrows what it has."""
+"""Space to reserve at once when a recording outgrows its reserve."""
 
 ROOM_FACTOR = 2
-"""While a recording is finished, it and its compressed copy lie side by side."""
+"""Factor of disk space, because a compressed copy is made at the end."""
 
 ITEM_BYTES = 4
 
 
 @dataclass(frozen=True)
 class TablePlaces:
-    """Where a table lies in the file: offset of each column and of its row counter."""
+    """File offsets of a table's columns and row counter."""
 
     table: Table
     columns: tuple[int, ...]
@@ -55,7 +55,7 @@ class TablePlaces:
 
 @dataclass(frozen=True)
 class Places:
-    """Where everything that is written later lies in the file, as byte offsets."""
+    """File offsets of everything that is written later."""
 
     channels: tuple[int, ...]
     n_valid: int
@@ -65,14 +65,14 @@ class Places:
     capacity: int
     """Samples per channel that fit."""
     reserved: int
-    """Samples per channel for which the disk has already given room."""
+    """Samples per channel with reserved space."""
 
 
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
-    """Create ``part`` for the recording ``path`` and claim its room on the disk.
+    """Create ``part`` for the recording ``path`` and reserve its space.
 
-    It is made under another name first, so that a ``.part`` can be opened from its first moment on: a program
-    that is killed here leaves a ``.tmp`` without a sample in it. Raises RecordingError when a file of that
+    It is created under another name first, so that a ``.part`` can always be opened; a kill here leaves a
+    ``.tmp`` without samples. Raises RecordingError when a file of that
     name exists, the folder does not, or the disk is too full.
     """
     capacity, reserved = _lengths(header)
@@ -85,7 +85,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
         _claim(made, places)
         rename(made, part)
         sync_folder(part.parent)
-    # HDF5 reports a failing disk as one or the other.
+    # HDF5 reports a failing disk by either error.
     except (OSError, RuntimeError, KeyboardInterrupt) as error:
         for each in () if isinstance(error, FileExistsError) else (made, part):
             with suppress(OSError):
@@ -100,7 +100,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
 
 
 def _lengths(header: RecordingHeader) -> tuple[int, int]:
-    """Find the samples declared, and the samples for which the disk must have room at once."""
+    """Return the declared samples, and the samples to reserve at once."""
     if header.expected_samples is None:
         declared_s, ahead_s = OPEN_ENDED_S, RESERVE_AHEAD_S
         return round(declared_s * header.sample_rate_hz), round(ahead_s * header.sample_rate_hz)
@@ -160,14 +160,14 @@ def _table(file: h5py.File, table: Table) -> TablePlaces:
 
 
 def _fill(group: h5py.Group, name: str, dtype: str, raw: bytes) -> int:
-    """Create a dataset of one element with a known value; its offset comes back."""
+    """Create a dataset of one element with a known value; return its offset."""
     dataset = _contiguous(group, name, dtype, 1)
     dataset[0] = np.frombuffer(raw.ljust(np.dtype(dtype).itemsize, b"\0"), dtype=dtype)[0]
     return int(dataset.id.get_offset())
 
 
 def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.Dataset:
-    """Create a dataset that has its final place now and is not filled with zeros first."""
+    """Create a dataset at its final place, without filling it with zeros."""
     settings = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     settings.set_layout(h5py.h5d.CONTIGUOUS)
     settings.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
@@ -185,7 +185,7 @@ def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.D
 
 
 def _claim(part: Path, places: Places) -> None:
-    """Let the disk give room for the head of the file and for the reserved samples of each channel."""
+    """Reserve space for the head of the file and for the first samples of each channel."""
     disk = PositionedFile(part)
     try:
         disk.reserve(0, min(places.channels))
@@ -199,7 +199,7 @@ def _claim(part: Path, places: Places) -> None:
 Answer = TypeVar("Answer")
 
 ATTEMPTS = 10
-"""How often another program may change the file first before we give up."""
+"""Number of attempts if other programs change the file."""
 
 _one_at_a_time = threading.Lock()
 
@@ -207,9 +207,8 @@ _one_at_a_time = threading.Lock()
 def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> Answer:
     """Apply ``change`` to a copy of the file, and swap the two.
 
-    A crash leaves the old file untouched (and perhaps a ``.tmp`` beside it). When another program has changed
-    the file meanwhile, the change is made again on top of that. Raises RecordingError when the disk refuses;
-    the file is as it was.
+    A crash leaves the old file unchanged (and perhaps a ``.tmp``). If another program changes the file
+    meanwhile, the change is repeated. Raises RecordingError when writing fails; the file is then unchanged.
     """
     try:
         with _one_at_a_time:
@@ -226,7 +225,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                     sync_file(tmp)
                     if _fingerprint(path) == before:
                         rename(tmp, path)
-                        with suppress(OSError):  # after a power cut either file is there, and both are whole
+                        with suppress(OSError):  # after a power cut either file exists, and both are complete
                             sync_folder(path.parent)
                         return answer
                 finally:
@@ -245,6 +244,6 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
 
 
 def _fingerprint(path: Path) -> tuple[int, int, int]:
-    """Take what differs when another program has put its own copy in place."""
+    """Return a value that changes when another program replaces the file."""
     status = path.stat()
     return (status.st_ino, status.st_mtime_ns, status.st_size)

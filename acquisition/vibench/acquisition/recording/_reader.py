@@ -1,4 +1,4 @@
-"""Reading a recording, days later, on another machine, or while it is still growing."""
+"""Read finished and growing recordings."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,10 +40,10 @@ from ._seal import (
 from ._tables import Event, EventKind, Gap, Segment
 
 LONGEST = 300
-"""Letters that are shown of what is wrong: names and texts in a broken file may be of any length."""
+"""Most letters of a faulty name or text in a message."""
 
 _LOCKED_OTHERWISE = "file locking flag values don't match"
-"""What HDF5 says of a file that this process has open already, with locks."""
+"""HDF5's message for a file that this process has open already with locks."""
 
 
 def open_hdf5(path: Path) -> h5py.File:
@@ -79,7 +79,7 @@ def open_hdf5(path: Path) -> h5py.File:
 
 
 def name_now(path: Path) -> Path:
-    """Return the name that a recording has by now: one that was growing a moment ago may be finished."""
+    """Return the current name of a recording, which may have been finished meanwhile."""
     if path.suffix != layout.PART_SUFFIX or path.exists():
         return path
     final = path.with_suffix("")
@@ -122,30 +122,30 @@ def _require_ours(path: Path, file: h5py.File) -> None:
 
 
 class OpenRecording:
-    """The one thing about a recording that changes: its HDF5 handle."""
+    """HDF5 handle of a recording."""
 
     def __init__(self, path: Path) -> None:
         self.path = name_now(path)
         try:
             self.file: h5py.File = open_hdf5(self.path)
         except RecordingError:
-            # It may have been finished, and got its final name, between the two lines above.
+            # It may have been finished and renamed between the two lines above.
             if name_now(self.path) == self.path:
                 raise
             self.path = name_now(self.path)
             self.file = open_hdf5(self.path)
         self.counts = CheckedCounts()
         self.described = ""
-        """What was read of it when it was opened, samples apart."""
+        """Content at the time of opening, except samples."""
 
     def reopen(self) -> None:
-        """Look at it as it is now."""
+        """Read its current content."""
         self.file.close()
         self.file = open_hdf5(self.path)
 
 
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
-"""What h5py raises when a file's inside is not what its outside promised."""
+"""Errors of h5py for damaged files."""
 
 
 @dataclass(frozen=True)
@@ -166,12 +166,12 @@ class Growth(Enum):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordingDescription:
-    """What a recording says of itself, of its bench and of how it ended."""
+    """Description of a recording, its bench and its end."""
 
     path: Path
     state: RecordingState
     reason: str
-    """Why it ended; empty when nobody said."""
+    """Reason for its end; empty if unknown."""
     sample_rate_hz: float
     requested_sample_rate_hz: float
     origin: Origin
@@ -187,7 +187,7 @@ class RecordingDescription:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording(RecordingDescription):
-    """One recording, as it was when it was opened. Close it, or use it in a ``with`` block."""
+    """One recording as it was when opened. Close it, or use it in a ``with`` block."""
 
     samples: int
     """Valid samples per channel."""
@@ -195,7 +195,7 @@ class Recording(RecordingDescription):
     channels: tuple[ChannelHeader, ...]
     plan: Mapping[str, Any]
     seal: str
-    """SHA-256 of the manifest, as the file says it; empty without one. see `check_seal`."""
+    """SHA-256 of the manifest stated in the file; empty without one. See `check_seal`."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
@@ -204,7 +204,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_growing(self) -> bool:
-        """Whether it is a ``.part``: being recorded, or what a program left that died."""
+        """Whether it is a ``.part``: being recorded or interrupted."""
         return layout.N_VALID in self._open.file
 
     @property
@@ -214,18 +214,18 @@ class Recording(RecordingDescription):
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes of all samples so far, as they are written."""
+        """Bytes of all samples so far, uncompressed."""
         return 4 * len(self.roles) * self.samples
 
     @property
     def packing(self) -> float:
-        """Bytes of the samples over those that the file takes for them: about 1.3 for noise of 20 bits."""
+        """Compression ratio of the samples: about 1.3 for noise of 20 bits."""
         stored = sum(self._open.file[role].id.get_storage_size() for role in self.roles)
         return float(self.stored_bytes / max(stored, 1))
 
     @property
     def check_text(self) -> str:
-        """What the check of the bench found before the run; empty where nothing was noted."""
+        """Result of the bench check before the run; empty if there is none."""
         return " ".join(each.text for each in self.events if each.kind == EventKind.CHECK)
 
     @property
@@ -234,7 +234,7 @@ class Recording(RecordingDescription):
         return tuple(channel.role for channel in self.channels)
 
     def channel(self, role: str) -> ChannelHeader:
-        """Everything that is known about one channel."""
+        """Return the header of one channel."""
         for channel in self.channels:
             if channel.role == role:
                 return channel
@@ -271,13 +271,13 @@ class Recording(RecordingDescription):
             ) from error
 
     def read_overview(self, role: str) -> CountOverview | None:
-        """Return the extremes of every 128 counts, as they were kept; None where the file has none."""
+        """Return the stored extremes of every 128 counts; None if the file has none."""
         return read_overview(self._open.file, self.channel(role).role, self.samples)
 
     def blocks(
         self, roles: Sequence[str], samples: int, start: int = 0, stop: int | None = None
     ) -> Iterator[RecordedBlock]:
-        """Go through a range, ``samples`` at a time (the last block may be shorter)."""
+        """Yield a range in blocks of ``samples`` (the last may be shorter)."""
         if samples < 1:
             raise RecordingError(f"Blocks of {samples} samples were asked for; allowed are 1 and more.")
         begin, end = self._range(start, stop)
@@ -334,17 +334,17 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process found it intact as a whole; later reads are checked against that."""
+        """Whether this process has checked the whole file; later reads are compared with that."""
         return was_checked(self.seal) and self.seal in (noted_seals(self.path) or (self.seal,))
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
-        """Hold every saved result against its own seal; the key is that of `check_seal`."""
+        """Check every saved result against its own seal; the key is as in `check_seal`."""
         used = seal_key() if key is None else key
         return {name: check_result(group, used) for name, group in result_groups(self._open.file).items()}
 
     @property
     def results(self) -> dict[str, SavedResult]:
-        """What analyses have saved, by name."""
+        """Return saved results by name."""
         try:
             return read_results(self._open.file)
         except DAMAGE as error:
@@ -355,7 +355,7 @@ class Recording(RecordingDescription):
 
     @property
     def result_names(self) -> tuple[str, ...]:
-        """Names of what analyses have saved, without reading it."""
+        """Return the names of saved results."""
         return tuple(result_groups(self._open.file))
 
     def save_results(
@@ -365,7 +365,7 @@ class Recording(RecordingDescription):
         settings: Mapping[str, Setting],
         roles: Sequence[str] | None = None,
     ) -> str:
-        """Keep a result beside the samples, and how it was made; returns the name it got.
+        """Save a result with its settings; return its name.
 
         Nothing is overwritten: a name that exists gets ``-2``, ``-3``, ... The file is copied and
         swapped, so that a crash cannot harm the samples. ``roles`` are the channels that were used
@@ -389,7 +389,7 @@ class Recording(RecordingDescription):
         return given
 
     def close(self) -> None:
-        """Let go of the file. Legal at any time."""
+        """Close the file. Legal at any time."""
         self._open.file.close()
 
     def __enter__(self) -> Self:
@@ -431,13 +431,13 @@ def open_recording(path: Path | str) -> Recording:
 
 
 def _require_as_checked(handle: OpenRecording, seal: str) -> None:
-    """Refuse what carries a seal that was checked in this process, and differs from what it was then."""
+    """Raise RecordingError for a changed file whose seal was checked in this process."""
     if was_checked(seal) and check_seal(handle.file, SealDepth.QUICK, seal_key()).state is SealState.DAMAGED:
         raise RecordingError("it is no longer what it was when its seal was checked")
 
 
 def _read(handle: OpenRecording) -> Recording:
-    """Read everything but samples and results, and believe none of it unseen."""
+    """Read and validate everything except samples and results."""
     file = handle.file
     is_part = layout.N_VALID in file
     growing = _growing(handle) if is_part else {}
@@ -480,7 +480,7 @@ def _read(handle: OpenRecording) -> Recording:
 
 
 def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -> None:
-    """Refuse a channel that does not hold the samples that the recording has; raises RecordingError."""
+    """Raise RecordingError for a channel without the stated samples."""
     dataset = file.get(role)
     if (
         not isinstance(dataset, h5py.Dataset)
@@ -495,7 +495,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
+    """Return the state of a ``.part``, which stays "recording" if its program died."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

@@ -1,4 +1,4 @@
-"""The seal of a recording: a checksum of everything in it, made at its end, by which any change shows.
+"""The seal of a recording: a checksum of its whole content, which shows any change.
 
 A manifest lists every group and dataset with two checksums: of its attributes, type and shape, and of its
 data. The SHA-256 of the manifest is the seal. With a key it is signed too (HMAC, RFC 2104). A seal alone
@@ -37,12 +37,12 @@ SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
 RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
 """Attributes of a result's group, which its own seal leaves out."""
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""How HDF5 notes which axis belongs to what: addresses inside the file, by which no number is read."""
+"""HDF5's attributes for axes, which contain addresses inside the file and no data."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
-"""What has several axes is read at once: results, of some megabytes."""
+"""Largest array with several axes, read at once (results)."""
 QUICK_BYTES = 65_536
-"""A quick look reads datasets up to this size: all texts and tables, and no samples of a whole recording."""
+"""Largest dataset of a quick check: all texts and tables, but no samples of a long recording."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Names the file with the key, for every command and program."""
 SHORTEST_KEY = 16
@@ -67,15 +67,15 @@ class SealState(StrEnum):
 
     INTACT = "intact"
     DAMAGED = "damaged"
-    """Something is not as it was sealed."""
+    """Something was changed after sealing."""
     UNSEALED = "unsealed"
-    """Made before recordings had seals: nothing shows whether scales, tables and plan were changed."""
+    """From before recordings had seals; changes of scales, tables and plan do not show."""
     SEAL_GONE = "seal_gone"
     """Written by a version that seals every recording, but the seal is missing."""
     UNFINISHED = "unfinished"
     """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
     OTHER_KEY = "other_key"
-    """Unchanged, but not signed with the key that was given."""
+    """Unchanged, but not signed with the given key."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class SealKey:
 
 
 def seal_key(path: Path | None = None) -> SealKey | None:
-    """Read the key from a file, by default the one that VIBENCH_SEAL_KEY names; None where none is given.
+    """Read the key from a file, by default from VIBENCH_SEAL_KEY; None if none is given.
 
     Raises RecordingError when the file cannot be read, or is too short to be a secret.
     """
@@ -275,7 +275,7 @@ def _data_sha256(item: h5py.HLObject, states: list["Hash"] | None = None) -> str
 
 
 def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
-    """Return a checksum, or a word that is none where data cannot be read."""
+    """Return a checksum, or another text if data cannot be read."""
     try:
         return _data_sha256(item, states)
     except OSError as error:
@@ -410,7 +410,7 @@ def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connecti
 
 
 def opened_to_look(path: Path) -> sqlite3.Connection:
-    """Open a database to read it, also where nothing may be written."""
+    """Open a database read-only, also in a read-only folder."""
     address = path.resolve().as_uri()
     try:
         # One that may write tidies up behind itself when it was the last to look.
@@ -422,7 +422,7 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
         return opened(f"{address}?mode=ro")
 
 
-# Counts that are as they were when the seal was checked: each piece is hashed again as it is read.
+# Counts are compared with the checked seal: each piece is hashed again when it is read.
 # A check reads a recording from end to end, and an analysis reads it again. The process keeps the state of
 # each channel's checksum before every piece, by seal. Later reads of a file with this seal are compared with
 # these states, so that an analysis reads what was checked.
@@ -432,12 +432,12 @@ _KNOWN: dict[str, ChannelStates] = {}
 
 
 def remember(seal: str, states: ChannelStates) -> None:
-    """Hold what carries this seal against these states from now on."""
+    """Compare files with this seal to these states from now on."""
     _KNOWN[seal] = states
 
 
 def forget_checks() -> None:
-    """Hold nothing against what was read before: all is looked at again."""
+    """Forget all checks, so that files are checked again."""
     _KNOWN.clear()
 
 
@@ -453,7 +453,7 @@ class CheckedCounts:
         self._last: dict[str, tuple[int, Counts]] = {}
 
     def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
-        """Return a range of a channel; raises ValueError where it is not what was checked."""
+        """Return a range of a channel; raises ValueError if it was changed after the check."""
         known = _KNOWN.get(seal)
         if known is None:
             return np.asarray(dataset[begin:end], dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Events, segments, overloads and gaps as they are read from a recording."""
+"""Read events, segments, overloads and gaps of a recording."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ Columns = dict[str, NDArray[Any]]
 
 
 class EventKind(StrEnum):
-    """What a run notes by itself; feedback and other programs add kinds of their own."""
+    """Kinds of events of a run; feedback and other programs add further kinds."""
 
     PLAYER = "player"
     CHECK = "check"
-    """What the check of the bench found before the run."""
+    """Result of the bench check before the run."""
     STATE = "state"
     MARK = "mark"
     LIMIT = "limit"
     """Numbers of a limit that was passed, as a JSON object."""
     SPECIMEN = "specimen"
-    """What the live twin found to have changed of the specimen."""
+    """Change of the specimen found by the live twin."""
     LATE = "late"
     """The drive fell behind its plan for a moment: by how much, and where."""
     END = "end"
@@ -129,7 +129,7 @@ def first_number(group: h5py.Group, name: str) -> int:
 
 
 def ending(file: h5py.File) -> tuple[RecordingState, str]:
-    """Say how a ``.part`` ended, and why; one whose program died while it wrote that is recording still."""
+    """Return how and why a ``.part`` ended; "recording" if its program died before."""
     state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     is_whole = state in tuple(RecordingState)
     return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
@@ -143,7 +143,7 @@ def _text(file: h5py.File, name: str) -> str:
 
 
 def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence[str]) -> None:
-    """Refuse rows that speak of samples or channels that are not there; raises RecordingError."""
+    """Raise RecordingError for rows with missing samples or channels."""
     if table is layout.EVENTS:
         is_right = (columns["sample"] >= 0) & np.isfinite(columns["unix_time_s"])
     else:
@@ -241,7 +241,7 @@ def gaps(columns: Columns) -> tuple[Gap, ...]:
 
 
 class SegmentLabel(StrEnum):
-    """What is played while a segment is recorded."""
+    """Label of a segment by its excitation."""
 
     REALISATION = "realisation"
     NOISE = "noise"
@@ -255,7 +255,7 @@ class SegmentLabel(StrEnum):
     BRANCH = "branch"
     """A point of a branch that a fast loop holds."""
     PERTURBED = "perturbed"
-    """Such a point while what is played is changed a little: what tells its stability."""
+    """Such a point with small perturbations of the drive, to find its stability."""
     CHECK = "check"
     """The small sine before the first ramp."""
     LEAD_IN = "lead_in"

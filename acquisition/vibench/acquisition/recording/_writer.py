@@ -1,4 +1,4 @@
-"""Writing a recording: create it, append blocks, note what happens, finish it.
+"""Write a recording: create it, append blocks, add events, finish it.
 
 ::
 
@@ -32,12 +32,11 @@ from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallo
 from ._seal import SealKey, seal_key
 
 COUNT_TOLERANCE = 0.01
-"""How far volts may lie from a whole count. Rounding of float64 is 1e-8 of a count at 24 bits;
-a wrong step or offset shows up as a spread over the whole count."""
+"""Largest distance of volts from a whole count; rounding of float64 is 1e-8 of a count at 24 bits."""
 
 
 class CountScale:
-    """The steps of all channels, ready to turn blocks into counts."""
+    """Converts blocks of volts to counts."""
 
     def __init__(self, channels: Sequence[ChannelHeader]) -> None:
         self._roles = [channel.role for channel in channels]
@@ -46,7 +45,7 @@ class CountScale:
         self._has_converter_step = np.array([channel.volts_per_count is not None for channel in channels])
 
     def counts(self, volts: Samples) -> Counts:
-        """Turn a block into counts, shape (channels, samples); exact where the converter's step is known.
+        """Convert a block to counts, shape (channels, samples); exact if the converter's step is known.
 
         Raises RecordingError when the volts are no multiples of the step, or outside what an int32 holds (NaN
         included).
@@ -81,7 +80,7 @@ RESERVED = 8
 
 
 class DescriptorReserve:
-    """Open descriptors of no use but to be given back."""
+    """Reserve of open file descriptors, released to finish a recording."""
 
     def __init__(self) -> None:
         self._held: list[int] = []
@@ -96,7 +95,7 @@ class DescriptorReserve:
             ) from error
 
     def close(self) -> None:
-        """Give them back. Legal at any time."""
+        """Release them. Legal at any time."""
         while self._held:
             os.close(self._held.pop())
 
@@ -109,7 +108,7 @@ ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILE
 
 
 def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWriter":
-    """Begin a recording: ``NAME.h5.part`` stands on the disk, with all that is known, before this returns.
+    """Start a recording; ``NAME.h5.part`` exists with all known facts when this returns.
 
     Raises RecordingError when the name is not ``NAME.h5``, a file of that name exists in any of its three
     forms, or the disk has no room for the planned samples.
@@ -135,7 +134,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
 
 
 class RecordingWriter:
-    """A recording in the making. Its methods belong to one thread; the disk has its own.
+    """Writer of a recording, used by one thread; the disk has its own.
 
     Leaving the ``with`` block finishes a recording that is not finished yet: as complete, as
     stopped (keyboard) or as failed (any other exception).
@@ -163,7 +162,7 @@ class RecordingWriter:
         self._key = key
         self._digests = {channel.role: hashlib.sha256() for channel in header.channels}
         self.samples = 0
-        """Samples per channel handed over so far."""
+        """Samples per channel so far."""
         self._reserved = places.reserved
         self._is_finished = False
 
@@ -173,7 +172,7 @@ class RecordingWriter:
         return self._committer.committed_samples
 
     def append(self, block: Block) -> None:
-        """Hand over the next samples. Returns at once unless the disk is seconds behind.
+        """Append the next samples. Returns at once unless the disk is seconds behind.
 
         Samples missing between this block and the last are marked as a gap and read as NaN.
 
@@ -203,17 +202,17 @@ class RecordingWriter:
             self._committer.put(self._journal.overload(overload))
 
     def log(self, kind: str, text: str, sample: int | None = None) -> None:
-        """Note an event, at a sample (the next one by default)."""
+        """Add an event at a sample (by default the next)."""
         place = self.samples if sample is None else sample
         LOG.info("%s, sample %d: %s: %s", self.path.name, place, kind, text)
         self._committer.put(self._journal.event(kind, text, place))
 
     def begin_segment(self, label: str, **numbers: Number) -> None:
-        """Begin a named range at the next sample; the analysis finds it by its label and numbers."""
+        """Start a named range at the next sample, with a label and numbers for the analysis."""
         self._committer.put(self._journal.begin_segment(label, numbers, self.samples))
 
     def end_segment(self) -> None:
-        """End the open segment with the last sample handed over."""
+        """End the open segment with the last sample."""
         self._committer.put(self._journal.end_segment(self.samples - 1))
 
     def finish(self, state: RecordingState, reason: str = "") -> Path:
@@ -242,7 +241,7 @@ class RecordingWriter:
             checksums = {role: digest.hexdigest() for role, digest in self._digests.items()}
             finalise(part, self._key, checksums if failure is None else None)
         finally:
-            # What a close can still refuse (a network folder), the ending's sync has refused before.
+            # The sync of the ending has already reported errors that closing could raise.
             with suppress(OSError):
                 self._disk.close()
         discard(part)
@@ -297,10 +296,10 @@ class RecordingWriter:
             )
 
     def _reserve_up_to(self, end: int) -> None:
-        """Keep the claim on the disk ahead of the samples, where the plan has no end or runs far over."""
+        """Reserve space ahead of the samples if the plan has no end or runs far over."""
         rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
         ahead = round(RESERVE_AHEAD_S * rate_hz)
-        # A recording that keeps to its plan never comes here, and so never asks a full disk for more.
+        # A recording of planned length never needs more space.
         lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
         if end + lead <= self._reserved or self._reserved == self._places.capacity:
             return
@@ -311,7 +310,7 @@ class RecordingWriter:
         self._reserved = target
 
     def _fill_gap(self, first: int, stop: int) -> None:
-        """Mark lost samples, in pieces that need little memory."""
+        """Mark lost samples, in small pieces."""
         missing = np.full(GAP_PIECE_SAMPLES, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
         for begin in range(first, stop, GAP_PIECE_SAMPLES):
             counts = np.broadcast_to(
@@ -330,7 +329,7 @@ class RecordingWriter:
         )
 
     def _write_ending(self, state: RecordingState, reason: str) -> None:
-        """State last: a file that says how it ended also says why."""
+        """Write the state last, so that it always has a reason."""
         why = encode(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
         try:
             self._disk.write(self._places.reason, why)

@@ -1,4 +1,4 @@
-"""From converter to recording without a gap: reads blocks, watches them, keeps them, counts the samples."""
+"""Read blocks from the converter, check them, record them, and count the samples."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ BLOCK_S = 0.1
 
 
 class AcquisitionLoop:
-    """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
+    """Acquisition loop, whose clock is the number of samples read: waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """``advance`` is called after every block."""
@@ -22,11 +22,11 @@ class AcquisitionLoop:
         self._digitizer = digitizer
         self._sink = sink
         self.segment: Segment | None = None
-        """The named range that is open."""
+        """The open named range."""
         self.samples = 0
         """Samples recorded so far."""
         self.lost_samples = 0
-        """Samples that the converter did not hand over; they are marked in the recording."""
+        """Samples lost by the converter, which are marked in the recording."""
         self._due_s = 0.0
 
     @property
@@ -35,26 +35,26 @@ class AcquisitionLoop:
         return self.samples / self._digitizer.sample_rate_hz
 
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
-        """Read, keep and hand on blocks until ``duration_s`` more have passed, less a lead.
+        """Read and record blocks for another ``duration_s``, minus a lead.
 
-        The end is the sample nearest to the sum of all durations asked for so far: many short
-        stretches that are no whole number of samples do not drift. A lead [s] is read with the next stretch.
+        The end is the sample nearest to the sum of all durations so far, so that rounding does not
+        accumulate. A lead [s] is read with the next stretch.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
-        # The goal moves when the consumer of the blocks is slow.
+        # The end moves when the consumer of the blocks is slow.
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self.samples))
 
     @property
     def waiting_s(self) -> float:
-        """How long ago the last sample that was read was converted [s]."""
+        """Return the age of the last sample read [s]."""
         return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
 
     def catch_up(self) -> Iterator[Block]:
-        """Read what waits, and let everything after it come that much later."""
-        # Once: while it is read more comes, and how much is no sign of lateness.
+        """Read all waiting samples, and delay everything after them accordingly."""
+        # Once only, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
         longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
@@ -63,7 +63,7 @@ class AcquisitionLoop:
             waiting -= min(longest, waiting)
 
     def linger(self, duration_s: float) -> Block:
-        """Read and keep one block more than was asked for; everything after it comes that much later."""
+        """Read and record an additional block, and delay everything after it accordingly."""
         self._due_s += duration_s
         return self._next(round(duration_s * self._digitizer.sample_rate_hz))
 
@@ -76,11 +76,11 @@ class AcquisitionLoop:
         return block
 
     def cut(self) -> None:
-        """Let the next stretch begin now, however much of the last one is missing."""
+        """Start the next stretch now, even if the last one is incomplete."""
         self._due_s = self.elapsed_s
 
     def enter(self, segment: Segment | None) -> None:
-        """Be inside ``segment`` from the next sample on; an equal one goes on, another one ends."""
+        """Start ``segment`` at the next sample, unless it is open already; end any other."""
         if segment == self.segment:
             return
         if self.segment is not None:
@@ -90,10 +90,10 @@ class AcquisitionLoop:
         self.segment = segment
 
     def log(self, kind: str, text: str) -> None:
-        """Note an event at the next sample."""
+        """Add an event at the next sample."""
         self._sink.log(kind, text, self.samples)
 
     def log_limit_trip(self, error: LimitExceeded) -> None:
-        """Note the numbers of a limit that was passed, at the sample where it was."""
+        """Add an event with the values of a passed limit at its sample."""
         if error.trip is not None:
             self._sink.log(EventKind.LIMIT, json.dumps(asdict(error.trip)), error.trip.sample)

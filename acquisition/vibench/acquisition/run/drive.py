@@ -1,4 +1,4 @@
-"""What makes the sound of a run: a function generator, or an analogue output for what never repeats."""
+"""Signal source of a run: a function generator, or an analogue output for non-repeating signals."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Protocol
@@ -13,10 +13,10 @@ from .stream_drive import StreamDrive
 
 
 class Drive(Protocol):
-    """Plays phases, one after another, while the run reads.
+    """Plays phases in sequence while the run reads.
 
-    A drive never waits: it says how long to read before it has something to do again, and samples
-    read are the only clock. What comes next is announced, since some drives write it ahead.
+    A drive never waits: it yields how long to read until its next action, because samples read are the only
+    clock. Coming phases are announced, because some drives write ahead.
     """
 
     @property
@@ -25,49 +25,49 @@ class Drive(Protocol):
 
     @property
     def pause_s(self) -> float:
-        """Silence between saying what comes after all that was told, and hearing it [s]."""
+        """Silence between an announcement and its effect [s]."""
 
     @property
     def coefficients(self) -> tuple[Any, ...]:
-        """What a real-time controller has measured since the phase began; nothing of other drives."""
+        """Measurements of a real-time controller since the start of the phase; empty for other drives."""
 
     @property
     def is_commanded(self) -> bool:
-        """Whether each change is a command that takes its time while samples are converted."""
+        """Whether each change is a command that takes time during sampling."""
 
     @property
     def setting_vpp(self) -> float:
-        """What is played now, as an amplitude setting, peak to peak [V]; 0 in silence."""
+        """Current amplitude setting, peak to peak [V]; 0 in silence."""
 
     @property
     def is_playing(self) -> bool:
-        """Whether there is anything to ramp down."""
+        """Whether a signal plays that must be ramped down."""
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Get ready before the digitizer starts: the first of ``coming`` begins with its first sample."""
+        """Prepare before the digitizer starts; the first of ``coming`` starts with its first sample."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Say what comes after everything told before; it begins after `pause_s`."""
+        """Announce the phases after all previous ones; they start after `pause_s`."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase; yields how long to read before the next command is due [s]."""
+        """Play a phase; yield how long to read until the next command [s]."""
 
     @property
     def can_hold(self) -> bool:
-        """Whether what is played goes on by itself while nobody tells more."""
+        """Whether the signal continues without further commands."""
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Break off what was announced, and ramp down within ``ramp_s`` [s]; yields as `perform` does."""
+        """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`."""
 
     def cut(self) -> None:
-        """Switch off at once, with a step. Legal at any time."""
+        """Switch off at once without a ramp. Legal at any time."""
 
     def silence(self) -> None:
-        """Be silent as soon as it goes without a step, and at once when that fails. Legal at any time."""
+        """Ramp down as fast as possible, and switch off at once if that fails. Legal at any time."""
 
 
 def drive_for(bench: Bench, measurement: Measurement) -> Drive:
-    """Choose what plays a measurement.
+    """Return the drive for a measurement.
 
     Raises ConfigurationError when the bench has none.
     """
@@ -85,14 +85,14 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
 
 
 def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
-    """Return the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
+    """Return the configured dead man's switch; raises ConfigurationError if it is not possible."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:
         return None
     plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
     frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
     frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
-    if frequency_hz is None:  # nothing is known of what is decided while it plays
+    if frequency_hz is None:  # the course is decided during the run
         raise _without_dead_man(f"{measurement.name} is not a sine of one frequency")
     if frequency_hz * longest_s < 1:
         raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")

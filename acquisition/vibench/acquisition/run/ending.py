@@ -1,4 +1,4 @@
-"""How a run ends: the first cause counts; silence, stop and a finished recording follow whatever fails."""
+"""End of a run: the first cause is reported; silence, stop and a finished recording always follow."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Progress:
     frequency_hz: float | None = None
     """Frequency of the sine that is played; None for anything else."""
     until: UntilNote | None = None
-    """How well results are known, of a recording that lasts until they are."""
+    """Bounds of results, for a recording that lasts until they are met."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class Outcome:
     path: Path
     """The recording."""
     cause: Cause | None = None
-    """What ended it before its plan did; None for a plan carried out."""
+    """Cause of an early end; None for a completed plan."""
 
 
 class Ending:
-    """What the recording and the caller will be told about the end of a run."""
+    """Cause and text of the end of a run."""
 
     def __init__(self) -> None:
         self.state = RunState.FAILED
@@ -54,16 +54,16 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the plan was carried out, how well results are known, and what the converter has lost."""
+        """Note that the plan was completed, with bounds of results and lost samples."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
-        """Note that somebody ended it."""
+        """Note that it was stopped."""
         self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
 
     def is_failed(self, error: Exception, reason: str) -> None:
-        """Note what went wrong; what had ended the run before stays in front."""
+        """Note a failure after any earlier cause."""
         if self._cause is None:
             self.reason, self._cause = reason, _cause_of(error)
         else:
@@ -75,7 +75,7 @@ class Ending:
         return Outcome(self.state, self.reason, path, self._cause)
 
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
-        """Silence, end sampling, finish the recording: each of them, whatever the others do."""
+        """Silence the drive, end sampling and finish the recording, each even if another fails."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, sink)
             leaving.callback(self._stop_listening, digitizer)
@@ -94,7 +94,7 @@ class Ending:
             digitizer.stop()
         except AcquisitionError as failure:
             self._add(failure)
-            if not has_failed_already:  # else the first failure is the cause, and must stay in front
+            if not has_failed_already:  # otherwise the first failure is the cause and stays first
                 raise
 
     def _finish(self, sink: RecordingWriter) -> None:

@@ -13,7 +13,7 @@ from ..instruments import FunctionGenerator, Sweep
 from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
 QUIET = 1.25
-"""Level 0 of a waveform that reaches full range, where ramps begin and end, over the generator's smallest
+"""Level 0 of a full-range waveform, where ramps start and end, relative to the generator's smallest
 setting."""
 
 
@@ -23,15 +23,15 @@ plays is not documented for every firmware, and the times of reading vary by som
 CHECK_MARGIN_S = 0.5
 """Extra length of a check's burst, for commands and the reading of samples [s]."""
 LITTLE = 0.98
-"""A level is not lowered before the frequency changes where it is lowered by less than this."""
+"""Least reduction of a level that is made before the frequency changes."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
-"""Time of a ramp on which no sample is counted."""
+"""Duration of a ramp without counting samples [s]."""
 _ROUNDING_S = 1e-9
 
 
 class DeadMan:
-    """A sine as bursts, each triggered while the run lives; without it the drive ends with its burst.
+    """Dead man's switch: a sine in bursts, each triggered by the running process.
 
     See docs/decisions/0030-dead-man.md.
     """
@@ -43,9 +43,9 @@ class DeadMan:
         self._left_s = 0.0
 
     def arm(self, frequency_hz: float, check_s: float = 0.0) -> None:
-        """Get ready for bursts of whole periods; the output is off or quiet.
+        """Prepare bursts of whole periods; the output is off or quiet.
 
-        A check of ``check_s`` is one burst, which may be longer than others: a gap would change its figures.
+        A check of ``check_s`` is one longer burst, because a gap would change its results.
         """
         longest_s = max(self._longest_s, check_s + CHECK_MARGIN_S if check_s else 0.0)
         cycles = max(1, min(MOST_CYCLES, int(longest_s * frequency_hz)))
@@ -53,12 +53,12 @@ class DeadMan:
         self._generator.arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Let the next burst begin."""
+        """Trigger the next burst."""
         self._generator.trigger()
         self._left_s = self._period_s
 
     def pieces(self, duration_s: float) -> Iterator[float]:
-        """Divide a time of playing so that each burst is triggered when the last one has ended."""
+        """Divide a duration so that each burst is triggered after the end of the last."""
         while duration_s > _ROUNDING_S:
             piece_s = min(duration_s, self._left_s)
             yield piece_s
@@ -69,13 +69,13 @@ class DeadMan:
 
 
 class GeneratorDrive:
-    """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
+    """A `Drive` whose commands take effect at once; each phase is commanded at its start."""
 
     drive_source = DriveSource.GENERATOR
     is_commanded = True
     coefficients = ()
     pause_s = 0.0
-    """A generator need not know what is coming."""
+    """A generator needs no announcement."""
 
     def __init__(
         self, generator: FunctionGenerator, measurement: Measurement, dead_man: DeadMan | None = None
@@ -93,7 +93,7 @@ class GeneratorDrive:
 
     @property
     def can_hold(self) -> bool:
-        """Whether what is played stays by itself: not where it needs a trigger every time, or sweeps."""
+        """Whether the signal continues by itself: not bursts and sweeps."""
         return self._dead_man is None and not isinstance(self._play, Sweep)
 
     @property
@@ -107,7 +107,7 @@ class GeneratorDrive:
         return self._is_on and self._level > 0.0
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Note how long the check plays that comes first; the output is off."""
+        """Note the duration of the first check; the output is off."""
         checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
         self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
@@ -132,27 +132,27 @@ class GeneratorDrive:
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Ramp down from the level of now, in stairs that there is time for; yields how long each is [s]."""
+        """Ramp down from the current level in as many steps as time allows; yield the length of each [s]."""
         yield from self._ramp(0.0, ramp_s, self._stairs_within(ramp_s))
 
     def cut(self) -> None:
-        """Turn the output off, loud as it is."""
+        """Turn the output off at once."""
         self._stop()
 
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
 
-        For the ways out on which no samples can be counted. Some 20 commands of a few milliseconds make a
-        ramp that is short but no step; of a slow generator, four.
+        For exits without sampling. About 20 commands of a few milliseconds make a short ramp; on a slow
+        generator, four.
         """
         try:
-            with suppress(AcquisitionError):  # a ramp that fails leaves it to stop(), which never gives up
+            with suppress(AcquisitionError):  # if the ramp fails, stop() still switches off
                 self._ramp_down_blindly()
         finally:
             self._stop()
 
     def _sound(self, play: Play | None) -> None:
-        """Play the check's small tone at once, without a ramp; or nothing."""
+        """Play the small tone of the check without a ramp, or nothing."""
         match play:
             case Tone(frequency_hz, _):
                 if not self._is_on:
@@ -164,9 +164,9 @@ class GeneratorDrive:
                     self._stop()
 
     def _begin(self, play: Play | None) -> None:
-        """Change what is played, from tone to tone without a break in phase; turn the output on if need be.
+        """Change the signal, between tones with continuous phase; turn the output on if needed.
 
-        Anything but a change from tone to tone must happen at level 0.
+        All other changes must happen at level 0.
         """
         if play != self._play:
             self._load(play)
@@ -174,7 +174,7 @@ class GeneratorDrive:
             self._begin_bursts(play)
 
     def _begin_bursts(self, play: Play | None, check_s: float = 0.0) -> None:
-        """Turn the output on; where there is a dead man, with the first of its bursts."""
+        """Turn the output on, with a dead man's switch by its first burst."""
         match play:
             case Tone(frequency_hz, _) if self._dead_man is not None:
                 self._dead_man.arm(frequency_hz, check_s)
@@ -205,9 +205,9 @@ class GeneratorDrive:
         self._setting_vpp = self._due_vpp
 
     def _change_tone(self, old: Tone, new: Tone) -> None:
-        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way.
+        """Lower the amplitude before the frequency changes, or raise it after, to never exceed the level.
 
-        Where it changes by little, as from step to step of a sweep, the frequency comes first: in its time.
+        For small changes, as between steps of a sweep, the frequency changes first, in time.
         """
         if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
@@ -223,12 +223,12 @@ class GeneratorDrive:
             yield from self._pieces(ramp_s / count)
 
     def _stairs_within(self, ramp_s: float) -> int:
-        """Count the settings that fit into a time, by how long the last took: a stop waits for no more."""
+        """Return the number of settings that fit into a time, from the duration of the last."""
         made = self._stairs if self._setting_takes_s == 0.0 else int(ramp_s / self._setting_takes_s)
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Before the command: should it fail half-way, the output counts as on.
+        # Before the command: if it fails half-way, the output counts as on.
         self._is_on = True
         self._generator.start()
 

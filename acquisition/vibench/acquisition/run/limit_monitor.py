@@ -18,7 +18,7 @@ HIGH_PASS_HZ = 2.0
 
 
 class _Section:
-    """A second-order filter that goes on where the last block ended."""
+    """A second-order filter with state between blocks."""
 
     def __init__(self, numerator: tuple[float, ...], sample_rate_hz: float) -> None:
         corner = 2 * pi * HIGH_PASS_HZ
@@ -27,8 +27,8 @@ class _Section:
 
     def run(self, values: Samples) -> Samples:
         if self._state is None:
-            # As if the first block's mean had been there for ever. Its first value alone would be the peak
-            # of whatever still rings from the run before, and swing for a second.
+            # Start from the mean of the first block. Its first value could be a peak of ringing from the
+            # last run, and the filter would swing for a second.
             self._state = lfilter_zi(self._b, self._a) * float(np.mean(values))
         out, self._state = lfilter(self._b, self._a, values, zi=self._state)
         return np.asarray(out)
@@ -44,7 +44,7 @@ def _high_pass(sample_rate_hz: float) -> _Section:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """The base in the samples of a block."""
+    """Motion of the base in the samples of a block."""
 
     velocity: Samples
     """[m/s]"""
@@ -53,23 +53,23 @@ class BaseMotion:
 
 
 class BaseTracker:
-    """Follows the base from its acceleration: each integration is one with a second-order high pass."""
+    """Integrates the base acceleration, each time with a second-order high pass."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._to_velocity = _integrator(sample_rate_hz)
         self._to_displacement = _integrator(sample_rate_hz)
 
     def follow(self, acceleration: Samples) -> BaseMotion:
-        """Take the next samples [m/s2]; they must follow the last ones without a gap."""
+        """Add the next samples [m/s2], without a gap."""
         velocity = self._to_velocity.run(acceleration)
         return BaseMotion(velocity, self._to_displacement.run(velocity))
 
 
 class SpecimenTracker:
-    """Follows the main mass against the base: what its springs are stretched by.
+    """Tracks the displacement of the main mass relative to the base, which stretches the springs.
 
-    Each integral that the sensor of m0 does not need is a high pass instead, so that both motions have the
-    same phase and their difference is right at low frequencies too.
+    Missing integrations of m0's sensor are replaced by high passes, so that both motions have the same
+    phase.
     """
 
     def __init__(self, sample_rate_hz: float, role: Role = Role.M0_VELOCITY) -> None:
@@ -89,23 +89,22 @@ class SpecimenTracker:
 
 
 RMS_S = 1.0
-"""Time over which the current's rms is formed [s]: a limiter minds heat, not peaks."""
+"""Averaging time of the rms current [s], since the limit is thermal."""
 REACTION = 1.1
-"""How much the force on the table may pass the coil's limit: the specimen, a tenth of the moving mass,
-pushes back on the table, and that push is not the coil's."""
+"""Tolerance of the force on the table above the coil's limit, for the reaction of the specimen."""
 SETTLING_S = 0.5
-"""For so long after its beginning [s], nothing integrated is judged: an AC-coupled input whose current has
-just been switched on drifts to its rest, which integrated twice is metres. A run is at the low level of its
-check then, and what is measured itself is judged from the first sample on."""
+"""Start-up time [s] in which integrated quantities are not checked: an AC-coupled input drifts after its
+current is switched on, which integrates to metres. The run is at the low level of its check then, and
+measured quantities are checked from the first sample."""
 _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 
 @dataclass(frozen=True)
 class _MonitoredQuantity:
-    """One quantity over a block, next to its limit."""
+    """One quantity over a block, with its limit."""
 
     role: Role
-    """The channel that it is taken from."""
+    """Its source channel."""
     what: str
     values: Samples
     limit: float
@@ -114,10 +113,10 @@ class _MonitoredQuantity:
 
 
 class LimitMonitor:
-    """Says when the run must end.
+    """Decides when the run must end.
 
-    It sits in the loop that reads the samples, with nothing between it and the generator: no window
-    and no other process has a say. Blocks must come one after the other; after a gap it begins again.
+    It is part of the loop that reads the samples, independent of windows and other processes. Blocks must
+    be consecutive; after a gap it restarts.
     """
 
     def __init__(
@@ -147,7 +146,7 @@ class LimitMonitor:
             raise self._overloaded(block, block.overloads[0])
 
     def note_change(self, text: str, sample: int) -> None:
-        """Take a change of the specimen, seen at a sample; the next block raises it if the plan says so."""
+        """Report a change of the specimen at a sample; the next block raises it if the plan requires."""
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
             trip = LimitTrip(
                 channel=self._response.value,
@@ -172,7 +171,7 @@ class LimitMonitor:
         self._mean_square_a2 = 0.0
 
     def _monitored_quantities(self, block: Block) -> Iterator[_MonitoredQuantity]:
-        """Everything with a limit: what is measured comes before what follows from it."""
+        """Return all quantities with limits, measured ones first."""
         rows = {
             channel.role: volts * channel.units_per_volt
             for channel, volts in zip(self._channels, block.volts, strict=True)
@@ -211,7 +210,7 @@ class LimitMonitor:
             )
 
     def _table(self, acceleration: Samples, base: BaseMotion) -> _MonitoredQuantity:
-        """Force that moves the table: mass times acceleration, and what its suspension takes."""
+        """Return the force on the table: mass times acceleration, and the force of its suspension."""
         shaker = self._rig.shaker
         force = (
             suspended_mass_kg(shaker) * acceleration
@@ -235,7 +234,7 @@ class LimitMonitor:
         yield _MonitoredQuantity(
             role, "the amplifier voltage", voltage, clip_v, "V", f"clipping of the {rig.amplifier.model}"
         )
-        # The coil's inductance is left out, which makes the current too large, by 3 % at 1 kHz.
+        # The coil's inductance is neglected, which overestimates the current by 3 % at 1 kHz.
         current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
         peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
         yield _MonitoredQuantity(
@@ -312,7 +311,7 @@ class LimitMonitor:
 
 
 def _blind(block: Block, role: Role) -> NDArray[np.bool_]:
-    """Mark the samples of a block in which a sensor is past its range."""
+    """Return the samples of a block in which a sensor exceeds its range."""
     is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
     for overload in block.overloads:
         if overload.channel == role.value:

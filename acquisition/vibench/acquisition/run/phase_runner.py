@@ -1,4 +1,4 @@
-"""Playing phases while every block is read, kept and held to the limits."""
+"""Play phases while every block is read, recorded and checked against the limits."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -27,18 +27,18 @@ of frequencies."""
 
 
 CLEAR = 0.3
-"""Share of the amplitude beyond which a sample is above or below zero for sure."""
+"""Share of the amplitude beyond which a sample is clearly above or below zero."""
 
 
 class Heard(Protocol):
-    """What takes blocks as they are read."""
+    """Consumer of blocks."""
 
     def append(self, block: Block) -> None:
-        """Take the next one."""
+        """Add the next block."""
 
 
 class GlideWatch:
-    """Counts the cycles of the recorded drive by its rising edges, and holds them against the plan."""
+    """Counts the cycles of the recorded drive by its rising edges, and compares them with the plan."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -46,7 +46,7 @@ class GlideWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Forget: another glide may begin."""
+        """Reset for another glide."""
         self._first: tuple[float, float] | None = None
         """Planned cycles at the first edge, and the frequency there [Hz]."""
         self._last_hz = 0.0
@@ -66,9 +66,9 @@ class GlideWatch:
         duration_s: float,
         course: Callable[[float], float] | None = None,
     ) -> None:
-        """Take what was recorded while a tone of the glide should have played.
+        """Add the record of a tone of the glide.
 
-        ``course`` gives the cycles since its beginning, of what is a tone on average only.
+        ``course`` returns the cycles since its start, for tones on average only.
         """
         if not blocks:
             return
@@ -89,7 +89,7 @@ class GlideWatch:
         self._last_hz = frequency_hz
 
     def _rises(self, block: Block, frequency_hz: float) -> Samples:
-        """Return the times at which the drive rises through zero [s]; noise around zero makes none."""
+        """Return the times at which the drive rises through zero [s], ignoring noise around zero."""
         volts, rate_hz = block.volts[self._row], self.sample_rate_hz
         low, high = float(volts.min()), float(volts.max())
         if volts.size * frequency_hz >= rate_hz:
@@ -104,7 +104,7 @@ class GlideWatch:
 
     @property
     def more_cycles(self) -> float:
-        """Cycles that the drive has more than planned; 0 within what a converter's delay makes of it."""
+        """Return the additional cycles of the drive; 0 within the effect of the converter's delay."""
         if self._first is None:
             return 0.0
         delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._first[1])
@@ -112,7 +112,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Holds a sweep that the generator makes by itself against its course, block by block."""
+    """Compares a sweep by the generator with its planned course, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide
@@ -120,7 +120,7 @@ class SweepWatch:
         self._time_s = 0.0
 
     def append(self, block: Block) -> None:
-        """Take the next block as the part of the sweep that belongs to it."""
+        """Add the next block of the sweep."""
         began_s, duration_s = self._time_s, block.volts.shape[1] / self._glide.sample_rate_hz
         began = self._sweep.cycles(began_s)
         self._time_s += duration_s
@@ -129,21 +129,20 @@ class SweepWatch:
 
 
 HOLD_LONGEST_S = HOLD_ROOM_S
-"""How long a run may be held in all [s]: its recording has room for that."""
+"""Longest total hold of a run [s], limited by the space of its recording."""
 
 
 LATEST = 0.5
-"""How late a glide from step to step may be, in steps."""
+"""Largest delay of a glide, in steps."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
-"""Late steps in a row that last longer, with their lateness, are not just a busy moment [s]."""
+"""Duration of late steps in a row that counts as a fault [s]."""
 LEARNT = 0.05
-"""Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
-ones it is more, so that the mean is learnt."""
+"""Least share of a delay by which later commands are sent earlier; larger for the first ones."""
 LONGEST_LEAD = 0.25
 """Longest lead of a step."""
 TOLD_CYCLES = 0.1
-"""Behind its plan by more than this at its end, a glide is noted."""
+"""Delay at the end of a glide that is noted."""
 MOST_MADE_UP = 3.0
 """Largest change of a frequency that makes up for lost cycles, over the step between two frequencies."""
 LEAST_LEFT = 0.2
@@ -152,20 +151,20 @@ _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
 class _Pace(Enum):
-    """What decides when a phase and its pieces begin."""
+    """Time base of a phase and its pieces."""
 
     AFTER_THE_COMMAND = auto()
-    """The end of its first command: what settles, settles from then on."""
+    """The end of its first command, for settling."""
     OF_THE_COMMANDS = auto()
-    """The plan, or the end of the last command where that is later: ramps."""
+    """The plan, or the end of the last command if later, for ramps."""
     OF_THE_PLAN = auto()
-    """The plan, to which a glide must keep."""
+    """The plan, for glides."""
     OF_ITSELF = auto()
-    """Nothing: no command is due, or none takes time."""
+    """None: no command is due, or none takes time."""
 
 
 class Stopped(Exception):
-    """Somebody asked the run to end."""
+    """The run was requested to end."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.reason)
@@ -173,10 +172,10 @@ class Stopped(Exception):
 
 
 class PhaseRunner:
-    """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
+    """The sampling part of a run: phases, holds, and the ramp of an early end.
 
     After every block it checks the limits and the switch: it raises LimitExceeded, RunStalled or
-    `Stopped`, and it is up to the run to let it ramp down.
+    `Stopped`, and the run then ramps down.
     """
 
     def __init__(
@@ -210,7 +209,7 @@ class PhaseRunner:
 
     @property
     def coefficients(self) -> tuple[Any, ...]:
-        """What a real-time controller has measured since the last phase began."""
+        """Measurements of a real-time controller since the start of the last phase."""
         return self._drive.coefficients
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
@@ -229,9 +228,9 @@ class PhaseRunner:
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
-            yield from self._catch_up()  # its first sample is that of the trigger
+            yield from self._catch_up()  # its first sample is at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # a segment holds nothing of the time in which its successor is commanded
+            self.loop.enter(None)  # a segment excludes the time in which its successor is commanded
         waits = self._drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
@@ -248,13 +247,13 @@ class PhaseRunner:
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _heard(self, phase: Phase) -> Heard | None:
-        """Return what takes the blocks of a phase whose drive is checked against the plan."""
+        """Return the consumers of the blocks of a phase whose drive is checked against the plan."""
         if not self._may_glide(phase):
             return None
         return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
 
     def _may_glide(self, phase: Phase) -> bool:
-        """Whether a phase may be a tone of a sweep that is recorded, command by command."""
+        """Return whether a phase may be a tone of a recorded sweep by commands."""
         return self._drive.is_commanded and phase.state is RunState.RECORDING
 
     def _pace_of(self, phase: Phase) -> "_Pace":
@@ -278,7 +277,7 @@ class PhaseRunner:
             return phase
         planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
         self._lost_cycles += (planned_hz - self._glided_hz) * late_s
-        # Of the plan's own step: what was made up before must not grow from one step to the next.
+        # Relative to the plan's step, so that corrections do not accumulate.
         most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
         wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
         more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
@@ -287,7 +286,7 @@ class PhaseRunner:
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
 
     def _tell_lost_cycles(self) -> None:
-        """Note how far the recorded drive is from its plan at the end of a glide, if it is."""
+        """Note any deviation of the recorded drive from its plan at the end of a glide."""
         more, self._lost_cycles = self._glide.more_cycles, 0.0
         self._glide.begin()
         if abs(more) > TOLD_CYCLES:
@@ -333,10 +332,10 @@ class PhaseRunner:
     def ramp_down_early(
         self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
     ) -> Iterator[Progress]:
-        """Ramp down from wherever the run is, within no limits; a segment that is open stays incomplete.
+        """Ramp down from the current state without limit checks; an open segment stays incomplete.
 
-        A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
-        The end is silence that was measured; raises InstrumentError when it does not come.
+        A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of each [s]. Waits for
+        measured silence; raises InstrumentError without it.
         """
         self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
@@ -359,7 +358,7 @@ class PhaseRunner:
         self._silence.require_silence()
 
     def _listened(self) -> Iterator[Progress]:
-        """Go on recording until the drive is silent where it is measured."""
+        """Continue recording until the measured drive is silent."""
         give_up_s = self.loop.elapsed_s + LONGEST_S
         yield from self._read(LISTEN_S)
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
@@ -375,9 +374,10 @@ class PhaseRunner:
                 yield from self._held()
 
     def _held(self) -> Iterator[Progress]:
-        """Stay where the run is, monitored and recorded, until it is resumed or stopped.
+        """Hold the run, monitored and recorded, until it is resumed or stopped.
 
-        What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
+        Signals that must be fed cannot be held, and the recording has space for `HOLD_LONGEST_S`; then it
+        is
         ramped down.
         """
         if not self._drive.can_hold:
@@ -397,13 +397,13 @@ class PhaseRunner:
         self._enter(before)
 
     def _go_on(self, block: Block) -> None:
-        """Raise what ends the run early: a limit, a stall, or somebody's wish."""
+        """Raise the cause of an early end: a limit, a stall, or a request."""
         self._limit_monitor.require_safe(block)
         if (request := self._switch.request) is not None:
             raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
 
     def _told(self, block: Block) -> Progress:
-        """Note what others want to be noted, and tell where the run stands."""
+        """Add requested events, and return the progress."""
         loop = self.loop
         for text in self._switch.take_marks():
             loop.log(EventKind.MARK, text)

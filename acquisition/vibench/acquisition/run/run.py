@@ -1,4 +1,4 @@
-"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
+"""Run a measurement: check, ramp up, settle, record, ramp down, and always silence."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -44,13 +44,13 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""A step of a glide must be longer than a setting takes by this factor: not all take the same time."""
+"""Least ratio of the step of a glide to the time of a setting, which varies."""
 _MOST_COMMANDS = 2
 """For one change of tone: amplitude and frequency."""
 
 
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
-    """Refuse a glide whose steps are too short; return how much longer a plan of settled tones will take [s].
+    """Refuse a glide with too short steps; return the additional time of a plan of settled tones [s].
 
     Raises ConfigurationError when a step is shorter than the generator takes for a setting, measured now.
     """
@@ -70,7 +70,7 @@ def require_time_for_commands(measurement: Measurement, generator: FunctionGener
 
 
 def _commands_of_a_step(measurement: Measurement) -> int:
-    """Frequency, and amplitude where that changes too: under feedback it may at any step."""
+    """Return the commands per step: frequency, and amplitude if that may change."""
     if isinstance(measurement.excitation, AbstractFeedback):
         return _MOST_COMMANDS
     levels = {
@@ -80,14 +80,14 @@ def _commands_of_a_step(measurement: Measurement) -> int:
 
 
 def _rounded_up(step_s: float) -> float:
-    """Return a hundredth of a second more, at most."""
+    """Round up to 0.01 s."""
     return -(-step_s // 0.01) * 0.01
 
 
 def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] | None:
-    """Return the feedback controller of a measurement; None for one whose course is known.
+    """Return the feedback controller of a measurement; None without feedback.
 
-    Raises ConfigurationError when the bench cannot do it: before anything plays.
+    Raises ConfigurationError when the bench does not support it, before anything plays.
     """
     if not isinstance(measurement.excitation, AbstractFeedback):
         return None
@@ -100,7 +100,7 @@ def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] |
 
 
 def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> RecordingHeader:
-    """Describe the recording of ``planned_s`` that a run of ``measurement`` on ``bench`` is going to make."""
+    """Return the header of the recording of ``planned_s`` of ``measurement`` on ``bench``."""
     rig = bench.rig
     steps = bench.digitizer.volts_per_count
     sample_rate_hz = bench.digitizer.sample_rate_hz
@@ -119,7 +119,7 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
 
 
 def _origin(bench: Bench) -> Origin:
-    """Return where samples come from: simulated where the rig is, or an instrument knows that its own are."""
+    """Return the origin of samples: simulated for a virtual rig or simulated instruments."""
     told = {identity.origin for identity in bench.identities.values()}
     simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
     return Origin.SIMULATED if simulated else Origin.REAL
@@ -155,7 +155,7 @@ CreateRecording = Callable[[Path, RecordingHeader], RecordingWriter]
 
 
 class Run(ClosedOnLeaving):
-    """One measurement being carried out: iterate it, and it plays, watches and records, block by block.
+    """Run of one measurement: iterate it to play, check and record, block by block.
 
     `RunState` has the diagram of its states. However the run ends (plan done, cancelled, limit,
     failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards
@@ -181,15 +181,15 @@ class Run(ClosedOnLeaving):
         create: CreateRecording = create_recording,
         switch: StopSwitch | None = None,
     ) -> None:
-        """``switch``: what others hold or end the run by; one of its own if absent."""
+        """``switch`` lets others hold or end the run."""
         self.switch = StopSwitch() if switch is None else switch
-        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
+        """Holds or ends the run within a block, from any thread or signal handler."""
         self._bench = bench
         self._measurement = measurement
         self._path = path
         self._bench_check = bench_check
         self._create = create
-        self._drive: Drive  # chosen when the plan is admitted; nothing plays before
+        self._drive: Drive  # chosen when the plan is admitted, before anything plays
         self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
         self._guard: DriveGuard  # likewise
         self._controller: Controller[None] | None = None
@@ -206,7 +206,7 @@ class Run(ClosedOnLeaving):
 
     @property
     def state(self) -> RunState:
-        """Where the run stands."""
+        """State of the run."""
         return self._state if self._runner is None else self._runner.state
 
     @property
@@ -215,14 +215,14 @@ class Run(ClosedOnLeaving):
         return self._ending.outcome(self._path)
 
     def cancel(self, reason: str = "cancelled") -> None:
-        """Ask the run to ramp down and end, as the operator would.
+        """Request the run to ramp down and end.
 
-        Without effect on a run that has ended, or is ramping down for the last time.
+        It has no effect on a run that has ended or is in its final ramp.
         """
         self.switch.ask(StopRequest.by(Cause.OPERATOR, reason))
 
     def close(self) -> None:
-        """End the run if it has not ended: ramp down, silence, finish the recording."""
+        """End the run if needed: ramp down, silence, finish the recording."""
         self._blocks.close()
 
     def __iter__(self) -> Iterator[Progress]:
@@ -263,7 +263,7 @@ class Run(ClosedOnLeaving):
                     self._until.close()
 
     def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
-        """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
+        """Play the plan; after a stop or a limit, ramp down as fast as the cause requires."""
         try:
             yield from self._played(runner)
             self._ending.is_finished(runner.loop.lost_samples, self._known)
@@ -283,7 +283,7 @@ class Run(ClosedOnLeaving):
             raise
 
     def _admitted(self) -> RecordingWriter:
-        """Refuse what can be refused before anything moves; then begin the recording."""
+        """Check everything before anything moves; then start the recording."""
         self._state = RunState.CHECKING
         try:
             require_checkable(self._bench.channels)
@@ -318,7 +318,7 @@ class Run(ClosedOnLeaving):
             playing = phases(self._measurement)
         if self._until is not None:
             playing = self._until.phases(self._measurement)
-        # What an output plays is written ahead: it reads the same phases as the run, somewhat earlier.
+        # An output writes ahead, so it reads the same phases earlier than the run.
         playing, announced = tee(playing)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
@@ -330,7 +330,7 @@ class Run(ClosedOnLeaving):
                 self._begin(announced)
                 loop.log(EventKind.CHECK, "left out: the bench was checked shortly before")
                 pause_s = 0.0
-        del announced  # what a drive does not read ahead need not be kept
+        del announced  # not stored for drives that do not read ahead
         yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
         if self._controller is None:
             for phase in playing:
@@ -342,14 +342,14 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _note_known(self, loop: AcquisitionLoop) -> None:
-        """Note of each stretch how well its results are known; the reason states the last."""
+        """Note the bounds of each stretch; the reason of the end states the last."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)
             self._known = f"; {note.sentence}"
 
     def _before_s(self) -> float:
-        """Time before the first ramp [s]; the signal is announced only after the check has passed."""
+        """Return the time before the first ramp [s]; the signal is announced after the check has passed."""
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 return CHECK_S + self._drive.pause_s
@@ -384,13 +384,13 @@ class Run(ClosedOnLeaving):
         return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
-        """How long the ramp of a stop takes [s]."""
+        """Return the duration of the ramp of a stop [s]."""
         planned_s = self._measurement.ramp_s
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
 
 def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
-    """Carry out actions one by one; the samples of each decide the next."""
+    """Perform actions one by one; the samples of each determine the next."""
     try:
         action = next(controller)
         while True:
@@ -405,7 +405,7 @@ def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[P
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Watch nothing."""
+    """Ignore the progress."""
 
 
 def run_measurement(
@@ -417,7 +417,7 @@ def run_measurement(
     create: CreateRecording = create_recording,
     switch: StopSwitch | None = None,
 ) -> Outcome:
-    """Carry out ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
+    """Run ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
 
     ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C
     ramps down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt.
@@ -429,7 +429,7 @@ def run_measurement(
         finished as failed.
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
-    # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
+    # Signals stay blocked until the run has ended, so that nothing interrupts the silencing.
     with stop_on_signal(run.switch, path.stem), run:
         for progress in run:
             on_progress(progress)

@@ -1,7 +1,6 @@
-"""Whether the drive is silent, as the converter measures it: what was commanded need not be what is.
+"""Measured silence of the drive, because commands may fail.
 
-A converter is read late where its process stood still or was busy: the samples that come after the last
-command are then of a time before it.
+After a stall, samples read after the last command may be older than it.
 """
 
 from collections.abc import Callable
@@ -23,28 +22,27 @@ from .acquisition_loop import BLOCK_S
 from .drive import Drive
 
 DRIVE_TOLERANCE = 0.15
-"""How far the measured drive may lie from the setting: a wrong load is a factor of 2, a cable is nothing."""
+"""Tolerance of the measured drive; a wrong load is a factor of 2."""
 BASE_FACTOR = 10 ** (3 / 20)
-"""How far the base acceleration may lie from the model, specimen included: 3 dB, either way."""
+"""Tolerance of the base acceleration relative to the model: 3 dB."""
 WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
-"""Share of the expected signal that may be there before anything plays."""
+"""Largest share of the expected signal before anything plays."""
 STILL_SHARE = 0.3
-"""Share of the quiet stretch that is not judged: what a run before was cut off at is still in the converter's
-filter, and the table still moves."""
+"""Share of the quiet stretch that is ignored, because the converter's filter and the table may still ring."""
 
 
 class LowLevelCheck(StrEnum):
-    """Whether a run begins with the check of the bench."""
+    """Whether a run starts with a bench check."""
 
     AT_LOW_LEVEL = "at low level"
     RECENTLY_PASSED = "recently passed"
-    """The bench was checked in the same session and nothing was touched since."""
+    """Left out: the bench was checked in the same session and not touched since."""
 
 
 @dataclass(frozen=True)
 class CheckFigures:
-    """What the check measured, as peak amplitudes of the sine."""
+    """Results of the check, as peak amplitudes of the sine."""
 
     drive_v: float
     expected_drive_v: float
@@ -68,7 +66,7 @@ def check_figures(
     sample_rate_hz: float,
     amplitude_vpp: float,
 ) -> CheckFigures:
-    """Compare what was measured before and while the check's sine played with what should be there.
+    """Compare the record before and during the sine of the check with expectations.
 
     Parameters
     ----------
@@ -78,7 +76,7 @@ def check_figures(
     Raises
     ------
     CheckFailed
-        Saying what does not fit and where to look.
+        With the deviation and advice.
     """
     quiet = quiet[:, round(STILL_SHARE * quiet.shape[1]) :]
     drive = _row(channels, Role.DRIVE_VOLTAGE)
@@ -114,7 +112,7 @@ def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -
 
 
 def require_checkable(channels: tuple[Channel, ...]) -> None:
-    """Refuse a rig without the two channels that every safe run needs."""
+    """Raise an error for a rig without the two channels that every safe run needs."""
     for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION):
         _row(channels, role)
 
@@ -170,17 +168,17 @@ def _require_base(figures: CheckFigures) -> None:
 SILENT_V = 5e-3
 """Half of peak to peak at the amplifier's input: noise, hum, and the lowest setting of a generator [V]."""
 HUM_FACTOR = 2.0
-"""On a wire that hums louder than that while nothing plays, this many times the hum."""
+"""Multiple of the hum if that is larger while nothing plays."""
 LISTEN_S = 0.02
-"""A period of the mains, at once the step in which silence is looked for [s]."""
+"""Period of the mains, the step of the search for silence [s]."""
 LONGEST_S = 12.0
-"""How long is listened at most [s]: longer than the converter's buffer is."""
+"""Longest listening time [s], longer than the converter's buffer."""
 STILL_ON = 0.1
-"""Share of the drive before the stop that is no hum."""
+"""Share of the drive before the stop that cannot be hum."""
 
 
 class SilenceWatch:
-    """Follows the recorded drive from the moment a stop is seen until nothing is left of it."""
+    """Tracks the recorded drive from a stop until it is silent."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -195,38 +193,38 @@ class SilenceWatch:
         """Whether the drive was still present at the end of the listening time."""
 
     def learn_hum(self, quiet: Samples) -> None:
-        """Take volts (channels, samples) of a time at which nothing played."""
+        """Measure the hum from volts (channels, samples) while nothing plays."""
         drive = self._drive(quiet)[round(STILL_SHARE * quiet.shape[1]) :]
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
     def begin(self, sample: int) -> None:
-        """Note that a stop was seen before this sample."""
+        """Note a stop before this sample."""
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
-        """Take the next samples."""
+        """Add the next samples."""
         drive = self._drive(block.volts)
         self._residue_v = _half_peak_to_peak(drive)
         self._loudest_v = max(self._loudest_v, self._residue_v)
-        # About its own mean: an offset of the input is no sound.
+        # About its mean: an offset of the input is no signal.
         loud = np.flatnonzero(np.abs(drive - np.mean(drive)) > self._silent_v)
         if loud.size:
             self._last_loud = block.first_sample + int(loud[-1])
 
     @property
     def is_silent(self) -> bool:
-        """Whether the newest samples are."""
+        """Whether the newest samples are silent."""
         return self._residue_v <= self._silent_v
 
     def text(self) -> str:
-        """Return how long it took."""
+        """Return the time to silence as text."""
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
         if self.is_silent:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
     def require_silence(self) -> None:
-        """Raise InstrumentError when as much is left as no hum is."""
+        """Raise InstrumentError if more than hum remains."""
         self.is_heard = not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
         if self.is_heard:
             raise InstrumentError(
@@ -243,7 +241,7 @@ def _half_peak_to_peak(volts: Samples) -> float:
 
 
 STANDSTILL_BLOCKS = 50
-"""Blocks without reading after which a drive is silenced: half of what a converter's buffer holds."""
+"""Blocks without reading after which a drive is silenced, half of a converter's buffer."""
 STOPPED_BLOCKS = 15
 """The same after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
@@ -251,10 +249,10 @@ _LONGEST_ROUND_S = 0.1
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Reserves what silencing needs before the drive begins: a thread, memory, and the request to end.
+    """Reserves resources for silencing before the drive starts: a thread, memory, and the end request.
 
-    The run calls it when its drive begins and after every block. From then on a stop of this process counts
-    the drive as on, until its output was read back as off.
+    The run calls it when its drive starts and after every block. The drive counts as on until its output
+    was read back as off.
     """
 
     def __init__(
@@ -279,17 +277,17 @@ class DriveGuard(ClosedOnLeaving):
         self._watchdog = Watchdog(self._look, "drive guard")
 
     def begin(self) -> None:
-        """Note that the drive begins."""
+        """Note the start of the drive."""
         DRIVES_ON.begin(self)
         self._still_s, self._has_begun = 0.0, True
 
     def advance(self) -> None:
-        """Note that the run has read a block."""
+        """Note a block that was read."""
         self._blocks += 1
         DRIVES_ON.note_advance()
 
     def silence(self) -> None:
-        """Silence the drive with `Drive.silence`; where memory is exhausted, release the reserve first."""
+        """Silence the drive with `Drive.silence`; if memory is exhausted, release the reserve first."""
         self._is_leaving = True
         try:
             self._drive.silence()
@@ -300,7 +298,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """Stop watching. Legal at any time; a drive that is not confirmed as off still counts as on."""
+        """Stop monitoring. Legal at any time; a drive not confirmed as off still counts as on."""
         self._watchdog.close()
 
     def _look(self) -> None:

@@ -1,4 +1,4 @@
-"""An analogue output as a drive: samples are written ahead of their time, and reading is the clock."""
+"""An analogue output as a drive: samples are written ahead, and reading is the clock."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -15,12 +15,12 @@ from ..plan import DriveSource, Measurement, Phase, half_cosine
 from .acquisition_loop import BLOCK_S
 
 RELEASE_S = 0.05
-"""How long the last sound fades when a sequence ends while something sounds [s]."""
+"""Fade of the last signal at the end of a sequence [s]."""
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A stretch of samples over which the level goes from one value to another on a half cosine."""
+    """A stretch of samples with a half-cosine ramp of the level."""
 
     play: Play | None
     begin: int
@@ -38,11 +38,11 @@ class _Stretch:
 
 
 class OutputSynthesizer:
-    """Phases as samples from -1 to 1, made on demand and in order.
+    """Converts phases to samples from -1 to 1, on demand and in order.
 
-    The level is an envelope, sample by sample: a half cosine over a ramp, and constant elsewhere. The
-    phase of a tone goes on when its frequency changes. Phase boundaries lie at the samples nearest to
-    the sums of all durations, as they do in the recording. When nothing is left, the last sound fades
+    The level is an envelope: a half cosine over a ramp, otherwise constant. The phase of a tone is
+    continuous when its frequency changes. Phase boundaries are at the samples nearest to the sums of all
+    durations, as in the recording. At the end, the signal fades
     within `RELEASE_S`, and silence follows.
     """
 
@@ -59,20 +59,20 @@ class OutputSynthesizer:
 
     @property
     def is_over(self) -> bool:
-        """Whether all that was appended has been handed out, and silence too."""
+        """Whether all phases and the silence after them have been returned."""
         return self._stretch.play is None and self.level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
-        """Play ``phases`` after what is there; at once when all of it has been handed out."""
+        """Append ``phases``, which start at once if nothing is left."""
         self._coming = chain(self._coming, phases)
 
     def fade(self, duration_s: float) -> None:
-        """Drop what is coming, and fade what sounds, from the next sample on."""
+        """Drop coming phases and fade the signal from the next sample on."""
         self._coming = iter(())
         self._fade(duration_s)
 
     def take(self, count: int) -> Samples:
-        """Hand out the next ``count`` samples, shape (count,)."""
+        """Return the next ``count`` samples, shape (count,)."""
         taken = np.empty(count)
         done = 0
         while done < count:
@@ -87,10 +87,10 @@ class OutputSynthesizer:
         return taken
 
     def _advance_to_next(self, wanted: int) -> None:
-        """Find the piece that the next sample belongs to; phases shorter than a sample are passed over.
+        """Advance to the piece of the next sample, skipping phases shorter than a sample.
 
-        When nothing is coming, silence lasts for the ``wanted`` samples and no longer, so that what is
-        appended then begins with the next one.
+        Without further phases, silence lasts for the ``wanted`` samples only, so that appended phases start
+        with the next one.
         """
         while self._sample >= self._stretch.end:
             phase = next(self._coming, None)
@@ -134,17 +134,16 @@ class OutputSynthesizer:
 
 
 BLIND_FADE_S = 0.1
-"""Fade on the ways out on which nothing is read any more: short, yet no step [s]."""
+"""Fade for exits without sampling [s]."""
 # A duration of a whole number of blocks must not become one part more by rounding.
 _ROUNDING = 1e-9
 
 
 class StreamDrive:
-    """A `Drive` that writes every sample, ramps included, `AnalogOutput.ahead_samples` before it is played.
+    """A `Drive` that writes every sample, including ramps, `AnalogOutput.ahead_samples` in advance.
 
-    Output and digitizer begin at the same trigger, so what has been read has been played: the room
-    in front of the output is known without asking the device. What was written cannot be taken back,
-    so breaking off takes effect after at most that long.
+    Output and digitizer start at the same trigger, so the samples read show how many have been played.
+    Written samples cannot be withdrawn, so a stop takes effect after at most that time.
     """
 
     drive_source = DriveSource.OUTPUT
@@ -164,36 +163,36 @@ class StreamDrive:
         """The first sample after the last one that is not silent."""
         self._is_playing = False
         self.setting_vpp = 0.0
-        """What plays now, as the setting of the generator that would play the same [V]."""
+        """Current amplitude as the equivalent setting of a generator [V]."""
 
     @property
     def pause_s(self) -> float:
-        """As long as it takes to play what is written ahead [s]."""
+        """Time to play the samples written ahead [s]."""
         return self._output.ahead_samples / self._output.sample_rate_hz
 
     @property
     def is_playing(self) -> bool:
-        """Whether anything but silence is still to be played."""
+        """Whether any signal remains to be played."""
         return self._is_playing and self._sounds_until > self._played
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Write the first stretch, and wait for the digitizer's start."""
+        """Write the first stretch, to start with the digitizer."""
         self._synthesizer.append(coming)
         self._write_ahead()
         self._output.arm()
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Let ``coming`` follow the silence that has been written already."""
+        """Append ``coming`` after the silence already written."""
         assert self._synthesizer.is_over, "what was told before is shorter than what is written ahead"
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Write ahead while a phase, written before, plays; yields how long to read until more fits."""
+        """Write ahead while an earlier phase plays; yield how long to read until more fits."""
         self._is_playing = True
         yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Let what is written play out, then fade; yields as `perform` does."""
+        """Play the written samples, then fade; yield as in `perform`."""
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)
@@ -201,26 +200,26 @@ class StreamDrive:
         yield from self._listened(fade_s, 0.0)
 
     def cut(self) -> None:
-        """Go to zero volts at once, whatever was written."""
+        """Set zero volts at once."""
         self._is_playing = False
         self.setting_vpp = 0.0
         self._output.stop()
 
     def silence(self) -> None:
-        """Fade within the shortest time, wait by writing until that has been played, then stop.
+        """Fade as fast as possible, write until the fade has been played, then stop.
 
-        For the ways out on which no samples can be counted. A device that takes no more samples is
+        For exits without sampling. A device that accepts no more samples is
         stopped at once.
         """
         try:
-            with suppress(AcquisitionError):  # what fails here leaves it to stop()
+            with suppress(AcquisitionError):  # if this fails, stop() still follows
                 self._fade_blindly()
         finally:
             self.cut()
 
     @property
     def _played(self) -> int:
-        """Samples that have been played: as many as fit into the time read."""
+        """Return the number of played samples, from the time read."""
         return round(self._read_s * self._output.sample_rate_hz)
 
     def _full_vpp(self, phase: Phase) -> float:
@@ -258,7 +257,7 @@ class StreamDrive:
             return
         self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
-        # Writing waits for room: when the last silence has gone in, the fade has been played.
+        # Writing blocks: once the last silence is written, the fade has been played.
         left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead
         while left > 0:
             count = min(left, ahead // 2)

@@ -1,4 +1,4 @@
-"""Ending a recording when its results are known well enough; another process analyses the growing file."""
+"""End a recording when its results meet requested bounds; another process analyses the growing file."""
 
 import json
 import subprocess
@@ -24,20 +24,20 @@ from ..recording import UntilNote
 from ..stopping.stop import StopSwitch
 
 PIECE_S = 0.5
-"""Time between two questions whether to go on [s]; a realisation of noise is always recorded whole."""
+"""Interval of checks whether to continue [s]; realisations of noise are always completed."""
 LONGEST_HINDRANCE = 120
 """Characters: an event's text is short."""
 _ENDING_S = 2.0
 _READY_S = 60.0
-"""How long the analysis may take to start [s]; the recording is made anyway, and looks come when they can."""
+"""Longest start of the analysis [s]; the recording continues without it."""
 _ASK_S = 0.05
 
 
 class UntilWatch(ClosedOnLeaving):
-    """Looks at a growing recording at times that grow by a factor, and says when the wishes are met.
+    """Analyses a growing recording at increasing times until the requested bounds are met.
 
-    Process and thread start before anything plays. The run only queues a look and reads the last result:
-    it never waits, and when the process fails the recording goes on to its longest time.
+    Process and thread start before anything plays. The run only queues requests and reads the last result,
+    and never waits. If the process fails, the recording continues to its longest time.
     """
 
     def __init__(self, measurement: Measurement, until: Until, path: Path) -> None:
@@ -67,28 +67,28 @@ class UntilWatch(ClosedOnLeaving):
         self._stretch = 0
         self._recorded_s = self._due_s = 0.0
         self._begun: UntilNote | None = None
-        """Of the stretch that is recorded, before its first look."""
+        """Note of the current stretch before its first analysis."""
         self._found: UntilNote | None = None
-        """Of the last look, which may belong to the stretch before; written by the thread, as a whole."""
+        """Note of the last analysis, possibly of the previous stretch; the thread replaces it atomically."""
         self.ended: list[UntilNote] = []
-        """How each stretch ended; emptied by the run, which notes them in the recording."""
+        """Final notes of stretches, which the run moves to the recording."""
 
     @property
     def progress(self) -> UntilNote | None:
-        """Give the newest of the stretch that is recorded; None between stretches."""
+        """Return the newest note of the current stretch; None between stretches."""
         begun, found = self._begun, self._found
         is_newer = begun is not None and found is not None and found.stretch == begun.stretch
         return found if is_newer else begun
 
     def wait_until_ready(self, switch: StopSwitch) -> None:
-        """Wait before anything plays until the process has loaded what it needs; a stop ends the wait."""
+        """Wait before anything plays until the process is ready, or until a stop."""
         give_up_s = monotonic() + _READY_S
         self._beside.do(lambda: self._greeting.append(self._read_answer()))
         while self._beside.is_busy and switch.request is None and monotonic() < give_up_s:
             self._beside.wait(_ASK_S)
 
     def phases(self, measurement: Measurement) -> Iterator[Phase]:
-        """Lay out the measurement; what is recorded ends when its wishes are met."""
+        """Return the phases of the measurement, which end when the requested bounds are met."""
         for phase in phases(measurement):
             is_result = phase.segment is not None and phase.segment.label in self._labels
             if not isinstance(phase.play, Waveform):
@@ -97,7 +97,7 @@ class UntilWatch(ClosedOnLeaving):
                 else:
                     yield phase
                 continue
-            # Noise of waveforms: one result of all realisations, of which each has a ramp up and down.
+            # Noise by waveforms: one result of all realisations, each with ramps up and down.
             if self._is_reached and phase.state is RunState.RAMPING_UP:
                 break
             if not (self._is_reached and phase.state in (RunState.SETTLING, RunState.RECORDING)):
@@ -135,7 +135,7 @@ class UntilWatch(ClosedOnLeaving):
             self._begun = None
 
     def _recorded(self, duration_s: float) -> None:
-        """Count what was recorded, and ask for a look when one is due."""
+        """Count the recorded time, and request an analysis when one is due."""
         self._recorded_s += duration_s
         asked, recorded_s = self.progress, self._recorded_s
         if asked is None or asked.is_reached or recorded_s < self._due_s * (1 - 1e-9) or self._beside.is_busy:
@@ -145,7 +145,7 @@ class UntilWatch(ClosedOnLeaving):
         self._beside.do(lambda: self._look(asked, recorded_s))
 
     def _look(self, asked: UntilNote, recorded_s: float) -> None:
-        """Have the file analysed up to a time of the stretch; in the thread beside the run."""
+        """Analyse the file up to a time of the stretch, in the thread."""
         bounds: dict[str, float | None] = {}
         try:
             question = {"path": str(self._path), "stretch": asked.stretch, "recorded_s": recorded_s}
@@ -171,11 +171,11 @@ class UntilWatch(ClosedOnLeaving):
         return self._process.stdout.readline()
 
     def close(self) -> None:
-        """End the process; what it was to say reaches nobody. Legal at any time."""
+        """End the process and discard its answer. Legal at any time."""
         self._process.kill()
         self._process.wait(_ENDING_S)
         self._beside.close(_ENDING_S)
         for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):  # half a question to a process that is gone
+            with suppress(OSError):  # the process ended during the request
                 assert pipe is not None
                 pipe.close()
