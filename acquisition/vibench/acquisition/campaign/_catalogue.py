@@ -304,6 +304,8 @@ def verify_recordings(
 ) -> tuple[VerifiedRecording, ...]:
     """Compare a recording, or all below a folder, with seals and journals; changes nothing.
 
+    Raises RecordingError when there is no such place, or the key cannot be read.
+
     Parameters
     ----------
     place
@@ -312,11 +314,6 @@ def verify_recordings(
         ``"quick"`` reads attributes, texts and tables, ``"whole"`` every sample too.
     key
         Key of their signatures, as `vibench.acquisition.recording.seal_key` reads it.
-
-    Raises
-    ------
-    RecordingError
-        When there is no such place, or the key cannot be read.
     """
     forget_checks()
     if not place.exists():

@@ -214,8 +214,9 @@ def run_campaign(
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
     All points are checked against the limits of the rig before the first one begins. The journal records
-    what was done, what failed and why, so that a killed campaign continues with ``existing="resume"`` at its
-    first unfinished point. Ctrl-C ramps the running measurement down, and ends the campaign.
+    what was done, what failed and why, so that a killed campaign continues with ``existing="resume"`` at
+    its first unfinished point. Ctrl-C ramps the running measurement down, and ends the campaign. Returns
+    the recordings made, kept or failed; it ends early when the campaign was stopped.
 
     Parameters
     ----------
@@ -236,11 +237,6 @@ def run_campaign(
         attempt; absent, a lost instrument ends the campaign.
     messengers
         Ways to notify somebody at every fault and at the end.
-
-    Returns
-    -------
-    tuple of PointResult
-        The recordings made, kept or failed; it ends early when the campaign was stopped.
 
     Raises
     ------

@@ -33,6 +33,10 @@ def feedback_controller(
 ) -> Controller[None]:
     """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
+    Yields the next phase. The samples of each phase, shape (channels, n) [V], are sent back in. Raises
+    ConfigurationError when the rig lacks a channel that feedback needs, or no package offers the
+    controller; before anything is yielded.
+
     Parameters
     ----------
     measurement
@@ -43,17 +47,6 @@ def feedback_controller(
         Recorded channels, in the order of the rows of samples.
     sample_rate_hz
         Sample rate of all channels.
-
-    Yields
-    ------
-    ControlAction
-        The next phase. The samples of each phase, shape (channels, n) [V], are sent back in.
-
-    Raises
-    ------
-    ConfigurationError
-        When the rig lacks a channel that feedback needs, or no package offers the controller; before
-        anything is yielded.
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     kind = measurement.excitation.kind

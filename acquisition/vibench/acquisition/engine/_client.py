@@ -92,15 +92,12 @@ def programs_without_engine() -> tuple[Program, ...]:
 def the_engine(pid: int | None) -> Announcement:
     """Return the engine with this process number, or the only one.
 
+    Raises EngineError when there is none, or more than one and none was named.
+
     Parameters
     ----------
     pid
         Number of its process; None: the only one.
-
-    Raises
-    ------
-    EngineError
-        When there is none, or more than one and none was named.
     """
     chosen = [each for each in announced_engines() if pid in (None, each.pid)]
     if chosen:
@@ -120,17 +117,13 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and scripts and checks that drive a bench
     themselves.
 
-    Those of other containers on this computer are among them; what is left in the state folder reaches them.
+    Those of other containers on this computer are among them; what is left in the state folder reaches
+    them. Raises EngineError when there is none.
 
     Parameters
     ----------
     pid
         Number of a process; None: all of this computer.
-
-    Raises
-    ------
-    EngineError
-        When there is none.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained)
@@ -149,15 +142,12 @@ def out_of_reach() -> str:
 def require_ended(engine: Announcement) -> None:
     """Refuse to continue after an engine that was killed: nobody has confirmed that its output is off.
 
+    Raises EngineGone when it was killed; the sentence says to switch the amplifier off.
+
     Parameters
     ----------
     engine
         As it announced itself.
-
-    Raises
-    ------
-    EngineGone
-        When it was killed; the sentence says to switch the amplifier off.
     """
     if engine.was_killed:
         raise EngineGone(f"The engine was killed. {SWITCH_OFF}")

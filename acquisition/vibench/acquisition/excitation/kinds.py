@@ -149,6 +149,8 @@ def rows_by_kind(
 ) -> Mapping[str, Row]:
     """Return the row of every kind: its own if it has one, else its family's (decision 0062).
 
+    Raises KeyError when a row is given for an unknown kind.
+
     Parameters
     ----------
     of_family
@@ -157,11 +159,6 @@ def rows_by_kind(
         Rows of single kinds, by name.
     of_packages
         Entry points by which installed packages give rows of the kinds that they add.
-
-    Raises
-    ------
-    KeyError
-        When a row is given for an unknown kind.
     """
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():

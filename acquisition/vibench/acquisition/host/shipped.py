@@ -46,17 +46,14 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
 def named(given: Path | str, folder: str) -> Path:
     """Return the path of a user's file, or of the shipped file with a bare name like ``"quick"``.
 
+    Raises ConfigurationError when a bare name is neither; it lists the existing names.
+
     Parameters
     ----------
     given
         A path, or a name without folder and suffix; a user's file with exactly this name has priority.
     folder
         Folder of the shipped files, for example ``"campaigns"``.
-
-    Raises
-    ------
-    ConfigurationError
-        When a bare name is neither; it lists the existing names.
     """
     path = Path(given).expanduser()
     if path.suffix or path.name != str(path) or path.is_file():

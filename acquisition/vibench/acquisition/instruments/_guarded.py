@@ -71,14 +71,12 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 def missing_package(name: str) -> str | None:
     """Return the sentence that names our package for a name that is not installed.
 
+    Returns the sentence; None if no package of ours provides that name.
+
     Parameters
     ----------
     name
         Word in a plan or a hardware configuration, such as ``"branch_continuation"``.
-
-    Returns
-    -------
-    The sentence; None if no package of ours provides that name.
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -104,17 +102,14 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
 def plug_in(kind: PlugInKind, name: str) -> Any:
     """Load the object of an entry point.
 
+    Raises ConfigurationError when no package provides the name, two do, or the package cannot be imported.
+
     Parameters
     ----------
     kind
         Group of entry points.
     name
         Name in the hardware configuration.
-
-    Raises
-    ------
-    ConfigurationError
-        When no package provides the name, two do, or the package cannot be imported.
     """
     found = {row.value: row for row in _rows(kind) if row.name == name}
     if not found:
@@ -151,6 +146,8 @@ def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[Ent
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     """Load a driver, with a guard if it is not ours.
 
+    Raises ConfigurationError as `plug_in` does.
+
     Parameters
     ----------
     kind
@@ -159,11 +156,6 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
         Name in the hardware configuration.
     promise
         Protocol of the entry point's object.
-
-    Raises
-    ------
-    ConfigurationError
-        As `plug_in` does.
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)

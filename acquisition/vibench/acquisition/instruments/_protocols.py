@@ -314,18 +314,15 @@ class RealTimeController(Protocol):
 def read_block(digitizer: Digitizer, samples: int) -> Block:
     """Read a block, and refuse an empty one: a caller that waits for more samples would wait for ever.
 
+    Raises InstrumentError when the block is empty, has other channels, or contains volts that are not
+    finite; or the errors of `Digitizer.read`.
+
     Parameters
     ----------
     digitizer
         A converter that is sampling.
     samples
         Number of samples of every channel.
-
-    Raises
-    ------
-    InstrumentError
-        When the block is empty, has other channels, or contains volts that are not finite; or the errors of
-        `Digitizer.read`.
     """
     block = digitizer.read(samples)
     rows = len(digitizer.roles)

@@ -288,6 +288,8 @@ class Recording(RecordingDescription):
     def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
         """Check the recording against its own seal, and against the one in a campaign's journal.
 
+        Raises RecordingError when the key cannot be read.
+
         Parameters
         ----------
         depth
@@ -300,11 +302,6 @@ class Recording(RecordingDescription):
         -------
         SealCheck
             Its state, a few words on it, and the seal.
-
-        Raises
-        ------
-        RecordingError
-            When the key cannot be read.
         """
         found = self._check_own_seal(SealDepth(depth), key)
         noted = noted_seals(self.path)

@@ -419,14 +419,10 @@ def run_measurement(
 ) -> Outcome:
     """Run ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
 
-    ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C
-    ramps down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt.
-
-    Raises
-    ------
-    AcquisitionError
-        As `run.Run` says; the generator is silent then, and the recording, if it had started, is
-        finished as failed.
+    ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C ramps
+    down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt. Raises
+    AcquisitionError as `run.Run` says; the generator is silent then, and the recording, if it had started,
+    is finished as failed.
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
     # Signals stay blocked until the run has ended, so that nothing interrupts the silencing.

@@ -68,15 +68,12 @@ def check_figures(
 ) -> CheckFigures:
     """Compare the record before and during the sine of the check with expectations.
 
+    Raises CheckFailed with the deviation and advice.
+
     Parameters
     ----------
     quiet, during
         Volts before, and while, the sine plays: shape (channels, samples) each [V].
-
-    Raises
-    ------
-    CheckFailed
-        With the deviation and advice.
     """
     quiet = quiet[:, round(STILL_SHARE * quiet.shape[1]) :]
     drive = _row(channels, Role.DRIVE_VOLTAGE)

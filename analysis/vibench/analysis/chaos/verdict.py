@@ -214,7 +214,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     near one without oversampling, and linear noise rejected by surrogates. Each test alone would accept
     some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a
     chaotic transient ends, the last part is classified: always if it repeats, otherwise only if it is the
-    longer part. Noise above a tenth of the orbit excludes the verdict periodic.
+    longer part. Noise above a tenth of the orbit excludes the verdict periodic. Raises InvalidRequest when
+    the drive frequency is not positive and finite.
 
     Parameters
     ----------
@@ -225,11 +226,6 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
         Drive frequency, to convert exponents per period to exponents per second.
     seed
         Of the random frequencies and surrogates.
-
-    Raises
-    ------
-    InvalidRequest
-        When the drive frequency is not positive and finite.
     """
     if not 0.0 < drive_hz < math.inf:
         raise InvalidRequest(f"a drive frequency of {drive_hz} Hz is not allowed; give a positive one")

@@ -17,16 +17,14 @@ _MOST_TRIED = 64
 def delay_vectors(series: Reals, delays: int) -> Reals:
     """Return delay vectors of a series.
 
+    Returns an array of shape (n - delays + 1, delays * channels), oldest value first.
+
     Parameters
     ----------
     series
         Shape (n,) or (n, channels).
     delays
         Number of successive values per point.
-
-    Returns
-    -------
-    Shape (n - delays + 1, delays * channels), oldest value first.
     """
     columns = series.reshape(series.shape[0], -1)
     if delays < 1:
@@ -88,9 +86,8 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
     """Find several neighbours of each point, at least ``apart`` steps away in time.
 
-    Returns
-    -------
-    The nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n, tried).
+    Returns the nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n,
+    tried).
     """
     tried = min(count + 2 * apart - 1, len(points))
     index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
@@ -319,10 +316,7 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
     """Return one surrogate: the same values with the same spectrum, otherwise in random order.
 
     Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
-
-    Returns
-    -------
-    The surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
+    Returns the surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
     """
     values = np.sort(series)
     wanted = np.abs(np.fft.rfft(series - series.mean()))

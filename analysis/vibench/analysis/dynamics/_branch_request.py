@@ -179,16 +179,13 @@ MOST_BINS = 100
 def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple[float, float], ...]:
     """Return pairs of frequency [Hz] and amplitude [m] of a sweep or of steps, ascending, 100 at most.
 
+    Raises NotEnoughData when the drive had fewer than two frequencies.
+
     Parameters
     ----------
     frequency_hz, drive_amplitude_m
         As measured, in any order; shape (n,). Each bin takes the median, so that one bad interval has no
         effect.
-
-    Raises
-    ------
-    NotEnoughData
-        When the drive had fewer than two frequencies.
     """
     known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
     place, level = frequency_hz[known], drive_amplitude_m[known]

@@ -209,6 +209,9 @@ def export_functions(
 ) -> tuple[Path, ...]:
     """Write frequency responses and spectra of an excerpt to ``path``, and its facts beside it.
 
+    Raises InvalidRequest when the format cannot store them, a name is taken, or writing fails; no file is
+    left.
+
     Parameters
     ----------
     excerpt
@@ -219,11 +222,6 @@ def export_functions(
         A format that can store them.
     path
         The new file.
-
-    Raises
-    ------
-    InvalidRequest
-        When the format cannot store them, a name is taken, or writing fails; no file is left.
     """
     write = EXPORTERS[to].write_functions
     if write is None:

@@ -286,7 +286,8 @@ def statistical_numbers(
     """Return gaps, m1, c1 and contact force with 95 % bounds, or why each is undetermined.
 
     Rig and specimens are simulated under the recorded voltage, and compared with the recording by
-    statistics.
+    statistics. Returns the parameters, and the distance of the statistics relative to the furthest run.
+    Raises AnalysisError when rig, law or samples are unsuitable, or no specimen has these statistics.
 
     Parameters
     ----------
@@ -304,15 +305,6 @@ def statistical_numbers(
         Fit of the linear parameters; each run draws them within its uncertainty.
     rounds
         Numbers of runs, each in a narrower box.
-
-    Returns
-    -------
-    The parameters, and the distance of the statistics relative to the furthest run.
-
-    Raises
-    ------
-    AnalysisError
-        When rig, law or samples are unsuitable, or no specimen has these statistics.
     """
     rate_hz = recording.sample_rate_hz
     start, stop = (round(each * rate_hz) for each in stretch_s)

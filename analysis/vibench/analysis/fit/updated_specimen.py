@@ -255,7 +255,8 @@ def update_model(
     Damping and frequencies come from the weakest noise. The gap of each side, m1, c1 and the contact law
     come from tracking a colliding motion, or else from statistics of chaos (minutes of simulation). If both
     fail, the smaller gap comes from the onset of collisions in sweeps or dwells. The table mass comes from
-    the transmission from voltage to base.
+    the transmission from voltage to base. Raises NotEnoughData when nothing could be fitted: no noise, no
+    trackable motion, no onset of collisions.
 
     Parameters
     ----------
@@ -266,11 +267,6 @@ def update_model(
         Additional parameters to fit to noise: one mass, and single dampers.
     observer
         Receives the progress.
-
-    Raises
-    ------
-    NotEnoughData
-        When nothing could be fitted: no noise, no trackable motion, no onset of collisions.
     """
     if not results.results:
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")

@@ -93,17 +93,14 @@ class FrequencyResponseView:
 def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
     """Read ``"velocity/acceleration"``; a single word stands for both.
 
+    Raises InvalidRequest for anything else.
+
     Parameters
     ----------
     text
         Quantities of m0 and the base, separated by a slash.
     scale
         Scale of magnitudes in figures.
-
-    Raises
-    ------
-    InvalidRequest
-        For anything else.
     """
     words = text.split("/")
     known = {each.value: each for each in Quantity}

@@ -54,10 +54,7 @@ class HiddenView(Labelled):
 def hidden_view(request: HiddenViewRequest) -> HiddenView:
     """Estimate the hidden motion of a stretch.
 
-    Raises
-    ------
-    AnalysisError
-        As `hidden_motion` does.
+    Raises AnalysisError as `hidden_motion` does.
     """
     # Imported late: the window needs the classes above at its start, and this loads scipy.stats.
     from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415

@@ -40,6 +40,8 @@ Samples = NDArray[np.float32] | NDArray[np.float64]
 def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     """Reduce signals to their extremes, column by column.
 
+    Raises InvalidRequest when there is no column.
+
     Parameters
     ----------
     samples
@@ -51,11 +53,6 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     -------
     Smallest and largest value of each column, shape (..., columns). Column c starts at sample ``c * n //
     columns``, see `column_starts`.
-
-    Raises
-    ------
-    InvalidRequest
-        When there is no column.
     """
     if columns < 1:
         raise InvalidRequest(f"{columns} columns were asked for; a picture has 1 or more")
@@ -73,17 +70,14 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
     """First sample of each column of `envelope`.
 
+    Returns an array of shape (columns,).
+
     Parameters
     ----------
     samples
         Number of samples of the signal.
     columns
         Number of columns of the picture.
-
-    Returns
-    -------
-    ndarray
-        Shape (columns,).
     """
     shown = min(samples, columns)
     return np.arange(shown, dtype=np.int64) * samples // max(shown, 1)
@@ -92,15 +86,12 @@ def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
 def zigzag(low: Reals, high: Reals) -> Reals:
     """Join both edges of an envelope into one line, low and high alternating.
 
+    Returns an array of shape (..., 2 columns).
+
     Parameters
     ----------
     low, high
         Edges, shape (..., columns).
-
-    Returns
-    -------
-    ndarray
-        Shape (..., 2 columns).
     """
     return np.stack((low, high), axis=-1).reshape(*low.shape[:-1], -1)
 
@@ -253,10 +244,7 @@ class RecordingOverview:
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
         """Return samples ``start`` to ``stop`` (exclusive) of some channels in about this many columns.
 
-        Raises
-        ------
-        InvalidRequest
-            When the stretch or the width is empty.
+        Raises InvalidRequest when the stretch or the width is empty.
         """
         begin, end = max(0, start), min(stop, self.recording.samples)
         if not (begin < end and columns >= 1 and roles):
@@ -344,10 +332,7 @@ def overview_levels(
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     """Return the stored extremes of one channel, fine to coarse; see `has_overview`.
 
-    Raises
-    ------
-    InvalidRequest
-        When the file contains none.
+    Raises InvalidRequest when the file contains none.
     """
     kept = recording.read_overview(role)
     if kept is None:

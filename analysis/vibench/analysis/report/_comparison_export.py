@@ -40,6 +40,8 @@ def write_comparison(
 ) -> Path:
     """Write a comparison as a report, a table or a picture; return the path.
 
+    Raises InvalidRequest when the suffix is unknown, or there is nothing to write.
+
     Parameters
     ----------
     path
@@ -53,11 +55,6 @@ def write_comparison(
         Two of the curves; their difference is shown too.
     markers_hz
         Vertical lines in pictures.
-
-    Raises
-    ------
-    InvalidRequest
-        When the suffix is unknown, or there is nothing to write.
     """
     try:
         kind = ExportKind(path.suffix.removeprefix(".").lower())

@@ -383,6 +383,8 @@ def write_report(
 ) -> Path:
     """Write one HTML file with all figures; replace an older report of that name.
 
+    Raises NotEnoughData when there are neither results nor failures to report.
+
     Parameters
     ----------
     results
@@ -397,11 +399,6 @@ def write_report(
         Hidden motions of these recordings.
     maps
         Maps on which the levels of stepped sines and sweeps are laid.
-
-    Raises
-    ------
-    NotEnoughData
-        When there are neither results nor failures to report.
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
@@ -501,16 +498,14 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
 def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:
     """Yield the warnings of checks to read before a result is trusted.
 
+    Returns a sentence for each check of a recording that ended with a warning.
+
     Parameters
     ----------
     results
         As `vibench.analysis.analyse_files` gives them.
     checks
         Names of the checks whose warnings are wanted; by default all.
-
-    Returns
-    -------
-    A sentence for each check of a recording that ended with a warning.
     """
     for result in results.results:
         for check in result.analysis.checks:

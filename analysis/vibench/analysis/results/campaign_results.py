@@ -182,7 +182,7 @@ def analyse_files(
     """Analyse recordings one after the other with `analyse`, and overlay the model on each.
 
     By default the model comes from each recording's bench configuration. If that describes no shaker, a
-    shaker is fitted to the weakest noise among the recordings.
+    shaker is fitted to the weakest noise among the recordings. Raises NotEnoughData when no path is given.
 
     Parameters
     ----------
@@ -202,11 +202,6 @@ def analyse_files(
         Number of simulated runs of each test.
     response
         Channel to analyse; by default the motion of m0. Only m0 is simulated.
-
-    Raises
-    ------
-    NotEnoughData
-        When no path is given.
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")

@@ -45,15 +45,12 @@ def compare_recording(
 ) -> ComparedRecording:
     """Analyse a recording for a comparison.
 
+    Raises AnalysisError or RecordingError when nothing in it is usable.
+
     Parameters
     ----------
     simulation
         Simulation to overlay, if any.
-
-    Raises
-    ------
-    AnalysisError, RecordingError
-        When nothing in it is usable.
     """
     with open_recording(path) as recording:
         result, failures = result_of(recording, simulation, request)

@@ -29,6 +29,8 @@ def analyse(
 ) -> AbstractAnalysis[Any, Any]:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
+    Raises AnalysisError when nothing in it is usable; one sentence that names the file.
+
     Parameters
     ----------
     recording
@@ -40,11 +42,6 @@ def analyse(
         Receives the progress.
     response
         Channel to analyse, such as ``"m2_velocity"``; by default the motion of m0.
-
-    Raises
-    ------
-    AnalysisError
-        When nothing in it is usable; one sentence that names the file.
     """
     if isinstance(recording, Path | str):
         with open_recording(Path(recording)) as opened:

@@ -39,6 +39,9 @@ _WEIGHTS = _weights_of_phases()
 def interpolate(samples: Reals, positions: Reals) -> Reals:
     """Evaluate a signal at fractional sample positions by a Kaiser-windowed sinc.
 
+    Returns an array of shape (m,) or (channels, m), exact to about 1e-9 of the signal up to `TRUSTED_BAND`
+    of the sample rate.
+
     Parameters
     ----------
     samples
@@ -46,10 +49,6 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
         are wrong unless it is zero there.
     positions
         Where to evaluate, in samples from the first, shape (m,).
-
-    Returns
-    -------
-    Shape (m,) or (channels, m), exact to about 1e-9 of the signal up to `TRUSTED_BAND` of the sample rate.
     """
     channels = np.ascontiguousarray(np.atleast_2d(samples), dtype=np.float64)
     values = np.empty((len(channels), positions.size))

@@ -260,15 +260,12 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
 def least_growth_time_s(loop_time_s: float) -> float:
     """Return the shortest growth time that a loop can hold against [s].
 
+    Raises ValueError when it is not positive and finite.
+
     Parameters
     ----------
     loop_time_s
         Latency from motion to drive [s].
-
-    Raises
-    ------
-    ValueError
-        When it is not positive and finite.
     """
     if not 0.0 < loop_time_s < math.inf:
         msg = f"A loop time of {loop_time_s} s is not allowed: positive and finite."

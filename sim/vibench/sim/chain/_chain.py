@@ -75,17 +75,14 @@ class Chain:
 def chain_of(specimen: Specimen, cells: int) -> Chain:
     """Build a chain of equal cells.
 
+    Raises ValueError when there is no cell.
+
     Parameters
     ----------
     specimen
         One cell; its k0 and c0 are the coupling, to the base and from cell to cell.
     cells
         One or more; one cell is the specimen itself.
-
-    Raises
-    ------
-    ValueError
-        When there is no cell.
     """
     if not 1 <= cells <= MOST_CELLS:
         msg = f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}."

@@ -26,6 +26,8 @@ TOUCHING = 1e-9
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     """Return the ratio of the motion of a unit to the previous one, for the outgoing or decaying wave.
 
+    Raises ValueError when a frequency is not positive.
+
     Parameters
     ----------
     unit
@@ -36,11 +38,6 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     Returns
     -------
     exp(i mu), shape (n,): magnitude 1 within a band without damping, below 1 in a gap or with damping.
-
-    Raises
-    ------
-    ValueError
-        When a frequency is not positive.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
@@ -137,6 +134,8 @@ def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
 def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     """Displacement of every mass, and of every p, over the base displacement, without contact.
 
+    Raises ValueError when a frequency is negative.
+
     Parameters
     ----------
     chain
@@ -147,11 +146,6 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     Returns
     -------
     Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U; time goes as exp(+i w t).
-
-    Raises
-    ------
-    ValueError
-        When a frequency is negative.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

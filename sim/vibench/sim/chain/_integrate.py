@@ -184,9 +184,11 @@ def integrate_chain(
 ) -> ChainTrajectory:
     """Integrate a chain of cells under a drive.
 
-    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
-    excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
-    Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does.
+    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved
+    or excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
+    Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does. Raises
+    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the
+    run is.
 
     Parameters
     ----------
@@ -205,11 +207,6 @@ def integrate_chain(
         Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
         Mean impact rate per cell above which a run ends with TOO_MANY_IMPACTS.
-
-    Raises
-    ------
-    ValueError
-        When an argument is not allowed, the run would take hours, or the drive is over before the run is.
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)

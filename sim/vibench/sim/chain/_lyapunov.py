@@ -66,6 +66,9 @@ def chain_lyapunov_exponent(
 ) -> ChainExponent:
     """Return the largest Lyapunov exponent of a chain.
 
+    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too
+    few intervals for an error.
+
     Parameters
     ----------
     chain, drive, accuracy, initial_state, max_impact_rate_hz
@@ -74,12 +77,6 @@ def chain_lyapunov_exponent(
         The exponent is the mean over ``duration_s``, after ``settle_s`` which find the attractor [s].
     seed
         Of the direction in which the second motion starts.
-
-    Raises
-    ------
-    ValueError
-        When an argument is not allowed, the run would take hours, or the duration holds too few intervals
-        for an error.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz

@@ -71,8 +71,9 @@ def chain_response(
 ) -> ChainResponse:
     """Integrate a chain and return the response of every mass at the end.
 
-    The defaults are those of `vibench.sim.steady_response`, which also answers for one cell. A long
-    chain settles more slowly than a cell.
+    The defaults are those of `vibench.sim.steady_response`, which also answers for one cell. A long chain
+    settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is longer
+    than the run or shorter than one period, or the run would take hours.
 
     Parameters
     ----------
@@ -81,12 +82,6 @@ def chain_response(
         observed [s].
     initial_state
         Shape (cells, 6); at rest when None.
-
-    Raises
-    ------
-    ValueError
-        When the drive has no amplitude, the window is longer than the run or shorter than one period, or the
-        run would take hours.
     """
     accuracy = chosen(Accuracy, accuracy)
     if chain.size == 1:
@@ -203,6 +198,9 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
     """Energy of every cell: of its masses, its springs with the link to the cell before, and its stops.
 
+    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest their sum stays as
+    it is. The energy that a Hunt and Crossley contact stores is that of its Hertz spring.
+
     Parameters
     ----------
     chain
@@ -211,11 +209,6 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
         x, y, z, vx, vy, vz of every cell [m, m/s], absolute, shape (..., cells, 6).
     base_m
         Displacement of the base at the same instants [m], shape (...).
-
-    Returns
-    -------
-    Shape (..., cells) [J]. Without damping and with the base at rest their sum stays as it is. The energy
-    that a Hunt and Crossley contact stores is that of its Hertz spring.
     """
     motion = np.asarray(states, dtype=np.float64)
     x, y, z = (motion[..., k] for k in range(MASSES_PER_CELL))

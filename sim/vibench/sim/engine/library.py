@@ -27,16 +27,13 @@ _NUMBERS: dict[str, DTypeLike] = {"double": np.float64, "int64_t": np.int64, "Ph
 def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     """Return numpy's type of every structure.
 
+    Raises ValueError when a text is not of this form.
+
     Parameters
     ----------
     texts
         C++ as native/structures.hpp declares it, such as ``State { double motion[6]; double side; }``; a
         structure may hold those before it.
-
-    Raises
-    ------
-    ValueError
-        When a text is not of this form.
     """
     known: dict[str, StructureType] = {}
     for text in texts:

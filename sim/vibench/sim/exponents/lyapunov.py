@@ -141,7 +141,8 @@ def lyapunov_exponent(
     """Return the largest Lyapunov exponent: how fast neighbouring motions separate.
 
     The first ``settle_s`` only find the attractor; the exponent is that of the following ``duration_s``, or
-    of the motion in which they end. Together the defaults are the paper's 30 s from rest.
+    of the motion in which they end. Together the defaults are the paper's 30 s from rest. Raises ValueError
+    when an argument is not allowed, or the duration holds fewer than 32 intervals.
 
     Parameters
     ----------
@@ -160,11 +161,6 @@ def lyapunov_exponent(
         late is then found.
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
-
-    Raises
-    ------
-    ValueError
-        When an argument is not allowed, or the duration holds fewer than 32 intervals.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)

@@ -103,10 +103,8 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
     """Yield every group and dataset below a group, itself first, by path; each once, in the order of names.
 
-    Raises
-    ------
-    UnsafeHdf5
-        At a link that leaves the file, when that is not allowed; links inside a file are left alone.
+    Raises UnsafeHdf5 at a link that leaves the file, when that is not allowed; links inside a file are left
+    alone.
     """
     seen = {_address(file)}
     links = 0

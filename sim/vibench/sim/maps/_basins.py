@@ -124,6 +124,8 @@ def kick_stability(
 ) -> tuple[KickStability, ...]:
     """Kick each motion of a basin map and see whether it comes back: basin stability under noise.
 
+    Raises InvalidStudy when more than the start varies, or there is no kick.
+
     Parameters
     ----------
     results
@@ -136,11 +138,6 @@ def kick_stability(
         Of each size, at one instant of each motion: when the drive is where it was when a run ended.
     seed, workers
         Of the kicks; threads.
-
-    Raises
-    ------
-    InvalidStudy
-        When more than the start varies, or there is no kick.
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks are asked for; give 1 or more.")

@@ -122,9 +122,10 @@ def integrate(
 ) -> Trajectory:
     """Follow a specimen under a drive.
 
-    Flight is exact (harmonic drives in closed form, others as cubics on intervals), contacts are proved
-    or excluded by bounds and resolved with the tolerance of ``accuracy``. Sampling changes no step, so
-    the motion is the same with any sample rate.
+    Flight is exact (harmonic drives in closed form, others as cubics on intervals), contacts are proved or
+    excluded by bounds and resolved with the tolerance of ``accuracy``. Sampling changes no step, so the
+    motion is the same with any sample rate. Raises ValueError when an argument is not allowed, or the drive
+    is over before the run is.
 
     Parameters
     ----------
@@ -142,11 +143,6 @@ def integrate(
         Time on the drive's clock at which the run begins: to go on from an earlier final state.
     max_impact_rate_hz
         A run that strikes more often than this on average ends with TOO_MANY_IMPACTS.
-
-    Raises
-    ------
-    ValueError
-        When an argument is not allowed, or the drive is over before the run is.
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)

@@ -42,7 +42,9 @@ def flow_derivative(
 ) -> tuple[Floats, Floats]:
     """Integrate from the drive's time zero, and differentiate the final state by the initial one.
 
-    At a grazing impact on a rigid stop no derivative exists, and very large numbers are returned.
+    At a grazing impact on a rigid stop no derivative exists, and very large numbers are returned. Returns
+    the state at the end, shape (6,), and its derivative by ``state``, shape (6, 6); NaN when the run was
+    lost.
 
     Parameters
     ----------
@@ -54,11 +56,6 @@ def flow_derivative(
         [s].
     accuracy
         Of the motion; its derivative is as exact.
-
-    Returns
-    -------
-    The state at the end, shape (6,), and its derivative by ``state``, shape (6, 6); NaN when the run was
-    lost.
     """
     run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
     run.carry(np.eye(DIRECTIONS))

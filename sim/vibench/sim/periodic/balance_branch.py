@@ -98,7 +98,8 @@ def balance(
 ) -> Balance:
     """Find one periodic motion of the drive's period.
 
-    The number of harmonics doubles until neglected ones change p by less than the tolerance.
+    The number of harmonics doubles until neglected ones change p by less than the tolerance. Returns the
+    motion; check ``outcome`` first. After NO_SOLUTION it is the best attempt.
 
     Parameters
     ----------
@@ -111,10 +112,6 @@ def balance(
     start
         Start of the iteration, which selects one of several motions; by default `first_guess`. Strong
         contact needs a near one, such as a neighbour's or an integrated orbit's.
-
-    Returns
-    -------
-    The motion; check ``outcome`` first. After NO_SOLUTION it is the best attempt.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         msg = f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: both must be positive."

@@ -134,6 +134,8 @@ def trace(
 ) -> Iterator[ArcPoint]:
     """Follow the curve from a point on it until the parameter leaves its bounds.
 
+    Yields the start, then every point, folds between them; the last says why it is the last.
+
     Parameters
     ----------
     curve
@@ -146,10 +148,6 @@ def trace(
         Range of the parameter, ends included.
     steps
         Lengths and tolerances.
-
-    Yields
-    ------
-    The start, then every point, folds between them; the last says why it is the last.
     """
     along = np.zeros(len(start))
     along[-1] = math.copysign(1.0, toward)

@@ -31,14 +31,12 @@ ROOT_TOLERANCE = 1e-15
 def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
     """Find every u > 0 with sum c_i u^e_i = 0, ascending.
 
+    Returns an array of shape (n,), n < m; a double zero is given once.
+
     Parameters
     ----------
     coefficients, exponents
         Shape (m,), finite; exponents may repeat and need not be whole.
-
-    Returns
-    -------
-    Shape (n,), n < m; a double zero is given once.
     """
     kept, powers = _sum_equal_exponents(
         np.asarray(coefficients, dtype=np.float64), np.asarray(exponents, dtype=np.float64)
@@ -125,17 +123,14 @@ def first_order_states(
 ) -> list[FirstOrderState]:
     """Find every first-order solution at one frequency and drive amplitude, by ascending abs(P).
 
+    Raises ValueError when frequency or amplitude is not allowed.
+
     Parameters
     ----------
     structure, spring
         Result of `vibench.sim.periodic.harmonic_balance.structure_of`, and the power law.
     frequency_hz, amplitude_m
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
-
-    Raises
-    ------
-    ValueError
-        When frequency or amplitude is not allowed.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
         msg = (

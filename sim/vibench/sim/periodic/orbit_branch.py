@@ -123,6 +123,10 @@ def periodic_branch_within(
 ) -> Branch:
     """Follow a periodic motion both ways along a drive path, through folds, to the ends of a range.
 
+    Returns the whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` are
+    the reasons for its ends. A closed branch is followed once. Raises ValueError when the orbit did not
+    converge, or lies outside.
+
     Parameters
     ----------
     orbit
@@ -133,16 +137,6 @@ def periodic_branch_within(
         Ends of the range, ascending [Hz, or m].
     steps
         Lengths and tolerances; the range is ten units long.
-
-    Returns
-    -------
-    The whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` are the
-    reasons for its ends. A closed branch is followed once.
-
-    Raises
-    ------
-    ValueError
-        When the orbit did not converge, or lies outside.
     """
     value = parameter_value(path, orbit.drive)
     family, start = _family_at(orbit, path, value, range_scale(low, high, value))

@@ -122,6 +122,11 @@ def phase_resonance_branch(
 ) -> Branch:
     """Follow a mode's phase resonance from the motion without contacts over the level of the base.
 
+    Returns the branch over amplitude, with the frequency and the multipliers of each motion; it may turn
+    back. Raises ValueError when there is no damping, no mode in the band has this phase, or several do, no
+    motion is found at the lower level, it already reaches the stops, or `of` is no word of
+    `PhaseReference`.
+
     Parameters
     ----------
     specimen
@@ -134,16 +139,6 @@ def phase_resonance_branch(
         The motion of m0, and its phase over the base, both as displacements.
     steps
         Along the branch: half a unit is a quarter of a decade of level, or of frequency 5 %.
-
-    Returns
-    -------
-    The branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
-
-    Raises
-    ------
-    ValueError
-        When there is no damping, no mode in the band has this phase, or several do, no motion is found at the
-        lower level, it already reaches the stops, or `of` is no word of `PhaseReference`.
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     if not any(specimen.dampings):

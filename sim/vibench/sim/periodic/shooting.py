@@ -213,6 +213,9 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find a periodic motion near a state.
 
+    Returns the motion; check ``outcome`` first. Raises ValueError when the drive has a phase, or no
+    amplitude.
+
     Parameters
     ----------
     specimen, drive
@@ -221,15 +224,6 @@ def periodic_orbit(
         How it repeats: see `OrbitShape`; ``periods`` is for a repeated one.
     start
         x, y, z, vx, vy, vz at time zero, shape (6,); None takes where a run from rest is after 400 periods.
-
-    Returns
-    -------
-    The motion; check ``outcome`` first.
-
-    Raises
-    ------
-    ValueError
-        When the drive has a phase, or no amplitude.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         msg = f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."

@@ -67,7 +67,8 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     """Return the share for ``count`` of ``trials`` with Wilson's interval.
 
     It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
-    Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
+    Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError when there are no trials, more
+    counted than tried, or no such probability.
 
     Parameters
     ----------
@@ -75,11 +76,6 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
         How many of how many.
     unsure
         Probability that the interval misses the share.
-
-    Raises
-    ------
-    ValueError
-        When there are no trials, more counted than tried, or no such probability.
     """
     if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
         msg = (

@@ -195,7 +195,8 @@ def solve_ensemble(
     """Follow a scene from this many starts a millionth of the gap apart, whether or not its own is forgotten.
 
     `solve_scene` does so by itself where the start is forgotten, with as few starts as tell the motions
-    apart; more of them give narrower intervals, and another seed another draw.
+    apart; more of them give narrower intervals, and another seed another draw. Raises ValueError when fewer
+    than 4 starts are asked for, or the specimen cannot be followed in time.
 
     Parameters
     ----------
@@ -211,11 +212,6 @@ def solve_ensemble(
     Returns
     -------
     What they came to. None where the motion is known in closed form, was lost, or the budget is too small.
-
-    Raises
-    ------
-    ValueError
-        When fewer than 4 starts are asked for, or the specimen cannot be followed in time.
     """
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."

@@ -245,6 +245,8 @@ class LoadedShaker:
     ) -> ShakenMotion:
         """Advance by as many steps as ``drive_v`` has values.
 
+        Raises MotionFailed when the motion is no longer finite; this shaker cannot go on.
+
         Parameters
         ----------
         drive_v
@@ -255,11 +257,6 @@ class LoadedShaker:
             For how many steps, counted from the first, the state at their ends is kept.
         block
             Steps of a block, at the end of which the number of contacts is kept; 0 for none.
-
-        Raises
-        ------
-        MotionFailed
-            When the motion is no longer finite; this shaker cannot go on.
         """
         drive, motion = (
             np.ascontiguousarray(drive_v, np.float64),

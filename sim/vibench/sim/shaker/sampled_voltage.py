@@ -77,6 +77,8 @@ def follow_voltage(
 ) -> SampledMotion:
     """Move table and specimen, from rest, by a sampled voltage.
 
+    Raises MotionFailed when the motion is no longer finite.
+
     Parameters
     ----------
     table
@@ -86,11 +88,6 @@ def follow_voltage(
         (samples,), finite. Best with silence at both ends.
     start
         The specimen's x, y, z, vx, vy, vz [m, m/s], absolute.
-
-    Raises
-    ------
-    MotionFailed
-        When the motion is no longer finite.
     """
     ratio = ceil(FINEST_STEP_HZ / sample_rate_hz)
     step_s = 1 / (sample_rate_hz * ratio)

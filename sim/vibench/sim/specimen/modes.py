@@ -36,7 +36,8 @@ def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
     """Displacement of every mass, and of p, over the base displacement, without contact.
 
-    (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping.
+    (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping. Raises ValueError when a frequency
+    is negative or not finite.
 
     Parameters
     ----------
@@ -48,11 +49,6 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     Returns
     -------
     Complex, shape (n, 4): x, y, z and p = y - z over U; time goes as exp(+i w t).
-
-    Raises
-    ------
-    ValueError
-        When a frequency is negative or not finite.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

@@ -165,6 +165,8 @@ def gong2025(
 ) -> Specimen:
     """Build the specimen of Gong et al. 2025, section 2.
 
+    Raises ValueError when damping time, gap or contact law is not allowed.
+
     Parameters
     ----------
     damping_time_s
@@ -175,11 +177,6 @@ def gong2025(
     contact
         ``"hertz"``: the paper's stops; ``"linear"``: no stops; ``"power:5"`` and others: see
         `vibench.sim.specimen`.
-
-    Raises
-    ------
-    ValueError
-        When damping time, gap or contact law is not allowed.
     """
     if not 0.0 <= damping_time_s < math.inf:
         msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."

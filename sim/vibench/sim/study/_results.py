@@ -188,17 +188,14 @@ class GridResults(Generic[Plan]):
     def values(self, name: str, **fixed: Value) -> Floats:
         """One quantity over the axes, NaN where it is not known.
 
+        Raises InvalidStudy when there is no such column, axis or value.
+
         Parameters
         ----------
         name
             A column, such as ``"response_i"``; numbers only.
         **fixed
             Axes that take one value and vanish: ``amplitude=5e-6, model="hertz"``.
-
-        Raises
-        ------
-        InvalidStudy
-            When there is no such column, axis or value.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"

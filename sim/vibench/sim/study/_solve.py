@@ -325,7 +325,8 @@ def run_study(
     """Compute every point that the store misses, longest first.
 
     The answers do not depend on the executor or on the order: each scene is computed alone, and a point
-    that continues another waits for it. An error in one scene is that point's answer.
+    that continues another waits for it. An error in one scene is that point's answer. Raises StudyError
+    when the store or the executor fails; what was kept before is kept.
 
     Parameters
     ----------
@@ -335,10 +336,5 @@ def run_study(
         Told of every answer.
     cancelled
         Asked between answers whether to end.
-
-    Raises
-    ------
-    StudyError
-        When the store or the executor fails; what was kept before is kept.
     """
     return run_points(Expansion(study), executor, store, observer, cancelled)
