@@ -39,6 +39,7 @@ def _number(given: object) -> object:
 
 
 def _time(given: object) -> object:
+    # pydantic reads 1 and "1" as seconds since 1970.
     if isinstance(given, int | float) or (isinstance(given, str) and not re.match(r"\d{4}-\d", given)):
         raise PydanticCustomError("datetime_type", "give a date, time and time zone")
     return given
@@ -47,12 +48,10 @@ def _time(given: object) -> object:
 def _with_numbers_only(schema: Any) -> Any:
     """Return a core schema that reads only numbers as numbers and only booleans as booleans."""
     match schema:
-        case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
+        case {"type": "float" | "int" | "datetime"} | {"type": "literal", "expected": [int(), *_]}:
             # pydantic's own strict mode would also refuse 1e3 for an integer, and numpy's numbers.
-            return core_schema.no_info_before_validator_function(_number, {**schema})
-        case {"type": "datetime"}:
-            # pydantic reads 1 and "1" as seconds since 1970.
-            return core_schema.no_info_before_validator_function(_time, {**schema})
+            check = _time if schema["type"] == "datetime" else _number
+            return core_schema.no_info_before_validator_function(check, {**schema})
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:
