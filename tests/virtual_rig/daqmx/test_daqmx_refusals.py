@@ -215,3 +215,12 @@ def test_a_number_that_is_no_member_of_its_enum_is_refused_by_name(daq, task, na
         getattr(nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel), name)(request)
     assert ("ni-error", str(DAQmxErrors.INVALID_ATTRIBUTE_VALUE.value)) in refused.value.trailing_metadata()
     assert "Requested Value: 77" in refused.value.details()
+
+
+def test_waveforms_that_are_none_are_refused(daq):
+    output = daq.task("play")
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    request = nidaqmx_pb2.WriteAnalogWaveformsRequest(task=Session(name="play"))
+    with pytest.raises(grpc.RpcError) as refused:
+        nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel).WriteAnalogWaveforms(request)
+    assert "number of waveforms" in refused.value.details()

@@ -7,6 +7,7 @@ from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqWriteError
 from nidaqmx.stream_writers import AnalogMultiChannelWriter, AnalogSingleChannelWriter
+from nitypes.waveform import AnalogWaveform
 
 RATE_HZ = 20000.0
 OUTPUT = "Dev1/ao0"
@@ -195,6 +196,14 @@ def test_two_outputs_play_their_own_rows(daq):
     for channel, row in zip(("Dev2/ao0", "Dev2/ao1"), rows, strict=True):
         start_s = daq.world.played[channel][0].start_s
         np.testing.assert_allclose(daq.world.output(channel, start_s + np.arange(200) / 10000), row)
+
+
+def test_a_waveform_is_played_as_its_samples(pair):
+    inputs, outputs = pair
+    assert outputs.write_waveform(AnalogWaveform.from_array_1d(ramp(500))) == 500
+    outputs.start()
+    inputs.start()
+    np.testing.assert_allclose(inputs.read(500), ramp(500), atol=1e-12)
 
 
 def test_writing_to_a_task_of_inputs_is_refused(daq):

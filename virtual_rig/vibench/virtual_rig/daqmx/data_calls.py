@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .acquisition import Acquisition, StartsItself, check_memory
 from .calls import Call, DaqmxSystem, Fields, deadline, pick, task_of
-from .errors import DaqmxRefusal
+from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation
 from .rig import QUESTION_S
 from .tasks import Task
@@ -316,6 +316,16 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     return {"samps_per_chan_written": write(task, rows, _start(request), deadline(request.timeout))}
 
 
+def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    rows = [np.array(waveform.y_data) for waveform in request.waveforms]
+    if len({row.size for row in rows}) != 1:
+        raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
+    _check_size(task, sum(row.size for row in rows), rows[0].size)
+    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), deadline(request.timeout))}
+
+
 def _read_what_fits(task: Task, request: Any) -> Reading:
     """Read the requested samples; "all" is limited by the caller's array."""
     channels = max(1, len(task.channels))
@@ -374,4 +384,5 @@ DATA_CALLS: Mapping[str, Call] = {
     "ReadRaw": _read_raw,
     "ReadBinaryI32": _read_counts,
     "WriteAnalogF64": _write,
+    "WriteAnalogWaveforms": _write_waveforms,
 }
