@@ -16,7 +16,7 @@ pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings py
 RATE_HZ = 5120.0
 SAMPLES = 12_000
 FAULTS = ("sound", "late", "gap", "drop", "repeat", "swap", "restart", "drift", "rate")
-SAYS_TIMES = ("csv", "csv units row", "csv ms", "csv tab", "csv comma", "mat", "h5")
+SAYS_TIMES = ("csv", "csv units row", "csv ms", "csv tab", "csv comma", "mat", "h5", "csv clock", "csv iso")
 SAYS_STARTS = ("tdms", "uff a", "uff b")
 
 
@@ -61,8 +61,14 @@ def write(kind, folder, fault, rng):
                 ("ms",): ("Time,a,b", 1e3, ",", "."),
                 ("tab",): ("t (s)\ta\tb\t", 1, "\t", "."),
                 ("comma",): ("Zeit [s] a b", 1, " ", ","),
+                ("clock",): ("Clock;a;b", 1, ";", ","),
+                ("iso",): ("Timestamp a b", 1, " ", "."),
             }[tuple(dialect)]
             rows = (between.join(f"{x:.9g}" for x in row) for row in np.stack((times * scale, *values)).T)
+            if dialect in (["clock"], ["iso"]):
+                day = "2026-02-28T" if dialect == ["iso"] else ""
+                clock = (f"{day}23:59:{57 + x:09.6f}" if x < 3 else "" for x in times)
+                rows = (at + between + row.split(between, 1)[1] for at, row in zip(clock, rows, strict=True))
             end = between if dialect == ["tab"] else ""
             text = "".join(f"{row}{end}\n" for row in rows)
             path.write_text(f"{heading}\n{text if point == '.' else text.replace('.', ',')}")

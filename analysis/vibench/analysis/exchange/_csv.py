@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import date
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
@@ -56,6 +57,11 @@ STATEMENT = re.compile(
 )
 """A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
 
+CLOCK = re.compile(
+    r"(?<![\w:])(?:(\d{4})-(\d\d)-(\d\d)[T ])?(\d\d?):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:\d\d)?(?![\w:])"
+)
+"""A time of day, with a date or without: ``2026-03-01T12:00:00.0002``."""
+
 
 @dataclass(frozen=True)
 class _Layout:
@@ -80,6 +86,7 @@ class _Layout:
 
     def plain(self, line: str) -> str:
         """Return a line with blanks and decimal points; empty if all cells are."""
+        line = _clock_in_seconds(line)
         if '"' not in line and not self.empty and line.strip(BLANK + (self.delimiter or "")):
             return line if self.delimiter == "," else line.replace(",", ".")
         cells = [each.strip().replace(",", ".") for each in self.cells(line)]
@@ -178,7 +185,21 @@ def _layout(line: str) -> _Layout | None:
     return None
 
 
+def _clock_in_seconds(line: str) -> str:
+    """Write times of day as seconds; a table of samples has no other text between its numbers."""
+    return CLOCK.sub(_seconds, line) if ":" in line else line
+
+
+def _seconds(clock: re.Match[str]) -> str:
+    year, month, day, hour, minute, second = clock.groups()
+    # A thousand days leave a double 15 ns.
+    days = date(int(year), int(month), int(day)).toordinal() % 1000 if year else 0
+    minutes = (days * 24 + int(hour)) * 60 + int(minute)
+    return f"{minutes * 60 + float(second.replace(',', '.')):.9f}"
+
+
 def _cells(line: str, delimiter: str | None) -> list[str]:
+    line = _clock_in_seconds(line)
     if delimiter is None:
         return [each.strip('"') for each in line.split()]
     return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
