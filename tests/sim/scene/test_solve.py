@@ -12,6 +12,7 @@ from vibench.sim import (
     Scene,
     base_transmissibility,
     gong2025,
+    periodic_orbit,
     solve_scene,
     steady_response,
 )
@@ -348,3 +349,14 @@ def test_a_motion_of_undamped_modes_and_the_drive_is_quasi_periodic():
     length = AutomaticDuration(window_s=0.5, longest_s=10.0)
     answer = solve_scene(Scene(specimen, Harmonic(400.0, 1e-6), duration=length, budget_s=0.0))
     assert answer.motion is MotionKind.QUASI_PERIODIC
+
+
+def test_a_motion_that_comes_back_but_would_leave_is_not_called_periodic():
+    specimen, drive = gong2025(2.39e-5), Harmonic(121.99, 46.75e-6)
+    near = (-1.33e-6, -8.49e-6, -2.97e-6, 0.0572, 0.0793, 0.0805)
+    orbit = periodic_orbit(specimen, drive, start=near)
+    assert 1.04 < abs(orbit.floquet_multipliers[0]) < 1.05
+    start = Given(tuple(map(float, orbit.state)))
+    found = solve_scene(Scene(specimen, drive, start=start, duration=AutomaticDuration()))
+    assert (found.motion, found.period) == (MotionKind.UNDECIDED, None)
+    assert found.ended == "it comes back after 1 drive period(s), but a small change of it grows"

@@ -174,6 +174,8 @@ SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
 """A motion that does not repeat is watched for this many windows; the last of them is the one observed."""
+UNSTABLE = 1.001
+"""Floquet multiplier above which a motion that comes back will leave: chaos passes by unstable motions."""
 DRIFT_SHARE = 0.25
 """Share of the budget that a slow drift may use: finding its error repeats its path three times."""
 
@@ -327,6 +329,10 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     seen = classify(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
     if run.outcome is not Outcome.REACHED_END:
         return seen
+    _, by_state = begins.image(repeats.period)
+    if np.all(np.isfinite(by_state)) and np.max(np.abs(np.linalg.eigvals(by_state))) > UNSTABLE:
+        ended = f"it comes back after {repeats.period} drive period(s), but a small change of it grows"
+        return replace(seen, motion=MotionKind.UNDECIDED, repeats=None, ended=ended, path=tuple(path))
     return replace(
         seen,
         motion=MotionKind.PERIODIC,
