@@ -1,11 +1,20 @@
 """Responses of chains: against the engine of one cell, samples and closed forms."""
 
+import time
+
 import numpy as np
 import pytest
 from scipy.integrate import simpson
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, steady_response
-from vibench.sim.chain import Chain, chain_of, chain_response, chain_transmissibility, integrate_chain
+from vibench.sim.chain import (
+    Chain,
+    chain_of,
+    chain_response,
+    chain_response_to,
+    chain_transmissibility,
+    integrate_chain,
+)
 
 pytestmark = pytest.mark.timeout(300)
 """The first run compiles the kernels: half a minute of processor time, more on a busy machine."""
@@ -115,3 +124,26 @@ def test_a_run_of_more_windows_than_anybody_waits_for_is_refused(drive, duration
 def test_what_cannot_be_observed_is_refused_in_one_sentence(drive, window_s, sentence):
     with pytest.raises(ValueError, match=sentence):
         chain_response(chain_of(gong2025(), 2), drive, duration_s=2.0, window_s=window_s)
+
+
+@pytest.mark.parametrize(
+    ("contact", "cells", "drive"), [("linear", 4, Harmonic(3e5, 1.0)), ("power:47", 20, Harmonic(42.0, 0.1))]
+)
+def test_a_requested_time_holds_where_a_window_takes_longer(contact, cells, drive):
+    chain = chain_of(gong2025(gap_m=1e-6, contact=contact), cells)
+    chain_response(chain, drive, duration_s=1.0 / drive.frequency_hz, window_s=1.0 / drive.frequency_hz)
+    began_s = time.thread_time()
+    found = chain_response_to(chain, drive, 1e-4, 0.6)
+    assert time.thread_time() - began_s < 1.5 * 0.6
+    assert found.response.outcome is Outcome.REACHED_END
+    assert found.followed_s * drive.frequency_hz == pytest.approx(
+        round(found.followed_s * drive.frequency_hz)
+    )
+    assert np.all(np.isfinite(found.response.lines_m))
+    assert np.all(np.isinf(found.errors))
+
+
+def test_a_time_in_which_no_drive_period_can_be_followed_is_refused():
+    chain = chain_of(gong2025(0.1, 10.0, "power:3"), 4)
+    with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to follow"):
+        chain_response_to(chain, Harmonic(0.21, 2.71e-7), None, 0.5)

@@ -199,9 +199,10 @@ MOST_NUMBERS = 3e7
 """Most numbers in the samples of a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Number of time steps in a picture of a whole run."""
-ENERGY_S = 0.5
-"""Averaging time of energies under a steady sine, after the responses [s]."""
+"""Number of stretches of a picture that shows a whole run."""
+ENERGY_S, ENERGY_SHARE = 0.5, 0.25
+"""Under a steady sine energies are averaged over this long, after the responses were observed; with a target
+at most over this part of their time."""
 SWEEP_PARTS = 120
 """Number of frequencies of a swept transmission, each over at least `FEWEST_PERIODS`."""
 FEWEST_PERIODS = 12
@@ -264,7 +265,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         found = chain_response(chain, drive, request.accuracy, whole_s, observed_s)
     if found.outcome is not Outcome.REACHED_END:
         return _lost_run(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
-    after_s = min(observed_s, ENERGY_S)
+    after_s = min(observed_s, ENERGY_S, ENERGY_SHARE * whole_s if request.has_target else math.inf)
     after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
     run = integrate_chain(
         chain, drive, after_s, found.accuracy, found.final_state,

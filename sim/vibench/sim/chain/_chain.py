@@ -5,6 +5,7 @@ the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -64,7 +65,7 @@ class Chain:
         """C, shape (3 cells, 3 cells) [N s/m]."""
         return _assemble([cell.dampings for cell in self.cells])
 
-    @property
+    @cached_property
     def natural_frequencies_hz(self) -> NDArray[np.float64]:
         """Undamped natural frequencies without contact, ascending, shape (3 cells,) [Hz]."""
         root = np.sqrt(self.masses)

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.state import Complex, Floats
 from ._chain import Chain
+from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
@@ -20,6 +22,8 @@ FEWEST_PAIRS, STUDENT = 8, 2.365
 """Pairs of windows without which nothing is said, and Student's quantile for it: 19 cases of 20."""
 TOLERANCE_PART = 0.1
 """Part of a requested error that the accuracy of contacts may use."""
+TRIED_S, TRIED_PART = 1e-4, 0.1
+"""Length that is tried of a slow drive's period [s], and part of the time that this is to take."""
 LONGEST_S = 60.0
 """Time after which an answer is refined no further, where none was requested [s]."""
 
@@ -48,33 +52,68 @@ def chain_response_to(
     time_s
         From the call to the answer; a minute when None [s].
 
+    Raises ValueError when one drive period takes longer.
+
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
     levels = (level for level in Accuracy if level.promise <= TOLERANCE_PART * wanted)
     accuracy = next(levels, Accuracy.REFERENCE)
-    window_s = max(1, math.floor(WINDOW_S * drive.frequency_hz)) / drive.frequency_hz
-    windows: list[ChainResponse] = []
-    while True:
-        state = windows[-1].final_state if windows else None
-        windows.append(chain_response(chain, drive, accuracy, window_s, window_s, state))
-        is_over = time.monotonic() - began_s > limit_s or windows[-1].outcome is not Outcome.REACHED_END
-        count = len(windows)
-        if not is_over and (count < FEWEST_WINDOWS or count & (count - 1)):
-            continue
-        used = windows[count // 2 :]
-        lines = np.array([each.lines_m for each in used])
-        errors = error_of_lines(lines[:, :, 0]) + accuracy.promise
-        if is_over or (error is not None and np.all(errors <= error)):
-            break
+    most = max(1, math.floor(WINDOW_S * drive.frequency_hz))
+    seen: list[ChainResponse] = []
+
+    def follows(periods: int) -> bool:
+        """Observe some more periods; whether the motion goes on and as many more fit in the time."""
+        before_s, length_s = time.monotonic(), periods / drive.frequency_hz
+        state = seen[-1].final_state if seen else None
+        seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
+        now_s = time.monotonic()
+        fits = now_s + (now_s - before_s) < began_s + limit_s
+        return fits and seen[-1].outcome is Outcome.REACHED_END
+
+    if most == 1:
+        _require_one_period(chain, drive, accuracy, limit_s)
+    # A window of a fast drive, or of hard contacts, may take longer than the time: begin with one period.
+    periods, goes_on = 1, follows(1)
+    while goes_on and periods < most:
+        periods = min(2 * periods, most)
+        goes_on = follows(periods)
+    before, used = len(seen) - 1, seen[-1:]
+    errors = _errors(used) + accuracy.promise
+    while goes_on and not (error is not None and np.all(errors <= error)):
+        goes_on = follows(most)
+        count = len(seen) - before
+        if not goes_on or (count >= FEWEST_WINDOWS and not count & (count - 1)):
+            used = seen[before + count // 2 :]
+            errors = _errors(used) + accuracy.promise
     response = replace(
-        windows[-1],
-        window_s=len(used) * window_s,
-        lines_m=lines.mean(axis=0),
+        used[-1],
+        window_s=sum(each.window_s for each in used),
+        lines_m=np.mean([each.lines_m for each in used], axis=0),
         largest_m=np.max([each.largest_m for each in used], axis=0),
         impacts=np.sum([each.impacts for each in used], axis=0),
     )
-    return TargetedResponse(response, errors, count * window_s)
+    return TargetedResponse(response, errors, sum(each.duration_s for each in seen))
+
+
+def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
+    """Refuse a time in which one drive period cannot be followed, by longer and longer parts of it."""
+    integrate_chain(chain, drive, TRIED_S, accuracy)  # prepares
+    tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
+    while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
+        tried_s, began_s = 4.0 * tried_s, time.monotonic()
+        integrate_chain(chain, drive, tried_s, accuracy)
+        took_s = time.monotonic() - began_s
+    if took_s * period_s / tried_s > limit_s:
+        msg = (
+            f"A time of {limit_s:g} s is not allowed for this chain: one drive period of {period_s:g} s "
+            "takes longer to follow; give more time."
+        )
+        raise ValueError(msg)
+
+
+def _errors(windows: Sequence[ChainResponse]) -> Floats:
+    return error_of_lines(np.array([each.lines_m[:, 0] for each in windows]))
 
 
 def error_of_lines(lines: Complex) -> Floats:

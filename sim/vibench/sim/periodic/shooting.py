@@ -268,12 +268,13 @@ def _size(values: Vector) -> float:
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
     """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = run.states[: mapping.periods * SAMPLES]
+    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # where the run was lost before the end
+    moved[: len(run.states)] = run.states[: len(moved)]
     waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
     lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
     defect = _size(gone)
-    found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)))
+    found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)) and np.all(np.isfinite(lines)))
     return PeriodicOrbit(
         drive=drive,
         period_map=mapping,
