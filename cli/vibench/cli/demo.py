@@ -56,10 +56,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for those that are not ready.
-
-        Raises AnalysisError when the process ended early.
-        """
+        """Yield the results in order as they are ready; raises AnalysisError when the process ended early."""
         for number in range(self.submitted):
             while number == len(self._parts):
                 self._pool.poll(LOOK_S)

@@ -43,10 +43,7 @@ def docs(
 
 
 def build(target: Path, extent: str) -> None:
-    """Build the site with Sphinx, warnings as errors.
-
-    Raises MissingLibrary when Sphinx and its extensions are not installed.
-    """
+    """Build the site, warnings as errors; raises MissingLibrary without Sphinx and its extensions."""
     for library in ("sphinx", "myst_nb", "furo"):
         if find_spec(library) is None:
             raise MissingLibrary(

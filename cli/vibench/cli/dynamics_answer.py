@@ -25,10 +25,7 @@ SHOWN = 24
 
 
 def room_for(file: str, out: Path | None) -> None:
-    """Refuse a folder that is not writable or already holds a result, before anything is computed.
-
-    Raises InvalidRequest when the file exists.
-    """
+    """Refuse a folder that is not writable or holds a result, before anything is computed."""
     if out is None:
         return
     room_for_folder(out)

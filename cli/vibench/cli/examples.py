@@ -51,10 +51,7 @@ def names_of(paths: list[Path]) -> list[str]:
 
 
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
-    """Copy every file into a folder of the same name under ``target``.
-
-    Raises ConfigurationError before anything is copied if a file exists.
-    """
+    """Copy every file into a folder of its name under ``target``; raises ConfigurationError if one exists."""
     room_for_folder(target)
     copies = {
         path: target / folder / path.relative_to(shipped_folder(folder))

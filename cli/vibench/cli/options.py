@@ -62,18 +62,12 @@ class RequestOptions(Generic[Request]):
     typed: Mapping[str, Any]
 
     def request(self, **others: object) -> Request:
-        """Return the request, with other fields set by the command.
-
-        Raises InvalidRequest with the invalid option, its value and the allowed values.
-        """
+        """Return the request, with other fields set by the command; raises InvalidRequest."""
         return validated(self.model, {**others, **self.typed})
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request from options by field name.
-
-    Raises InvalidRequest with the first invalid option, as it was typed.
-    """
+    """Return a request from options by field name; raises InvalidRequest with the first invalid option."""
     from pydantic import ValidationError
 
     try:
@@ -203,15 +197,11 @@ class SectionedCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; refuse what only Python reads as a number, such as 1_0."""
         kinds = getattr(self.callback, "__annotations__", {})
-        numeric = {
-            name: each
-            for each in self.get_params(ctx)
-            if isinstance(each, TyperOption) and _plain(kinds.get(each.name)) in (float, int)
-            for name in each.opts
-        }
+        numbers: list[Any] = [each for each in self.params if _plain(kinds.get(each.name)) in (float, int)]
         for name, word in pairwise(words_of(args)):
-            if name in numeric and not (word.isascii() and "_" not in word):
-                raise typer.BadParameter("it should be a valid number", ctx, numeric[name])
+            given = next((each for each in numbers if name in each.opts), None)
+            if given is not None and not (word.isascii() and "_" not in word):
+                raise typer.BadParameter("it should be a valid number", ctx, given)
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:

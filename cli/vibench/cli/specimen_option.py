@@ -21,10 +21,7 @@ Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Return the specimen of an option, by default the paper's.
-
-    Raises InvalidRequest when it does not exist or the file does not describe one.
-    """
+    """Return the specimen of an option, by default the paper's; raises InvalidRequest if there is none."""
     if specimen is None:
         return usual_specimen()
     try:

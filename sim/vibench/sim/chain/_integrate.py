@@ -190,6 +190,9 @@ def integrate_chain(
     ValueError when an argument is not allowed, the run would take hours, or the drive is over before the
     run is.
 
+    Raises ValueError when an argument is not allowed, the run would take hours, or the drive is over before
+    the run is.
+
     Parameters
     ----------
     chain, drive

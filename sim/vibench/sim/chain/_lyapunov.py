@@ -69,6 +69,9 @@ def chain_lyapunov_exponent(
     Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too
     few intervals for an error.
 
+    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too few
+    intervals for an error.
+
     Parameters
     ----------
     chain, drive, accuracy, initial_state, max_impact_rate_hz

@@ -75,6 +75,9 @@ def chain_response(
     settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is longer
     than the run or shorter than one period, or the run would take hours.
 
+    Raises ValueError when the drive has no amplitude, the window is longer than the run or shorter than one
+    period, or the run would take hours.
+
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
@@ -231,17 +234,7 @@ class MeanEnergies(NamedTuple):
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:
-    """Average `chain_energies` over evenly spaced instants, states of shape (n, cells, 6).
-
-    Parameters
-    ----------
-    chain
-        What moved.
-    states
-        Shape (n, cells, 6) [m, m/s].
-    base_m
-        Displacement of the base, shape (n,) or one number [m].
-    """
+    """Average `chain_energies` over evenly spaced `states`, shape (n, cells, 6) [m, m/s]."""
     found = [block_mean(row) for row in chain_energies(chain, states, base_m).T]
     return MeanEnergies(
         np.array([each.mean for each in found]), np.array([each.standard_error for each in found])

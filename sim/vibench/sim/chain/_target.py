@@ -54,6 +54,8 @@ def chain_response_to(
 
     Raises ValueError when one drive period takes longer.
 
+    ``error`` is relative, of the transmission of every cell; None: as small as the time allows. The time is
+    that from the call to the answer; None: a minute. Raises ValueError when one drive period takes longer.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error

@@ -144,6 +144,8 @@ def lyapunov_exponent(
     of the motion in which they end. Together the defaults are the paper's 30 s from rest. Raises ValueError
     when an argument is not allowed, or the duration holds fewer than 32 intervals.
 
+    Raises ValueError when an argument is not allowed, or the duration holds fewer than 32 intervals.
+
     Parameters
     ----------
     specimen, drive

@@ -49,6 +49,8 @@ def solve_map(
 ) -> MapResults:
     """Compute a map, or the missing part of its file.
 
+    Raises StudyError in one sentence: a file of another map, a cluster that does not answer, a full disk, ...
+
     Parameters
     ----------
     plan
@@ -68,11 +70,6 @@ def solve_map(
     -------
     MapResults
         Complete, or what there was when it was cancelled.
-
-    Raises
-    ------
-    StudyError
-        In one sentence: a file of another map, a cluster that does not answer, a full disk, ...
     """
     with executor_of(workers, cluster, map_solver(plan)) as executor, store_of(plan, out, existing) as store:
         compute_map(plan, executor, store, observer, cancelled)

@@ -127,6 +127,8 @@ def integrate(
     motion is the same with any sample rate. Raises ValueError when an argument is not allowed, or the drive
     is over before the run is.
 
+    Raises ValueError when an argument is not allowed, or the drive is over before the run is.
+
     Parameters
     ----------
     specimen, drive

@@ -17,7 +17,7 @@ from ..specimen.state import Complex, Floats, X, Y, Z
 from .followed_run import whole_periods
 from .prediction import Method
 from .repetition import MOST_STATES
-from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene, Target
+from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
 
 if TYPE_CHECKING:
     from .cost import Expected
@@ -338,14 +338,9 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
         (
             *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
             # Where the start is forgotten other starts take as long as they may.
-            f"{scene.budget_s:.0e} s" if scene.target is None else _target_words(scene.target),
+            f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
         )
     )
-
-
-def _target_words(target: Target) -> str:
-    error = "" if target.error is None else f"{target.error:.0e}"
-    return f"error {error} in {'' if target.time_s is None else f'{target.time_s:.0e}'} s"
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:

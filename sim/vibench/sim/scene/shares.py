@@ -70,6 +70,8 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError when there are no trials, more
     counted than tried, or no such probability.
 
+    Raises ValueError when there are no trials, more counted than tried, or no such probability.
+
     Parameters
     ----------
     count, trials

@@ -198,6 +198,8 @@ def solve_ensemble(
     apart; more of them give narrower intervals, and another seed another draw. Raises ValueError when fewer
     than 4 starts are asked for, or the specimen cannot be followed in time.
 
+    Raises ValueError when fewer than 4 starts are asked for, or the specimen cannot be followed in time.
+
     Parameters
     ----------
     scene

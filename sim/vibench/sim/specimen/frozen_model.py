@@ -13,7 +13,7 @@ _SCALES = {"": 1.0, "%": 0.01, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def number_of(text: str, *units: str) -> float:
-    """Return the number in a text, alone or with one of these units, in SI units.
+    """Return the number in a `text`, alone or with one of these `units` [SI].
 
     Python's `float` also reads ``1_0`` and digits of other scripts, which are slips here. Raises ValueError.
     """
@@ -25,7 +25,7 @@ def number_of(text: str, *units: str) -> float:
 
 
 def number_with(*units: str) -> BeforeValidator:
-    """Read numbers, and texts of a number, alone or with one of these units."""
+    """Read numbers, and texts of a number, alone or with one of these `units`."""
     return BeforeValidator(
         lambda given: number_of(given, *units) if isinstance(given, str) else given,
         json_schema_input_type=float | str,

@@ -222,6 +222,8 @@ class SpecimenDescription(_Described):
     ) -> Specimen:
         """Build the specimen, with another contact law, damping or gap where one is given.
 
+        Raises ValueError in one sentence, when a number or the law is not allowed.
+
         Parameters
         ----------
         contact
@@ -230,11 +232,6 @@ class SpecimenDescription(_Described):
             c_i = damping_time_s * k_i [s].
         gap_m
             Clearance at both stops [m], or (lower, upper). A power law is fitted at the nearer one.
-
-        Raises
-        ------
-        ValueError
-            In one sentence, when a number or the law is not allowed.
         """
         gap = self.gap_m if gap_m is None else gap_m
         lower, upper = gap if isinstance(gap, tuple) else (None, gap)

@@ -249,6 +249,9 @@ def solve_study(
 ) -> StudyResults:
     """Compute what a study asks for, and what its file does not hold yet.
 
+    Raises StudyError in one sentence: a file of another study, a cluster that does not answer, a full disk,
+    ...
+
     Parameters
     ----------
     study
@@ -269,11 +272,6 @@ def solve_study(
     -------
     StudyResults
         Complete, or what there was when it was cancelled.
-
-    Raises
-    ------
-    StudyError
-        In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
     """
     solver = study_solver(study)
     with executor_of(workers, cluster, solver) as executor, store_of(study, out, existing) as store:
@@ -327,6 +325,8 @@ def run_study(
     The answers do not depend on the executor or on the order: each scene is computed alone, and a point
     that continues another waits for it. An error in one scene is that point's answer. Raises StudyError
     when the store or the executor fails; what was kept before is kept.
+
+    Raises StudyError when the store or the executor fails; what was kept before is kept.
 
     Parameters
     ----------

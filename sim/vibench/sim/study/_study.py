@@ -32,19 +32,9 @@ WHOLE = 1e-9
 
 
 def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
-    """List start, start + step, ... up to stop, which is included when it is hit.
+    """List `start`, `start` + `step`, ... up to `stop`, which is included when it is hit, in one unit [Hz].
 
     Raises ValueError when nothing, or too much, would be listed.
-
-    Parameters
-    ----------
-    start, stop, step
-        All in the same unit, Hz by habit.
-
-    Returns
-    -------
-    tuple of float
-        Ascending.
     """
     if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
         raise ValueError(
@@ -336,15 +326,7 @@ _MICRO = 1e-6
 
 
 def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
-    """Yield what looks wrong; it can be computed all the same.
-
-    Parameters
-    ----------
-    amplitudes_m
-        Of the base displacement [m], in any order.
-    gaps_m
-        Clearances at stops [m], in any order; infinite where there is no stop.
-    """
+    """Yield what looks wrong in base amplitudes and gaps, infinite without a stop; it can be computed."""
     gaps_m = tuple(gaps_m)
     largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)
     if largest_m > MOST_GAPS * narrowest_m:
