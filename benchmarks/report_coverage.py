@@ -2,6 +2,7 @@
 
     python benchmarks/report_coverage.py --rigs 125 --seed 1                # 1000 measurements of each kind
     python benchmarks/report_coverage.py --rigs 125 --seed 1 --shard 1/10   # a tenth of them
+    python benchmarks/report_coverage.py --rigs 30 --seed 48 --sensors      # another set of sensors on each
 
 Each rig has another specimen and shaker, and measures one plan `REPEATS` times: with other noise, with a
 converter whose clock is off by another error within what the configuration states, and, where the drive is
@@ -105,6 +106,35 @@ def with_stated_clock(rig: Rig) -> Rig:
     return Rig.model_validate(document)
 
 
+def random_sensors(rig: Rig, rng: np.random.Generator) -> tuple[Rig, str]:
+    """Draw the sensor of m0, and in half of the sets a further sensor in place of the amplifier's wire."""
+    document = rig.model_dump(mode="json")
+    channels = {each["role"]: each for each in document["daq"]["channels"]}
+    kinds = {
+        "acceleration": (f"{rng.uniform(5, 20):.3g} mV/g", 10 ** rng.uniform(-5, -4), 0.0),
+        "velocity": (f"{rng.uniform(4, 20):.3g} V/(m/s)", 10 ** rng.uniform(-8, -7), 0.0),
+        "displacement": (f"{rng.uniform(5, 20):.3g} mV/um", 10 ** rng.uniform(-11, -10), 1e-5),
+        "force": ("22 mV/N", 2e-6, 0.0),
+    }
+    shown = str(rng.choice(("acceleration", "velocity", "displacement"), p=(0.5, 0.1, 0.4)))
+    others = ("base_force", "m1_velocity", "m2_acceleration", "m2_displacement")
+    other = str(rng.choice(others)) if rng.uniform() < 0.5 else None
+    roles = [] if shown == "velocity" else [f"m0_{shown}"]
+    if shown != "velocity":
+        document["vibrometer"] = None
+        channels["m0_velocity"]["role"] = f"m0_{shown}"
+    if other is not None:
+        roles.append(other)
+        channels["amplifier_voltage"].update(role=other, attenuation=1.0, range_v=5.0)
+    for role in roles:
+        sensitivity, density, delay_s = kinds[role.partition("_")[2]]
+        document["sensors"][role] = {
+            "model": "drawn", "sensitivity": sensitivity, "full_scale_v": 5.0, "calibrated": "2026-02-10",
+            "delay_s": delay_s, "noise_per_rthz": {"value": density, "source": "drawn"},
+        }  # fmt: skip
+    return Rig.model_validate(document), f"m0_{shown}, {other or 'amplifier_voltage'}"
+
+
 def modes(specimen: Specimen) -> tuple[np.ndarray, np.ndarray]:
     """Natural frequencies [Hz] and damping ratios, by the poles."""
     motion = -np.linalg.solve(
@@ -176,12 +206,17 @@ def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float,
     return found, result.analysis
 
 
-def scenes(rigs: int, seed: int, shard: tuple[int, int], kinds: list[str]) -> Iterator[Held]:
+def scenes(
+    rigs: int, seed: int, shard: tuple[int, int], kinds: list[str], *, draws_sensors: bool
+) -> Iterator[Held]:
     """Measure every kind on every rig of a shard."""
     first, of = shard
     for number in range(first - 1, rigs, of):
         rng = np.random.default_rng((seed, number))
         rig, words = random_rig(rng)
+        if draws_sensors:
+            rig, sensors = random_sensors(rig, np.random.default_rng((seed, number, len(KINDS))))
+            words = f"{words}, {sensors}"
         rig, is_weak = with_stated_clock(rig), number % 4 == 0
         for kind in KINDS:
             plan = drawn(rng, kind, is_weak=is_weak)
@@ -266,6 +301,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--shard", default="1/1", help="which part of the rigs: 3/10 is the third of ten")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--sensors", action="store_true", help="draw the sensors of every rig, too")
     parser.add_argument("--save", type=Path, metavar="FILE.json", help="keep every bound, as it comes")
     parser.add_argument("--add", type=Path, nargs="+", metavar="FILE.json", help="count what shards kept")
     asked = parser.parse_args()
@@ -275,7 +311,7 @@ def main() -> None:
         return
     part, of = (int(each) for each in asked.shard.split("/"))
     found = []
-    for each in scenes(asked.rigs, asked.seed, (part, of), asked.kinds):
+    for each in scenes(asked.rigs, asked.seed, (part, of), asked.kinds, draws_sensors=asked.sensors):
         found.append(each)
         if asked.save is not None:
             with asked.save.open("a", encoding="utf-8") as file:

@@ -24,6 +24,7 @@ from vibench.analysis import (
     analyse,
     analyse_files,
     budget_sentences,
+    budgets_of,
     other_responses,
 )
 from vibench.analysis.errors import UnusableData
@@ -236,6 +237,34 @@ def test_a_sensor_on_m2_is_analysed_by_the_same_path_and_gets_a_report(tmp_path)
     shown = re.sub(r"<(script|style).*?</\1>|data:[^\"]+", "", report, flags=re.DOTALL)
     # The channel of m0 stands among the levels of all channels, and nothing else speaks of m0.
     assert re.findall(r".{30}\bm0\b(?! velocity).{20}", shown) == []
+
+
+def test_a_campaign_by_accelerometers_has_the_results_of_the_vibrometer(tmp_path):
+    """The paper's campaign, shortened: noise, sweep and chaotic dwell."""
+    noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
+    plans = {
+        "noise": {"kind": "white_noise", "amplitude_vpp": 0.05, "settle_s": 2.0, **noise},
+        "sweep": {
+            "kind": "sine_sweep", "amplitude_vpp": 0.3, "start_hz": 230, "stop_hz": 250, "duration_s": 4.0,
+        },
+        "dwell": {**DWELL, "amplitude_vpp": 1.5, "frequency_hz": 260.0, "duration_s": 3.0},
+    }  # fmt: skip
+    budgets, verdicts = [], []
+    for number, rig in enumerate((BASE, WITHOUT)):
+        paths = [measured(rig, tmp_path / f"{number}_{name}", **plan) for name, plan in plans.items()]
+        done = analyse_files(paths, "both", Simulation.LEFT_OUT)
+        assert not done.failures
+        budgets.append([each for result in done.results for each in budgets_of(result)])
+        verdicts.append([getattr(each.analysis, "motion", None) for each in done.results])
+    compared = 0
+    for one, other in zip(*budgets, strict=True):
+        assert re.sub(r"[\d.]+ Hz", "", one.quantity) == re.sub(r"[\d.]+ Hz", "", other.quantity)
+        if np.isfinite(one.expanded) and np.isfinite(other.expanded):
+            compared += 1
+            assert abs(one.value - other.value) <= np.hypot(one.expanded, other.expanded), one.quantity
+    assert compared >= 13
+    kinds = [[None if each is None else each.verdict.kind for each in motions] for motions in verdicts]
+    assert kinds[0] == kinds[1]
 
 
 def test_a_channel_that_shows_no_mass_is_no_response(tmp_path):

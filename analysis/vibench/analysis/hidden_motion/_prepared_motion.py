@@ -183,12 +183,12 @@ def _require_finite(lost: int) -> None:
 
 
 def require_channels(name: str, roles: Collection[str]) -> None:
-    """Raise UnusableData when a recording or bench lacks a channel that the hidden motion needs."""
+    """Raise UnusableData if a recording, or a bench, lacks a channel that hidden motion needs."""
     missing = [role for role in (BASE, RESPONSE) if role not in roles]
     if missing:
         raise UnusableData(
-            f"{name} has no channel {' and no channel '.join(missing)}; the hidden motion is "
-            f"told from {BASE} and {RESPONSE}"
+            f"{name} has no channel {' and no channel '.join(missing)}; hidden motion needs {BASE} and "
+            f"{RESPONSE}, whose noise is white: measure m0 with a vibrometer"
         )
 
 
