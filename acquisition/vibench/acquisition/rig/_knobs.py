@@ -158,12 +158,7 @@ def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
 def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
     """Return a function that asks one question about each setting.
 
-    Parameters
-    ----------
-    ask
-        Shows a question and returns the answer: ``input``, or a dialogue.
-    operator
-        Name of the person who answers.
+    ``ask`` shows a question and returns the answer, as ``input`` does; ``operator`` is who answers.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -201,17 +196,8 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
     """Return a function that accepts an earlier confirmation if it is recent and has the same settings.
 
-    Parameters
-    ----------
-    path
-        The sheet from `save_knob_sheet`.
-    valid
-        Time during which a confirmation is valid.
-
-    Raises
-    ------
-    CheckFailed
-        When the function is called, and the sheet is older or has other settings.
+    ``path`` is a sheet from `save_knob_sheet`; ``valid`` is how long it counts. The function raises
+    CheckFailed when the sheet is older or has other settings.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
