@@ -101,7 +101,7 @@ def trespasses(room, package, target, names):
     )
 
 
-def test_nobody_reaches_past_a_face():
+def test_nobody_reaches_past_a_public_api():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {trespass}"
         for portion, _, room, path in sources()
@@ -148,7 +148,7 @@ def test_only_public_apis_load_their_names_on_first_use():
 
 
 @pytest.mark.parametrize("room", sorted({room for _, _, room, _ in sources()} - {"vibench"}))
-def test_a_room_says_what_it_is_for_and_every_name_on_its_face_is_there(room):
+def test_a_package_states_what_it_is_for_and_every_name_in_its_public_api_is_there(room):
     face = importlib.import_module(room)
     assert len(face.__doc__.split()) > 5
     names = getattr(face, "__all__", [])
@@ -166,7 +166,7 @@ def test_a_room_says_what_it_is_for_and_every_name_on_its_face_is_there(room):
         *("vibench.analysis.prediction", "vibench.cli.paper"),
     ],
 )
-def test_the_example_of_a_face_runs(face):
+def test_the_example_of_a_public_api_runs(face):
     result = doctest.testmod(importlib.import_module(face))
     assert result.attempted
     assert result.failed == 0
@@ -195,5 +195,5 @@ def loaded_by(program):
         ),
     ],
 )
-def test_importing_a_face_loads_no_driver_and_nothing_that_a_name_does_not_need(program, heavy):
+def test_importing_a_public_api_loads_no_driver_and_nothing_that_a_name_does_not_need(program, heavy):
     assert heavy.isdisjoint(loaded_by(program))

@@ -73,7 +73,7 @@ def test_every_public_function_is_documented():
     assert {name: found for name, found in short.items() if found} == {}
 
 
-def test_every_public_class_says_what_it_is():
+def test_every_public_class_states_what_it_is():
     classes = {name: found for name, found in public() if inspect.isclass(found)}
     assert [name for name, found in classes.items() if not found.__dict__.get("__doc__")] == []
 

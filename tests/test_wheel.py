@@ -129,7 +129,7 @@ def test_a_script_beside_files_of_our_folders_names_imports_ours(python, users_f
 
 
 @pytest.mark.thorough
-def test_every_name_of_every_face_resolves_from_the_wheel(python, users_folder):
+def test_every_name_of_every_public_api_resolves_from_the_wheel(python, users_folder):
     printed = run(
         python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen"
     )

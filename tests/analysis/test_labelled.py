@@ -258,7 +258,7 @@ def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
     assert sorted(lacking - PURE_HERE - set(UNIT_NOT_KNOWN)) == []
 
 
-def test_whoever_holds_a_part_in_some_unit_says_in_which():
+def test_anyone_who_holds_a_part_in_some_unit_states_in_which():
     """What is held by a type variable, as `response` of an analysis, says its units by itself."""
     found = reached()
     silent = [
@@ -319,7 +319,7 @@ def test_a_unit_is_told_of_nothing_that_is_not_there():
         ("stepped", {"response_drive_amplitude_m": "m"}),
     ],
 )
-def test_what_a_recording_told_has_its_units(request, kind, units):
+def test_what_a_recording_reported_has_its_units(request, kind, units):
     made = request.getfixturevalue(f"{kind}_file")
     with open_recording(made() if callable(made) else made) as recording:
         data = analysis.analyse(recording).to_xarray()

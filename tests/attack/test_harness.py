@@ -67,7 +67,7 @@ def test_shards_are_added_up(tmp_path):
         first.add(Tally("imports"))
 
 
-def test_a_shard_goes_on_from_its_file(tmp_path):
+def test_a_shard_continues_from_its_file(tmp_path):
     path = tmp_path / "shard.json"
 
     def tried(count, part=0):
@@ -93,7 +93,7 @@ def test_mutants_of_nothing_are_mutants_too():
 
 
 @pytest.mark.thorough
-def test_a_command_runs_in_a_process_of_its_own():
+def test_a_command_runs_in_its_own_process():
     with CommandRunner() as runner:
         good = runner.run(reading("campaign", (ROOT / "campaigns" / "paper.toml").read_bytes()))
         bad = runner.run(reading("campaign", b"name = 3"))

@@ -24,7 +24,7 @@ def found_again(name, seed, number):
 
 @pytest.mark.parametrize(("name", "seed", "number"), FOUND)
 @pytest.mark.attack
-def test_what_was_found_once_is_mended(name, seed, number):
+def test_anything_that_was_found_once_is_fixed(name, seed, number):
     assert found_again(name, seed, number) == ()
 
 

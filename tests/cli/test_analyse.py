@@ -152,7 +152,7 @@ def without_plan(file):
         (without_plan, "the plan in changed.h5 is not one this version of vibench can read"),
     ],
 )
-def test_a_recording_that_cannot_be_understood_says_what_is_wrong_with_it(good, tmp_path, change, said):
+def test_a_recording_that_cannot_be_understood_states_what_is_wrong_with_it(good, tmp_path, change, said):
     assert said in sentence(changed(good, tmp_path, change))
 
 

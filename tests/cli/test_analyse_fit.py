@@ -47,7 +47,7 @@ def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell
     assert any("gap stays as the bench says" in each for each in fit["not_told"])
 
 
-def test_the_fit_is_said_in_words(vibench_here, folder, tmp_path):
+def test_the_fit_is_stated_in_words(vibench_here, folder, tmp_path):
     result = vibench_here(
         "analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder
     )

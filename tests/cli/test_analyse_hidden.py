@@ -20,7 +20,7 @@ def shaken(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_the_hidden_motion_is_told_in_numbers_figures_and_the_report(vibench_here, shaken, tmp_path):
+def test_the_hidden_motion_is_reported_in_numbers_figures_and_the_report(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--out", "told", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "shaken: p was tracked in" in done.stdout
@@ -34,7 +34,7 @@ def test_the_hidden_motion_is_told_in_numbers_figures_and_the_report(vibench_her
     assert len(rows) == pytest.approx(len(true), rel=0.01)
 
 
-def test_json_has_bounds_and_says_what_is_not_determined(vibench_here, shaken, tmp_path):
+def test_json_has_bounds_and_states_what_is_not_determined(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--json", cwd=tmp_path)
     told = json.loads(done.stdout)["hidden_motion"]["shaken"]
     gap = told["parameters"]["upper_gap_m"]

@@ -123,7 +123,7 @@ def test_a_letter_that_cannot_be_written_is_asked_again(tmp_path, name):
 
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
-def test_answers_that_cannot_be_read_or_have_no_place_are_told_in_a_sentence(tmp_path, content):
+def test_answers_that_cannot_be_read_or_have_no_place_are_reported_in_a_sentence(tmp_path, content):
     if content is not None:
         (tmp_path / "answers.toml").write_bytes(content)
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
@@ -186,7 +186,7 @@ def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_place_that_is_no_folder_is_told_before_anything_is_asked(tmp_path):
+def test_a_place_that_is_no_folder_is_reported_before_anything_is_asked(tmp_path):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "no" / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert isinstance(done.exception, ConfigurationError)
@@ -209,7 +209,7 @@ def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_pa
     assert "two per cent" not in page
 
 
-def test_what_is_seen_alone_is_proposed_and_its_driver_and_product_entered(tmp_path):
+def test_anything_that_is_seen_alone_is_proposed_and_its_driver_and_product_entered(tmp_path):
     only = seen("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
@@ -262,7 +262,7 @@ def test_a_person_is_asked_again_at_once_after_a_wrong_answer(tmp_path):
     assert load_rig(tmp_path / "lab.toml") == rig
 
 
-def test_answers_that_do_not_agree_are_asked_anew_and_the_first_ones_kept(tmp_path):
+def test_answers_that_do_not_agree_are_asked_again_and_the_first_ones_kept(tmp_path):
     place = "daq.channels.{}.physical".format
     rig, wrong = asked_of_a_person(
         tmp_path,

@@ -28,7 +28,7 @@ def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
+def test_a_campaign_is_catalogued_and_its_end_is_reported(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
     measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)
@@ -114,7 +114,7 @@ def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_
     assert not (tmp_path / "out").exists()
 
 
-def test_an_estimate_says_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):
+def test_an_estimate_states_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     result = vibench_here(
         "measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate", cwd=tmp_path

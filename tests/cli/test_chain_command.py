@@ -22,7 +22,7 @@ def answer(*arguments):
     return json.loads(result.stdout)
 
 
-def test_without_a_drive_bands_gaps_and_transmission_are_told():
+def test_without_a_drive_bands_gaps_and_transmission_are_reported():
     found = answer("--cells", 3)
     assert found["runs"] == []
     assert [round(low, 1) for low, _ in found["gaps_hz"]] == [96.1, 373.4, 701.3]
@@ -72,7 +72,7 @@ def test_studies_over_the_number_of_cells_and_cells_that_take_turns():
 
 
 @pytest.mark.parametrize("frequency", ["220", "200:300"])
-def test_a_run_that_is_lost_says_how_it_ended_and_nothing_else_is_claimed(frequency, tmp_path):
+def test_a_run_that_is_lost_states_how_it_ended_and_nothing_else_is_claimed(frequency, tmp_path):
     options = (
         "--cells",
         2,
@@ -93,13 +93,13 @@ def test_a_run_that_is_lost_says_how_it_ended_and_nothing_else_is_claimed(freque
     assert "1 did not reach their end" in run(*options).output
 
 
-def test_a_run_without_time_for_an_error_says_that_it_is_not_known():
+def test_a_run_without_time_for_an_error_states_that_it_is_not_known():
     found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
     assert "error not known" in found.output
     assert "inf" not in found.output
 
 
-def test_an_exponent_is_told_with_its_error():
+def test_an_exponent_is_reported_with_its_error():
     result = run(
         "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,
         "--exponent", 0.4,
@@ -131,7 +131,7 @@ def test_an_exponent_is_told_with_its_error():
         ),
     ],
 )
-def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
     result = run(*arguments)
     assert result.exit_code != 0
     assert said in str(result.exception)

@@ -124,7 +124,7 @@ def test_a_bench_without_its_instruments_is_one_sentence(vibench_here, tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_bench_check_says_what_it_found_as_one_json_document(vibench, tmp_path):
+def test_a_bench_check_states_what_it_found_as_one_json_document(vibench, tmp_path):
     result = vibench("bench", "check", "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)

@@ -34,14 +34,14 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
     assert "ever overwritten" in refused("branches", *options, "--out", tmp_path / "out")
 
 
-def test_branches_along_the_level_are_told_in_sentences():
+def test_branches_along_the_level_are_reported_in_sentences():
     result = run("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
     assert result.exit_code == 0, result.output
     assert "1: period 1, mirrored: 1 to 2 µm" in result.output
     assert "1 branches (0 isolated)" in result.output
 
 
-def test_what_a_bench_can_hold_is_told_beside_branches():
+def test_what_a_bench_can_hold_is_reported_beside_branches():
     bench = shipped("hardware_configs/virtual_rig.toml")
     result = run(
         "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
@@ -171,7 +171,7 @@ def test_zero_is_named_as_it_was_typed(command):
         ),
     ],
 )
-def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
     assert said in refused(*arguments)
 
 
@@ -194,7 +194,7 @@ def test_numbers_that_no_specimen_has_are_refused_at_once(arguments, told):
     assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
 
 
-def test_branches_reach_a_requested_error_and_say_so(vibench_here, tmp_path):
+def test_branches_reach_a_requested_error_and_report_it(vibench_here, tmp_path):
     asked = ("branches", "--model", "power:5", "--amplitude", 5e-6, "--frequency", "50:60", "--places", 2)
     ran = vibench_here(*asked, "--method", "balance", "--error", "1 %", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

@@ -144,7 +144,7 @@ DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "
         ("digitizer", "read", raises),
     ],
 )
-def test_what_a_stranger_s_instrument_breaks_is_told_in_a_sentence(stranger, kind, member, does, told):
+def test_what_a_stranger_s_instrument_breaks_is_reported_in_a_sentence(stranger, kind, member, does, told):
     inside = AFG1022_MODEL if kind == "generator" else DaqmxDigitizer
     path = stranger(kind, OddDriver(inside, member, does))
     code, said = told(path)
@@ -167,7 +167,9 @@ def test_samples_that_are_none_end_check_and_run_with_a_sentence(stranger, does,
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
-def test_samples_that_are_left_out_are_told_with_the_recording_and_not_played_back(stranger, told, tmp_path):
+def test_samples_that_are_left_out_are_reported_with_the_recording_and_not_played_back(
+    stranger, told, tmp_path
+):
     left = [20]
 
     def skips(found, *given):
@@ -200,13 +202,13 @@ def test_a_check_finds_a_converter_that_leaves_samples_out(stranger, tmp_path):
         check_bench(bench, tmp_path)
 
 
-def test_a_stop_that_fails_says_that_the_output_may_be_on(stranger, tmp_path):
+def test_a_stop_that_fails_states_that_the_output_may_be_on(stranger, tmp_path):
     path = stranger("generator", OddDriver(AFG1022_MODEL, "stop", raises))
     with pytest.raises(BrokenPromise, match="THE OUTPUT MAY STILL BE ON"), open_bench(path) as bench:
         check_bench(bench, tmp_path)
 
 
-def test_a_driver_that_ends_the_program_is_told_too(stranger, told):
+def test_a_driver_that_ends_the_program_is_reported_too(stranger, told):
     def ends(_found, *_given):
         sys.exit(0)
 
@@ -215,7 +217,7 @@ def test_a_driver_that_ends_the_program_is_told_too(stranger, told):
     assert "broke its promise in open: SystemExit: 0" in said
 
 
-def test_a_failure_while_playing_ends_silent_and_the_recording_says_why(stranger, tmp_path):
+def test_a_failure_while_playing_ends_silent_and_the_recording_states_why(stranger, tmp_path):
     left = [15]
 
     def fails_later(found, *given):
@@ -233,7 +235,9 @@ def test_a_failure_while_playing_ends_silent_and_the_recording_says_why(stranger
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
-def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(stranger, kind, inside, told):
+def test_a_close_that_fails_after_a_complete_recording_states_that_it_is_complete(
+    stranger, kind, inside, told
+):
     path = stranger(kind, OddDriver(inside, "close", does_then_raises))
     code, said = told(path)
     assert "recorded out/dwell.h5 (the plan was carried out)" in said
@@ -256,7 +260,7 @@ def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(
         (None, "None as SensorFacts"),
     ],
 )
-def test_a_sensor_that_tells_what_no_sensor_can_be_is_refused(stranger, facts, words):
+def test_a_sensor_that_shows_what_no_sensor_can_be_is_refused(stranger, facts, words):
     usual = {"units_per_volt": 100.0, "full_scale_v": 5.0, "name": "odd"}
 
     def sensor(_rig, _config):
@@ -267,7 +271,7 @@ def test_a_sensor_that_tells_what_no_sensor_can_be_is_refused(stranger, facts, w
         pass
 
 
-def test_a_sensor_that_raises_is_told_by_name(stranger):
+def test_a_sensor_that_raises_is_reported_by_name(stranger):
     path = stranger("sensor", raises)
     with pytest.raises(BrokenPromise, match=r"'odd' of vibench\.sensors broke its promise when it was asked"):
         load_rig(path) and open_bench(path)

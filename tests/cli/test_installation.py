@@ -55,7 +55,7 @@ def without(libraries, *arguments, cwd):
     )
 
 
-def test_the_version_is_that_of_the_package(vibench_here, tmp_path):
+def test_the_version_matches_the_package(vibench_here, tmp_path):
     assert vibench_here("--version", cwd=tmp_path).stdout == f"vibench {version('vibench')}\n"
 
 
@@ -79,7 +79,7 @@ def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, t
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
-def test_every_example_has_a_name_of_its_own(vibench_here, tmp_path):
+def test_every_example_has_its_own_name(vibench_here, tmp_path):
     for line in vibench_here("examples", cwd=tmp_path).stdout.splitlines()[:-1]:
         names = line.partition(": ")[2].split(", ")
         assert len(names) == len(set(names)), line
@@ -117,7 +117,9 @@ def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vib
 
 
 @pytest.mark.parametrize("state", ["file", "file/below"])
-def test_where_no_state_can_be_kept_the_doctor_says_so_and_predictions_go_on(vibench_here, tmp_path, state):
+def test_where_no_state_can_be_kept_the_doctor_reports_it_and_predictions_continue(
+    vibench_here, tmp_path, state
+):
     (tmp_path / "file").write_text("a file in the way")
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / state)}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)

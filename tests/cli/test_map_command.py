@@ -50,7 +50,7 @@ def test_an_estimate_makes_nothing(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
-def test_a_map_becomes_a_file_and_a_picture_and_goes_on_where_it_was(vibench_here, tmp_path, text):
+def test_a_map_becomes_a_file_and_a_picture_and_continues_where_it_was(vibench_here, tmp_path, text):
     asked = plan(tmp_path, text)
     found = vibench_here("map", asked, "--out", "a", "--json", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
@@ -86,7 +86,7 @@ def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
         (LINE, "it needs ranges for two coordinates"),
     ],
 )
-def test_a_basin_says_why_its_boundary_has_no_exponent(vibench_here, tmp_path, text, why):
+def test_a_basin_states_why_its_boundary_has_no_exponent(vibench_here, tmp_path, text, why):
     found = vibench_here("map", plan(tmp_path, text), "--out", "a", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert f"The uncertainty exponent is not determined: {why}" in found.stdout
@@ -135,7 +135,9 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vib
         (MAP + "gap = 3\n", (), "gap"),
     ],
 )
-def test_what_cannot_be_mapped_is_one_sentence_and_no_folder(vibench_here, tmp_path, text, more, said):
+def test_anything_that_cannot_be_mapped_is_one_sentence_and_no_folder(
+    vibench_here, tmp_path, text, more, said
+):
     found = vibench_here("map", plan(tmp_path, text), "--out", "a", *more, cwd=tmp_path)
     assert found.returncode == 1
     assert said in " ".join(found.stderr.split())

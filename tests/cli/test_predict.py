@@ -51,7 +51,7 @@ def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench_here, tmp_pat
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_an_exponent_is_carried_where_it_is_asked_for(vibench_here, tmp_path):
+def test_an_exponent_is_carried_where_it_is_requested(vibench_here, tmp_path):
     ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov", "--json"),
@@ -129,7 +129,7 @@ def test_a_point_without_an_answer_is_an_error_beside_the_answers_of_the_others(
         (("--amplitude", "nan", "--frequency", 100), "--amplitude"),
     ],
 )
-def test_what_cannot_be_predicted_is_said_in_one_sentence(vibench_here, tmp_path, arguments, said):
+def test_anything_that_cannot_be_predicted_is_stated_in_one_sentence(vibench_here, tmp_path, arguments, said):
     ran = vibench_here("predict", *arguments, "--json", cwd=tmp_path)
     assert ran.returncode != 0
     assert ran.stdout == ""
@@ -168,7 +168,7 @@ def test_a_budget_that_is_no_number_is_refused_in_a_sentence(vibench_here, tmp_p
         assert said in ran.stderr
 
 
-def test_a_requested_error_is_reached_and_said(vibench_here, tmp_path):
+def test_a_requested_error_is_reached_and_stated(vibench_here, tmp_path):
     asked = ("predict", "--amplitude", 20e-6, "--frequency", 130, "--error", "1 %", "--time", "20 s")
     ran = vibench_here(*asked, "--json", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

@@ -33,7 +33,7 @@ def test_without_a_terminal_progress_is_one_line_each_time():
     assert log.getvalue().splitlines()[-1] == "progress: noise 15 of 60 (25 %); opening"
 
 
-def test_what_ends_before_ten_seconds_leaves_no_line():
+def test_anything_that_ends_before_ten_seconds_leaves_no_line():
     log = Log()
     with show_bars(Progress(console=Console(file=log))) as bars:
         bars.add_task("noise", total=60)

@@ -97,7 +97,7 @@ def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, 
         (ImportError("x.so: cannot open shared object file: Too many open files"), "cannot open more files"),
     ],
 )
-def test_a_shortage_is_told_however_it_is_wrapped(vibench_here, tmp_path, monkeypatch, wrapped, said):
+def test_a_shortage_is_reported_however_it_is_wrapped(vibench_here, tmp_path, monkeypatch, wrapped, said):
     def short(*_arguments, **_named):
         try:
             raise wrapped

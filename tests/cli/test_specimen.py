@@ -187,7 +187,7 @@ def test_the_forces_of_all_laws_are_drawn(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_every_shipped_specimen_is_told(vibench_here, tmp_path, name):
+def test_every_shipped_specimen_is_reported(vibench_here, tmp_path, name):
     found = vibench_here("specimen", name, cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert "contact law: " in found.stdout

@@ -74,7 +74,7 @@ def test_one_that_is_named_is_stopped_alone(vibench_here, tmp_path):
         assert south.poll() is None
 
 
-def test_which_is_held_must_be_said(vibench_here, tmp_path):
+def test_which_is_held_must_be_stated(vibench_here, tmp_path):
     with driving("north"), driving("south"):
         told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert told.returncode == 1
@@ -122,7 +122,7 @@ def on_another_computer(what):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
-def test_what_drives_on_another_computer_is_said_not_to_be_reached(vibench_here, tmp_path):
+def test_what_drives_on_another_computer_is_stated_not_to_be_reached(vibench_here, tmp_path):
     there = "Not reached, since it runs on another computer: night (process"
     with on_another_computer("night") as path:
         alone = vibench_here("stop", cwd=tmp_path)

@@ -78,14 +78,14 @@ def test_it_stops_the_one_that_is_named():
 @pytest.mark.parametrize(
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
-def test_what_is_not_plain_is_answered_by_the_complete_command(words, code):
+def test_anything_that_is_not_plain_is_answered_by_the_complete_command(words, code):
     with driving("north") as north:
         told = vibench_stop(*words)
         assert told.returncode == code, told.stderr
         assert north.poll() is None
 
 
-def test_of_one_that_was_killed_it_says_what_to_do():
+def test_of_one_that_was_killed_it_states_what_to_do():
     with driving("north") as north:
         north.kill()
         north.wait()
@@ -114,7 +114,7 @@ def test_what_the_system_stopped_is_not_called_silent():
         assert "switch the amplifier off" in " ".join(told.stderr.split())
 
 
-def test_without_a_state_folder_it_says_so(tmp_path):
+def test_without_a_state_folder_it_reports_it(tmp_path):
     told = vibench_stop(VIBENCH_STATE_DIR=str(Path(tmp_path) / "nowhere"))
     assert told.returncode == 1
     assert "no engine is running" in told.stderr

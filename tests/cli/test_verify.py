@@ -81,7 +81,7 @@ def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
     assert vibench_here("verify", "one.h5", cwd=folder).returncode == 0
 
 
-def test_a_key_is_asked_for_by_name(vibench_here, folder):
+def test_a_key_is_requested_by_name(vibench_here, folder):
     (folder / "key").write_text("a key that was not used here")
     found = vibench_here("verify", ".", "--key", "key", "--json", cwd=folder)
     assert found.returncode == 1
@@ -196,7 +196,7 @@ def test_it_is_read_when_the_user_says_so(vibench_here, folder):
     assert (folder / "two.csv").exists()
 
 
-def test_what_was_left_of_a_recording_is_read_when_the_user_says_so(vibench_here, folder):
+def test_anything_that_was_left_of_a_recording_is_read_when_the_user_says_so(vibench_here, folder):
     with growing(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     with h5py.File(folder / "five.h5.part", "r+") as file:

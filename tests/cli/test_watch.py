@@ -91,7 +91,7 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_a_stop_of_an_engine_that_stands_still_is_kept_and_said_so(running, tmp_path):
+def test_a_stop_of_an_engine_that_stands_still_is_kept_and_reported(running, tmp_path):
     with frozen(running.pid):
         told = vibench("stop", "--level", "abort", "--reason", "while it stood still")
         assert told.returncode == 1
@@ -116,14 +116,14 @@ def test_watching_shows_the_run_and_its_end(running):
     assert "dwell" in said
 
 
-def test_where_no_engine_runs_it_is_said():
+def test_where_no_engine_runs_it_is_stated():
     told = vibench("stop")
     assert told.returncode == 1
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
     assert f"looked for in {os.environ['VIBENCH_STATE_DIR']}" in told.stderr
 
 
-def test_where_the_state_folder_cannot_be_made_it_is_said(vibench_here, tmp_path):
+def test_where_the_state_folder_cannot_be_made_it_is_stated(vibench_here, tmp_path):
     (tmp_path / "state").write_text("a file")
     told = vibench_here("stop", cwd=tmp_path, environment={"VIBENCH_STATE_DIR": str(tmp_path / "state")})
     assert told.returncode == 1

@@ -375,7 +375,7 @@ def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
     assert analyse(Path(recorded(bench).file)).response.periodic.realisations == 11
 
 
-def test_what_is_complained_of_goes_when_it_has_come_about(bench, qtbot):
+def test_anything_that_is_complained_of_goes_when_it_has_come_about(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.start()
     assert "nothing is armed" in bench.strip.notices[-1].what
@@ -401,7 +401,7 @@ def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
 
 
-def test_an_engine_that_dies_is_told_within_a_moment(bench, qtbot):
+def test_an_engine_that_dies_is_reported_within_a_moment(bench, qtbot):
     os.kill(bench.context.bridge.engine_pid, signal.SIGKILL)
     qtbot.waitUntil(lambda: bench.context.bridge.status is None, timeout=5_000)
     assert bench.strip.notices[-1].code == "EngineGone"

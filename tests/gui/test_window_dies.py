@@ -120,7 +120,9 @@ def silent_after_s(window, number, folder):
 @pytest.mark.thorough
 @sees_locks
 @pytest.mark.timeout(300)
-def test_what_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_it(window, qtbot, tmp_path):
+def test_anything_that_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_it(
+    window, qtbot, tmp_path
+):
     bridge, left = window.context.bridge, tmp_path / "left"
     with measuring_window(left, Supervision.UNATTENDED, os.environ["VIBENCH_STATE_DIR"]):
         window.look_for_left_campaign()

@@ -32,7 +32,7 @@ def judge(values_by_damping, *wanted, tried=(DAMPED, VERY_DAMPED)):
     return judgement(made(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
 
 
-def test_a_claim_is_named_by_its_function_and_says_its_docstring():
+def test_a_claim_is_named_by_its_function_and_states_its_docstring():
     @claim("section 3", "Read off.", at_least("peak", "Hz", 95.0), draws=3)
     def first_peak(_reading):
         """The first peak

@@ -73,7 +73,7 @@ def test_of_the_options_tried_the_page_has_only_those_that_uphold_a_claim(found)
     assert "exponent: 60 1/s" not in page
 
 
-def test_what_differs_from_the_paper_is_said_first_with_the_option_that_upholds_it(found):
+def test_anything_that_differs_from_the_paper_is_stated_first_with_the_option_that_upholds_it(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
@@ -125,7 +125,7 @@ def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found,
     assert len(page.visible.split()) <= 2000
 
 
-def test_every_claim_has_a_key_of_its_own():
+def test_every_claim_has_its_own_key():
     assert len({claim.key for claim in CLAIMS}) == len(CLAIMS)
 
 

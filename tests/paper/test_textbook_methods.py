@@ -77,7 +77,7 @@ def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode(method):
 
 
 @pytest.mark.thorough
-def test_chaos_under_a_tight_tolerance_is_that_of_the_exact_motion():
+def test_chaos_under_a_tight_tolerance_matches_the_exact_motion():
     # Many short motions, which go together, in place of a long one.
     drives = [Harmonic(260.0, 5e-6, phase) for phase in np.linspace(0.0, 2.0 * np.pi, 100, endpoint=False)]
     exact = lyapunov_exponent(gong2025(), Harmonic(260.0, 5e-6)).exponent_per_s

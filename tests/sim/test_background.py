@@ -94,7 +94,7 @@ def test_a_stream_that_does_not_end_when_dropped_is_ended(pool):
     assert answers != heard
 
 
-def test_what_takes_too_long_is_given_up_and_a_stream_may_take_as_long_as_it_likes(pool):
+def test_anything_that_takes_too_long_is_given_up_and_a_stream_may_take_as_long_as_it_likes(pool):
     errors, heard = [], []
     pool.ask(time.sleep, errors.append, errors.append, 3600.0)
     polled(pool, lambda: errors)

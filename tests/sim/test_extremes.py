@@ -313,6 +313,6 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("ask", "sentence"), REFUSED)
-def test_what_has_no_answer_is_refused_in_one_sentence(ask, sentence):
+def test_anything_that_has_no_answer_is_refused_in_one_sentence(ask, sentence):
     with pytest.raises(ValueError, match=sentence):
         ask()

@@ -84,7 +84,7 @@ def asked_enums():
 
 
 @pytest.mark.parametrize(("function", "parameter", "kind"), list(asked_enums()))
-def test_where_an_enum_is_asked_for_its_word_is_accepted_and_another_refused_with_those_allowed(
+def test_where_an_enum_is_requested_its_word_is_accepted_and_another_refused_with_those_allowed(
     function, parameter, kind
 ):
     call = CALLS[function]
@@ -93,7 +93,7 @@ def test_where_an_enum_is_asked_for_its_word_is_accepted_and_another_refused_wit
         call(**{parameter: "nonsense"})
 
 
-def test_what_is_observed_may_be_named_by_words():
+def test_anything_that_is_observed_may_be_named_by_words():
     named = sim.Scene(SPECIMEN, DRIVE, observe=("response", "lyapunov"), accuracy="quick")
     assert named.observe == (sim.Observable.RESPONSE, sim.Observable.LYAPUNOV)
     assert named.accuracy is sim.Accuracy.QUICK

@@ -129,11 +129,11 @@ class TestOpening:
         assert output_of(virtual) == b"0\n"
         open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
 
-    def test_a_second_bench_on_the_same_converter_is_told_that_it_is_busy(self, laboratory):
+    def test_a_second_bench_on_the_same_converter_gets_an_error_that_it_is_busy(self, laboratory):
         with laboratory_bench(laboratory), pytest.raises(InstrumentBusy):
             open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
 
-    def test_a_load_that_only_the_operator_knows_is_asked_for(self, rig):
+    def test_a_load_that_only_the_operator_knows_is_requested(self, rig):
         asked = []
 
         def confirm(knobs):
@@ -160,7 +160,7 @@ class TestLeaving:
         bench.close()
 
     @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
-    def test_whatever_error_is_under_way_silences_and_goes_on(self, laboratory, virtual, error):
+    def test_whatever_error_is_under_way_silences_and_continues(self, laboratory, virtual, error):
         with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
             raise error
         assert caught.value is error
@@ -210,7 +210,7 @@ class TestCalibration:
         open_bench(aged(rig, "2001-01-01")).close()
 
     @pytest.mark.parametrize(("age_days", "is_valid"), [(-1, False), (0, True), (730, True), (731, False)])
-    def test_it_holds_from_its_day_for_as_long_as_the_rig_says(self, rig, age_days, is_valid):
+    def test_it_holds_from_its_day_for_as_long_as_the_rig_states(self, rig, age_days, is_valid):
         today = rig.vibrometer.calibrated + timedelta(days=age_days)
         assert calibrations(rig, today)[0].is_valid is is_valid
 
@@ -236,7 +236,7 @@ class TestCalibration:
 
 
 class TestKnobs:
-    def test_every_knob_is_asked_for_once(self, rig):
+    def test_every_knob_is_requested_once(self, rig):
         asked = []
         sheet = confirm_by_asking(lambda question: asked.append(question) or "y", "B. Kjaer")(rig.knobs)
         assert len(asked) == len(rig.knobs)
@@ -279,7 +279,7 @@ class TestConfigurationFiles:
         with pytest.raises(ConfigurationError, match=r"nowhere\.toml"):
             open_bench(tmp_path / "nowhere.toml")
 
-    def test_the_laboratory_bench_says_which_instrument_it_misses(self):
+    def test_the_laboratory_bench_states_which_instrument_it_misses(self):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver"):
             open_bench(CONFIGS / "lab_rig.toml", confirm_simulated, CalibrationRule.WAIVED)
 

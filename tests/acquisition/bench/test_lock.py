@@ -65,7 +65,7 @@ def test_a_bench_that_another_user_drives_is_refused(user):
 
 @posix
 @pytest.mark.parametrize(("first", "second"), [(None, NOBODY), (NOBODY, None), (NOBODY, NOBODY - 1)])
-def test_whoever_comes_second_is_refused_and_the_next_day_comes_first(user, first, second):
+def test_anyone_who_comes_second_is_refused_and_the_next_day_comes_first(user, first, second):
     if os.geteuid() != 0:
         pytest.skip("only root can be another user")
     for one, other in ((first, second), (second, first)):
@@ -118,7 +118,9 @@ def a_folder(path, aim):
 @posix
 @pytest.mark.timeout(10)
 @pytest.mark.parametrize("trap", [a_link, a_second_name, a_pipe, a_folder])
-def test_what_lies_in_a_locks_place_is_refused_and_nothing_is_written_through_it(shared, tmp_path, trap):
+def test_anything_that_lies_in_a_locks_place_is_refused_and_nothing_is_written_through_it(
+    shared, tmp_path, trap
+):
     BenchLock.of(RIG).close()
     aim = tmp_path / "precious"
     aim.write_text("kept")
@@ -130,7 +132,7 @@ def test_what_lies_in_a_locks_place_is_refused_and_nothing_is_written_through_it
     assert aim.read_text() == "kept"
 
 
-def test_what_is_written_into_a_lock_is_not_shown_unless_it_is_a_process(shared, monkeypatch):
+def test_anything_that_is_written_into_a_lock_is_not_shown_unless_it_is_a_process(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():

@@ -46,7 +46,7 @@ def reads(monkeypatch):
     return opened
 
 
-def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
+def test_it_states_what_when_and_how_large_also_of_folders_in_the_folder(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")
@@ -85,7 +85,7 @@ def test_it_can_be_made_again_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
-def test_what_is_to_be_minded_is_the_verdict(bench, folder):
+def test_anything_that_needs_attention_is_the_verdict(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 

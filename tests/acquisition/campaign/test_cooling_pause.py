@@ -60,7 +60,7 @@ def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_te
     assert "resting for 12 s before two" in told
 
 
-def test_a_rest_is_told_in_the_plan_and_in_the_estimate(rig, tmp_path):
+def test_a_rest_is_reported_in_the_plan_and_in_the_estimate(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three"), campaign("one", "two", "three", rest_s=0)
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
@@ -104,7 +104,7 @@ def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
     ]
 
 
-def test_a_campaign_killed_in_a_rest_goes_on_at_the_next_point(bench, new_bench, rig, tmp_path):
+def test_a_campaign_killed_in_a_rest_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
     def as_left_by_a_kill(event):
         if event.kind is CampaignEventKind.RESTING:
             # What a process leaves that is killed now: the files as they are, the journal's log included.

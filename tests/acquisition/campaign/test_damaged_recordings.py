@@ -215,7 +215,7 @@ def test_a_journal_from_before_seals_is_gone_on_with(bench, folder):
     assert (one.seal, len(three.seal)) == ("", 64)
 
 
-def test_recordings_from_before_seals_are_kept_and_told_as_such(bench, folder):
+def test_recordings_from_before_seals_are_kept_and_reported_as_such(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
@@ -237,7 +237,7 @@ def test_recordings_whose_seal_was_taken_away_are_made_again(bench, folder):
     assert {each.outcome for each in made} == {PointOutcome.RECORDED}
 
 
-def test_another_recording_under_its_name_is_found_by_whoever_checks_a_seal(folder):
+def test_another_recording_under_its_name_is_found_by_anyone_who_checks_a_seal(folder):
     shutil.copy(folder / "one.h5", folder / "two.h5")
     with open_recording(folder / "two.h5") as recording:
         for depth in SealDepth:
@@ -278,7 +278,7 @@ def said_by(statement):
         said_by("ALTER TABLE points RENAME COLUMN file TO fine"),
     ],
 )
-def test_a_journal_that_says_what_cannot_be_is_refused_in_a_sentence(bench, folder, damage):
+def test_a_journal_that_states_what_cannot_be_is_refused_in_a_sentence(bench, folder, damage):
     damage(folder)
     older = sorted((folder / "older").iterdir())
     with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite cannot be understood"):
@@ -382,7 +382,7 @@ def test_a_complete_point_whose_end_the_disk_refuses_is_not_recorded_twice(bench
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_complete_recording_counts_whatever_the_journal_says_of_its_attempt(bench, tmp_path):
+def test_a_complete_recording_counts_whatever_the_journal_states_of_its_attempt(bench, tmp_path):
     """The journal could not be written after the recovery; or the user recovered it, as the error says."""
     refused_by_the_disk(bench, tmp_path, None)
     (tmp_path / "two.h5.tmp").rmdir()

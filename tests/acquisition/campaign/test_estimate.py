@@ -41,7 +41,7 @@ def test_the_time_is_what_the_recordings_last(bench, rig, tmp_path):
     assert expected.recordings == 3
 
 
-def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp_path):
+def test_the_bytes_match_the_samples_and_the_largest_is_the_last(rig, tmp_path):
     expected = estimate_campaign(CAMPAIGN, rig, tmp_path)
     bytes_per_s = 5120 * 4 * 4
     assert expected.largest_bytes == pytest.approx((0.6 + 0.4 + 0.5 + 0.3) * bytes_per_s)
@@ -49,7 +49,7 @@ def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp
     assert expected.fits
 
 
-def test_what_is_there_already_is_not_counted(bench, rig, tmp_path):
+def test_anything_that_is_there_already_is_not_counted(bench, rig, tmp_path):
     point_results = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):
         estimate_campaign(CAMPAIGN, rig, tmp_path)

@@ -108,13 +108,13 @@ def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["c.campaign.sqlite"]
 
 
-def test_a_journal_whose_program_died_before_its_first_commit_is_not_begun(tmp_path):
+def test_a_journal_whose_program_died_before_its_first_commit_is_not_started(tmp_path):
     path = tmp_path / "c.campaign.sqlite"
     path.touch()
     assert not journal_exists(path)
 
 
-def test_what_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
+def test_anything_that_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
     other = tmp_path / "other.sqlite"
     other.write_text("no database " * 100)
     with pytest.raises(RecordingError, match=r"other\.sqlite"):
@@ -154,7 +154,7 @@ def test_a_file_that_is_refused_is_let_go(connections, tmp_path, use):
             connection.execute("SELECT 1")
 
 
-def test_a_journal_that_cannot_be_begun_is_let_go(journal, connections):
+def test_a_journal_that_cannot_be_started_is_let_go(journal, connections):
     with pytest.raises(RecordingError, match="already exists"):
         Journal.begin(journal.path, CAMPAIGN, journal.bench)
     (connection,) = connections

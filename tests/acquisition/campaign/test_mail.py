@@ -72,13 +72,13 @@ def test_a_notice_becomes_one_message(server, tmp_path):
     assert "recorded: 3" in server.heard
 
 
-def test_a_server_that_is_not_there_is_said_and_raises_nothing(server, tmp_path):
+def test_a_server_that_is_not_there_is_stated_and_raises_nothing(server, tmp_path):
     with socketserver.TCPServer(("127.0.0.1", 0), None) as closed:
         port = closed.server_address[1]
     assert MailMessenger(settings(tmp_path, port)).send(NOTICE).startswith("mail through 127.0.0.1 failed")
 
 
-def test_a_server_without_encryption_is_not_used_when_it_is_asked_for(server, tmp_path):
+def test_a_server_without_encryption_is_not_used_when_it_is_requested(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1], "starttls")).send(NOTICE)
     assert said.startswith("mail through 127.0.0.1 failed")
     assert not any(line.startswith("Subject") for line in server.heard)

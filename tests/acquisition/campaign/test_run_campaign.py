@@ -55,7 +55,7 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
     assert not any(name == "start" for name, _, _ in bench.world.calls)
 
 
-def test_points_that_are_played_alike_are_held_against_the_limits_once(bench, tmp_path, monkeypatch):
+def test_points_that_are_played_alike_are_checked_against_the_limits_once(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
         _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
@@ -137,7 +137,7 @@ def test_resuming_with_another_plan_is_refused(bench, tmp_path):
         run_campaign(bench, changed, tmp_path, ExistingRecordings.RESUME)
 
 
-def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
+def test_a_campaign_that_continues_after_failures_passes_a_failed_measurement(bench, tmp_path):
     point_results = run_campaign(
         bench,
         CAMPAIGN,
@@ -154,7 +154,9 @@ def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
 
 
 @pytest.mark.parametrize("lost", [InstrumentLost("gone"), RecordingError("the disk is full")])
-def test_a_lost_instrument_or_disk_ends_a_campaign_even_when_told_to_go_on(bench, tmp_path, lost):
+def test_a_lost_instrument_or_disk_ends_a_campaign_even_when_it_continues_after_failures(
+    bench, tmp_path, lost
+):
     with pytest.raises(type(lost)):
         run_campaign(
             bench,

@@ -183,7 +183,7 @@ class TestAnotherBench:
 
 
 class TestFurtherMeasurements:
-    def test_they_are_made_next_and_asked_for_once_also_over_a_resume(self, bench, tmp_path):
+    def test_they_are_made_next_and_requested_once_also_over_a_resume(self, bench, tmp_path):
         asked = []
 
         def after(finished, recording):
@@ -280,7 +280,7 @@ class TestResuming:
 
 
 class TestWatching:
-    def test_log_and_status_line_tell_the_story(self, bench, tmp_path):
+    def test_log_and_status_line_show_the_story(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         assert [line["event"] for line in log(tmp_path)] == [
             "begun",

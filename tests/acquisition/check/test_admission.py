@@ -86,7 +86,7 @@ def test_a_check_of_another_configuration_does_not_arm(real, tmp_path):
         require_fresh(bench, tmp_path, clock=lambda: NOW)
 
 
-def test_the_time_that_a_check_holds_is_the_rigs_to_say(rig, state_folder):
+def test_the_time_that_a_check_holds_is_the_rigs_to_state(rig, state_folder):
     patient = rig.model_copy(update={"check_valid_h": 48.0})
     result = kept_result(rig, 30.0)
     assert "12 h are allowed" in why_not(result, rig, NOW)
@@ -115,7 +115,7 @@ def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
         require_fresh(bench, tmp_path)
 
 
-def test_a_check_that_finds_the_drive_playing_on_does_not_say_that_it_is_off(real, tmp_path):
+def test_a_check_that_finds_the_drive_playing_on_does_not_state_that_it_is_off(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
     with pytest.raises(
@@ -124,7 +124,7 @@ def test_a_check_that_finds_the_drive_playing_on_does_not_say_that_it_is_off(rea
         require_fresh(bench, tmp_path, CheckRule.NOW)
 
 
-def test_a_waived_check_arms_and_the_recording_says_that_there_was_none(real, tmp_path):
+def test_a_waived_check_arms_and_the_recording_states_that_there_was_none(real, tmp_path):
     bench, _ = real
     assert require_fresh(bench, tmp_path, CheckRule.WAIVED) is None
     run_measurement(bench, DWELL, tmp_path / "run.h5")
@@ -140,7 +140,7 @@ def test_a_virtual_bench_is_checked_unasked_once_and_then_trusted(rig, state_fol
         assert bench.last_check == first
 
 
-def test_what_has_changed_since_the_last_check_is_said_in_decibels_and_days(real, tmp_path):
+def test_anything_that_has_changed_since_the_last_check_is_stated_in_decibels_and_days(real, tmp_path):
     bench, virtual = real
     check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
     virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)
@@ -161,7 +161,7 @@ def test_another_configuration_is_not_compared_with(real, tmp_path):
 
 
 class TestKeeping:
-    def test_each_rig_has_a_file_of_its_own_and_only_the_last_check_is_kept(self, rig, state_folder):
+    def test_each_rig_has_its_own_file_and_only_the_last_check_is_kept(self, rig, state_folder):
         other = rig.model_copy(update={"name": "another: rig/1"})
         kept_result(rig, 3.0)
         last, apart = kept_result(rig, 2.0), kept_result(other)

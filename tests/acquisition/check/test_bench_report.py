@@ -35,7 +35,7 @@ def failed(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
-def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configuration(checked, rig, tmp_path):
+def test_a_healthy_bench_fails_nothing_and_its_figures_match_the_configuration(checked, rig, tmp_path):
     report = checked(rig, tmp_path)
     assert failed(report) == set()
     clock = report["drive's clock"]
@@ -169,7 +169,7 @@ def test_a_wrong_load_at_the_panel_is_named_as_such(checked, rig, tmp_path):
     assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
 
 
-def test_a_right_load_that_nobody_can_ask_for_passes(checked, rig, tmp_path):
+def test_a_right_load_that_nobody_can_request_passes(checked, rig, tmp_path):
     assert failed(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
@@ -213,7 +213,7 @@ def test_a_bench_whose_output_plays_sines_is_checked_by_its_output(tmp_path):
         (np.nan, Verdict.FAIL),
     ],
 )
-def test_a_deviation_is_judged_by_its_bounds(deviation, verdict):
+def test_a_deviation_is_classified_by_its_bounds(deviation, verdict):
     assert Bounds(1.0, 3.0).verdict(deviation) is verdict
 
 

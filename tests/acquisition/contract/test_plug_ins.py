@@ -84,13 +84,13 @@ def test_a_configuration_that_names_what_is_not_installed_is_refused_before_anyt
         load_rig(BENCH)
 
 
-def test_a_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch):
+def test_a_package_that_cannot_be_imported_reports_it(tmp_path, monkeypatch):
     offer(tmp_path, monkeypatch, "broken", "no_such_module_of_anyone:Driver")
     with pytest.raises(ConfigurationError, match=r"no_such_module_of_anyone:Driver, which cannot be loaded"):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_a_module_that_raises_when_it_is_imported_is_told_in_a_sentence(tmp_path, monkeypatch):
+def test_a_module_that_raises_when_it_is_imported_is_reported_in_a_sentence(tmp_path, monkeypatch):
     (tmp_path / "raises_at_once.py").write_text('raise RuntimeError("the firmware is too old")')
     offer(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
     said = r"raises_at_once:Driver, which cannot be loaded \(RuntimeError: the firmware is too old\)"
@@ -98,7 +98,7 @@ def test_a_module_that_raises_when_it_is_imported_is_told_in_a_sentence(tmp_path
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypatch):
+def test_two_packages_with_one_name_are_distinguished_by_nobody(tmp_path, monkeypatch):
     offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"offered more than once \(somebody:Else, vibench"):
         plug_in(PlugInKind.GENERATOR, "afg1022x")
@@ -179,7 +179,7 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         ),
     ],
 )
-def test_the_contract_says_once_what_is_wrong_with_its_command(tmp_path, options, sentence):
+def test_the_contract_states_once_what_is_wrong_with_its_command(tmp_path, options, sentence):
     bench = CONFIGS / "virtual_rig.toml"
     done = run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),

@@ -19,7 +19,7 @@ def velocity(seconds=2.0):
 
 
 @pytest.mark.parametrize("block", [900, 1925, 5000])
-def test_what_is_handed_on_is_the_motion_once_and_in_order(block):
+def test_anything_that_is_handed_on_is_the_motion_once_and_in_order(block):
     light = velocity()
     dark = light.copy()
     begins = np.random.default_rng(block).integers(2_000, light.size - 3_000, 14)
@@ -46,7 +46,7 @@ def test_without_a_suspicion_nothing_waits():
         assert np.array_equal(handed_on, [part, 2 * part, 3 * part])
 
 
-def test_after_a_hole_and_after_a_change_it_begins_anew():
+def test_after_a_hole_and_after_a_change_it_begins_again():
     light, rows = velocity(), BridgedRows(RATE_HZ)
     dark = light[:2_000].copy()
     dark[-15:] = 0.6

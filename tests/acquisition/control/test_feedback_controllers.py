@@ -71,7 +71,7 @@ def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
         assert low - 0.3 <= fold <= high + 0.3
 
 
-def test_every_step_says_its_pass_branch_and_where_it_came_from(swept):
+def test_every_step_states_its_pass_branch_and_where_it_came_from(swept):
     steps = [numbers for label, numbers, *_ in swept.segments if label == "step"]
     assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]
     assert [each["pass"] for each in steps] == [1] * 9 + [2] * 9
@@ -98,7 +98,7 @@ def test_it_takes_no_longer_than_planned(swept, both_ways):
     assert swept.sample / 5120 <= duration_s(both_ways["measurement"])
 
 
-def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_says(new_control_bench):
+def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_states(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.6 + 0.3 * (frequency_hz > 125))
     plan = SettledSine(
         amplitude_vpp=1.0,
@@ -136,7 +136,7 @@ def test_a_level_out_of_reach_is_flagged_and_the_plan_s_setting_never_passed(new
     assert max(setting for *_, setting in bench.settings) == pytest.approx(0.05)
 
 
-def test_a_sweep_holds_its_level_over_a_shaker_resonance_and_says_where_not(new_control_bench):
+def test_a_sweep_holds_its_level_over_a_shaker_resonance_and_states_where_not(new_control_bench):
     bench = new_control_bench(
         shaker_factor=lambda frequency_hz: 1 + 0.5 / (1 + ((frequency_hz - 150) / 4) ** 2)
     )
@@ -205,7 +205,7 @@ def test_a_strongly_bent_resonance_is_followed_though_each_level_moves_it_by_hal
     assert found[-1]["at_hz"] > 127
 
 
-def test_where_the_motion_does_not_settle_no_resonance_is_told_nor_that_it_was_locked_on_to(
+def test_where_the_motion_does_not_settle_no_resonance_is_reported_nor_that_it_was_locked_on_to(
     new_control_bench,
 ):
     """Phase and level are met, and a thousand like periods are not waited for."""

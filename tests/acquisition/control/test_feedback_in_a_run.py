@@ -58,7 +58,7 @@ def test_it_ends_silent_and_complete_with_its_level_in_the_recording(bench, tmp_
     assert dwell["last"] - dwell["first"] + 1 == 5120
 
 
-def test_it_is_no_longer_than_its_header_says(bench, tmp_path):
+def test_it_is_no_longer_than_its_header_states(bench, tmp_path):
     list(run_of(bench, tmp_path))
     planned = round((CHECK_S + duration_s(DWELL)) * 5120)
     assert bench.recorder.header.expected_samples == planned

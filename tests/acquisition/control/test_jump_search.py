@@ -45,14 +45,14 @@ def test_the_bracket_holds_the_jump_and_is_as_narrow_as_asked(jump_hz, resolutio
         assert len(asked) <= 8
 
 
-def test_a_bracket_that_is_narrow_enough_asks_for_nothing():
+def test_a_bracket_that_is_narrow_enough_requests_nothing():
     jump, asked = found(105.0, 10.0)
     assert asked == []
     assert jump == LocatedJump(jump.before, jump.after)
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected):
+def test_half_the_factor_in_decibels_distinguishes_two_branches(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 

@@ -33,7 +33,7 @@ def test_an_error_that_chance_explains_changes_nothing():
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.1), 10.0) > 1.0
 
 
-def test_a_level_s_uncertainty_is_that_of_repetitions_also_when_neighbours_depend_on_each_other():
+def test_a_level_s_uncertainty_matches_repetitions_also_when_neighbours_depend_on_each_other():
     random = np.random.default_rng(3)
     means, stated = [], []
     for _ in range(200):

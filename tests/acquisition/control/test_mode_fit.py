@@ -49,7 +49,7 @@ def test_four_points_are_too_few():
     assert fit_mode(*points(*MODES[1], count=4)) is None
 
 
-def test_points_that_scatter_tell_no_mode_that_nobody_damps():
+def test_points_that_scatter_show_no_mode_that_nobody_damps():
     """A vibrometer without light led to "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
     random = np.random.default_rng(3)
     frequency_hz, answers = points(*MODES[1])

@@ -64,7 +64,7 @@ def random_spectrum(seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("spectrum", [corners((40, 0.01)), random_spectrum(3), random_spectrum(8)])
-def test_the_base_has_the_spectrum_that_was_asked_for(recorded, spectrum):
+def test_the_base_has_the_spectrum_that_was_requested(recorded, spectrum):
     with recorded(noise(spectrum=spectrum)) as recording:
         frequency_hz, density = densities(recording, "base_acceleration")
         off_db = 10 * np.log10(density / density_at(spectrum, frequency_hz))

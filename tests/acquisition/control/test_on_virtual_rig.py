@@ -293,7 +293,7 @@ def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carr
         ((60e-6, 30e-6), -60, 193.092, 2.417e-6),
     ],
 )
-def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_asked_for(
+def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_requested(
     carried_out, gap_m, phase_deg, model_hz, model_m
 ):
     """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""

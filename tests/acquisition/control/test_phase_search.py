@@ -60,7 +60,7 @@ def test_it_stays_in_its_range():
     assert search.next_hz() == 270.0
 
 
-def test_errors_beyond_a_right_angle_tell_no_crossing():
+def test_errors_beyond_a_right_angle_show_no_crossing():
     tries = [PhaseError(100.0, 130.0, 1.0), PhaseError(101.0, 120.0, 1.0)]
     found = PhaseSearch(90.0, 110.0, 1.0, tries).resonance(0.3)
     assert found.frequency_hz == 101.0

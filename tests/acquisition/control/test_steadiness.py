@@ -120,7 +120,7 @@ def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drive
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
-def test_a_single_order_that_wanders_is_judged_like_all_of_them(kept):
+def test_a_single_order_that_wanders_is_checked_like_all_of_them(kept):
     """It keeps its statistics and does not repeat, by itself too."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))

@@ -63,7 +63,7 @@ class TestOpening:
         plugged.instrument.execute(b"NONSENSE")
         AFG1022X.open(plugged.config).close()
 
-    def test_nothing_on_the_bus_is_an_instrument_that_is_lost(self, bus):
+    def test_nothing_on_the_bus_is_a_lost_instrument(self, bus):
         config = bus.plug_in().config.model_copy(update={"resource": "USB0::0x0699::0x0353::NOBODY::INSTR"})
         with pytest.raises(InstrumentLost, match=r"NOBODY.*power and cable"):
             AFG1022X.open(config)
@@ -73,7 +73,7 @@ class TestOpening:
             AFG1022X.open(impostor.config)
         assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
 
-    def test_a_second_program_is_told_that_the_first_one_holds_it(self, plugged, generator):
+    def test_a_second_program_gets_an_error_that_the_first_one_holds_it(self, plugged, generator):
         with pytest.raises((InstrumentBusy, InstrumentLost), match=plugged.instrument.serial):
             AFG1022X.open(plugged.config)
         generator.load_sine(100.0, 1.0)
@@ -90,7 +90,7 @@ class TestLoad:
         assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
         generator.close()
 
-    def test_a_load_that_is_wrong_at_the_panel_keeps_it_closed_and_says_what_to_do(self, panel_load):
+    def test_a_load_that_is_wrong_at_the_panel_keeps_it_closed_and_states_what_to_do(self, panel_load):
         with pytest.raises(
             SettingRefused, match=r"expects a load of 50 ohm.*factor of two.*high-z on its panel"
         ):
@@ -149,7 +149,7 @@ class TestPlaying:
         assert (state.frequency_hz, state.amplitude_vpp) == (260.1, 0.2)
 
     @pytest.mark.parametrize("points", [2, 3, 1024, 8191, 8192])
-    def test_the_memory_holds_what_was_asked_for(self, plugged, generator, points):
+    def test_the_memory_holds_what_was_requested(self, plugged, generator, points):
         values = np.cos(2 * np.pi * np.arange(points) / points)
         generator.load_waveform(values, 2.0, 0.5)
         held = plugged.instrument.memory.codes("EMEM")
@@ -234,7 +234,9 @@ class TestLimits:
             (lambda g: g.arm_burst(0), "0 cycles"),
         ],
     )
-    def test_what_is_not_allowed_is_refused_before_anything_is_sent(self, plugged, generator, act, complaint):
+    def test_anything_that_is_not_allowed_is_refused_before_anything_is_sent(
+        self, plugged, generator, act, complaint
+    ):
         generator.load_sine(100.0, 1.0)
         plugged.log.forget()
         with pytest.raises(LimitExceeded, match=complaint):
@@ -310,7 +312,7 @@ class TestFaults:
             generator.set_frequency(261.0)
         assert not plugged.is_on
 
-    def test_a_pulled_cable_tells_the_operator_to_switch_the_amplifier_off(self, plugged, generator):
+    def test_a_pulled_cable_advises_the_operator_to_switch_the_amplifier_off(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         plugged.usb.pull_cable()

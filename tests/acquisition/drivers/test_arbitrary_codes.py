@@ -48,7 +48,7 @@ def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
     assert abs(achieved(made).mean()) < 1e-7
 
 
-def test_an_uneven_waveform_tells_by_how_much_the_panel_must_be_higher():
+def test_an_uneven_waveform_shows_by_how_much_the_panel_must_be_higher():
     values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
     made = AFG1022_MODEL.codes(values)
     assert made.panel_factor == pytest.approx(0.96)

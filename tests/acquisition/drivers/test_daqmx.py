@@ -204,16 +204,16 @@ class TestConfiguration:
             (lambda rig: with_daq(rig, sample_rate_hz=1e6), ConfigurationError, r"does not support"),
         ],
     )
-    def test_what_the_device_cannot_do_is_told_when_the_bench_opens(self, rig, change, kind, complaint):
+    def test_what_the_device_cannot_do_is_reported_when_the_bench_opens(self, rig, change, kind, complaint):
         with pytest.raises(kind, match=complaint):
             DaqmxDigitizer.open(change(rig))
         DaqmxDigitizer.open(rig).close()  # nothing stayed reserved
 
-    def test_no_server_is_an_instrument_that_is_lost(self, configured):
+    def test_no_server_is_a_lost_instrument(self, configured):
         with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
             DaqmxDigitizer.open(with_daq(configured, server="127.0.0.1:9"))
 
-    def test_no_driver_on_this_computer_is_said_plainly(self, configured):
+    def test_no_driver_on_this_computer_is_stated_plainly(self, configured):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver.*daq\.server"):
             DaqmxDigitizer.open(configured)
 
@@ -234,7 +234,7 @@ class TestFaults:
             (-200088, InstrumentLost, r"no longer knows the task"),
         ],
     )
-    def test_a_failed_read_says_what_happened_and_ends_the_run(
+    def test_a_failed_read_states_what_happened_and_ends_the_run(
         self, rig, virtual, digitizer, code, kind, complaint
     ):
         digitizer.start()
@@ -272,7 +272,7 @@ class TestFaults:
 
 class TestErrors:
     @pytest.mark.parametrize("code", MEANINGS)
-    def test_every_error_in_the_table_says_what_was_done_what_happened_and_what_to_do(self, code):
+    def test_every_error_in_the_table_states_what_was_done_what_happened_and_what_to_do(self, code):
         error = from_code(DaqError("said", code.value), "reading Dev1")
         assert isinstance(error, AcquisitionError)
         assert str(error).startswith("reading Dev1 failed: ")

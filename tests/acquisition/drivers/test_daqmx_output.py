@@ -68,7 +68,7 @@ def tone(first, count, amplitude_v=1.0):
     return amplitude_v * np.sin(2 * np.pi * 100.0 * (first + np.arange(count)) / RATE_HZ)
 
 
-def test_what_is_streamed_is_heard_from_the_first_sample_on_without_a_gap(digitizer, output):
+def test_anything_that_is_streamed_is_heard_from_the_first_sample_on_without_a_gap(digitizer, output):
     written = 0
     output.write(tone(0, 6400))
     written += 6400
@@ -102,7 +102,7 @@ def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output
 @pytest.mark.parametrize(
     ("device", "idle"), [("Dev1", IdleOutput.ZERO), ("Dev2", IdleOutput.HELD)], ids=["USB-4431", "USB-6211"]
 )
-def test_an_output_is_told_to_idle_at_zero_and_says_when_it_cannot(virtual, device, idle):
+def test_an_output_is_commanded_to_idle_at_zero_and_states_when_it_cannot(virtual, device, idle):
     with nidaqmx.Task(grpc_options=daqmx_session(virtual.daq_address).options) as task:
         channel = task.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-2, max_val=2)
         assert _set_idle_output(channel) is idle
@@ -194,7 +194,9 @@ def test_an_output_that_the_device_does_not_have_is_refused_in_one_sentence(
     opened_output(digitizer).close()  # nothing stayed reserved
 
 
-def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_says_so(digitizer, output, virtual):
+def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_reports_it(
+    digitizer, output, virtual
+):
     output.write(np.full(6400, 1.0))
     output.arm()
     digitizer.start()

@@ -58,7 +58,7 @@ def test_the_same_plan_records_it_again_sample_for_sample(playing, original, tmp
             )
 
 
-def test_the_end_of_the_recording_is_told(playing, original):
+def test_the_end_of_the_recording_is_reported(playing, original):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         with open_recording(original) as recording:
             samples = recording.samples

@@ -28,7 +28,7 @@ def test_pauses_shorter_than_the_converter_needs_to_recover_do_not_end_a_range()
     assert ranges(row) == (Overload("m0_velocity", 100, 164), Overload("m0_velocity", 300, 300))
 
 
-def test_each_channel_is_held_against_its_own_full_scale():
+def test_each_channel_is_checked_against_its_own_full_scale():
     volts = np.full((2, 10), 4.0)
     assert overload_ranges(volts, ("drive_voltage", "m0_velocity"), (5.0, 4.0), 0) == (
         Overload("m0_velocity", 0, 9),

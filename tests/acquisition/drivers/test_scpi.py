@@ -84,7 +84,7 @@ def test_errors_without_end_are_an_error_and_no_endless_loop():
         port(instrument).command("FREQ 1")
 
 
-def test_an_empty_first_answer_is_asked_for_again():
+def test_an_empty_first_answer_is_requested_again():
     instrument = Instrument(IDN=[b"\n", b"TEKTRONIX,AFG1022\n"])
     instrument.answers["*IDN?"] = instrument.answers.pop("IDN")
     assert port(instrument).query_patiently("*IDN?") == "TEKTRONIX,AFG1022"
@@ -105,7 +105,7 @@ def test_an_answer_that_is_no_number_is_an_error_naming_question_and_answer(repl
         port(instrument).query_number("FREQ?")
 
 
-def test_a_timeout_is_an_error_that_says_how_long_was_waited():
+def test_a_timeout_is_an_error_that_states_how_long_was_waited():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [TIMEOUT]
     with pytest.raises(InstrumentError, match=r"'FREQ\?' within 3 s") as caught:

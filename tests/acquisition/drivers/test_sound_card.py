@@ -167,14 +167,14 @@ def test_what_no_card_can_do_is_refused(card_rig, audio, wrong, said):
         open_bench(rig.model_copy(update={"daq": daq}), confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_a_card_that_is_not_there_is_told(card_rig, audio):
+def test_a_card_that_is_not_there_is_reported(card_rig, audio):
     audio.plugged = False
     rig = card_rig().model_copy(update={"virtual": None})
     with pytest.raises(InstrumentLost, match="no sound card 'Simulated card'"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_samples_that_nobody_reads_in_time_are_lost_and_told(opened, audio):
+def test_samples_that_nobody_reads_in_time_are_lost_and_reported(opened, audio):
     bench = opened()
     card = bench.digitizer.card
     card.most_waiting = 2000
@@ -185,7 +185,7 @@ def test_samples_that_nobody_reads_in_time_are_lost_and_told(opened, audio):
         bench.digitizer.read(100)
 
 
-def test_an_output_that_nobody_feeds_runs_dry_and_says_so(opened):
+def test_an_output_that_nobody_feeds_runs_dry_and_reports_it(opened):
     bench = opened()
     bench.output.write(np.zeros(600))
     bench.output.arm()
@@ -197,7 +197,7 @@ def test_an_output_that_nobody_feeds_runs_dry_and_says_so(opened):
 
 @pytest.mark.parametrize("name", ["input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
 @pytest.mark.parametrize("value", ["two", True, 0.0, -1.0])
-def test_a_calibration_that_is_no_number_above_zero_is_told_before_anything_opens(
+def test_a_calibration_that_is_no_number_above_zero_is_reported_before_anything_opens(
     card_rig, audio, name, value
 ):
     rig = card_rig(**{name: value}).model_copy(update={"virtual": None})
@@ -205,7 +205,7 @@ def test_a_calibration_that_is_no_number_above_zero_is_told_before_anything_open
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_an_output_that_no_card_has_is_told_as_that(card_rig, audio):
+def test_an_output_that_no_card_has_is_reported_as_that(card_rig, audio):
     rig = card_rig().model_copy(update={"virtual": None})
     output = rig.daq.output.model_copy(update={"physical": "out1"})
     rig = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})

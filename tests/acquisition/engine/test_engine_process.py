@@ -118,7 +118,7 @@ class TestTheJob:
         until_state(client, EngineState.CLOSED)
 
     @pytest.mark.thorough
-    def test_the_newest_samples_are_those_of_the_recording(self, client, shipped_rig, tmp_path):
+    def test_the_newest_samples_match_the_recording(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         newest_samples = client.look(most=10_000)
         client.stop(StopLevel.ABORT)
@@ -142,7 +142,7 @@ class TestTheJob:
             assert [mark.text for mark in marks] == ["the sphere was heard"]
             assert before <= marks[0].sample <= recording.samples
 
-    def test_a_held_run_goes_on(self, client, shipped_rig, tmp_path):
+    def test_a_held_run_continues(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         client.stop(StopLevel.HOLD)
         until_state(client, EngineState.HELD)
@@ -159,7 +159,7 @@ class TestTheJob:
 
 
 class TestACheckIsStopped:
-    def test_by_whoever_asks_for_it(self, client, shipped_rig, tmp_path):
+    def test_by_anyone_who_requests_it(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         client.check(tmp_path)
@@ -181,7 +181,7 @@ class TestACheckIsStopped:
             "the bench check was stopped",
         ]
 
-    def test_and_the_campaign_that_asked_for_it_begins_nothing(self, client, shipped_rig, tmp_path):
+    def test_and_the_campaign_that_requested_it_begins_nothing(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
@@ -238,7 +238,9 @@ class TestRefusals:
     @pytest.mark.parametrize(
         "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
     )
-    def test_what_is_no_message_closes_the_connection_and_harms_nobody(self, client, shared_engine, said):
+    def test_anything_that_is_no_message_closes_the_connection_and_harms_nobody(
+        self, client, shared_engine, said
+    ):
         at = shared_engine.address
         with socket.create_connection((at.host, at.port), 5.0) as stranger:
             stranger.sendall(said)
@@ -298,7 +300,7 @@ def test_a_long_campaign_is_armed_although_its_limits_take_longer_than_an_answer
 
 
 class TestNobodyLooks:
-    def test_an_attended_run_is_aborted_when_nobody_asks(self, client, shipped_rig, tmp_path):
+    def test_an_attended_run_is_aborted_without_requests(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         events = kept(tmp_path / "run.h5", r"nobody has looked for \d+\.\d s")  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
@@ -328,7 +330,7 @@ class TestNobodyLooks:
         until(client, lambda status: status.samples > samples + 50_000)
 
     @pytest.mark.thorough
-    def test_a_campaign_that_is_left_alone_goes_on_when_its_window_is_gone(
+    def test_a_campaign_that_is_left_alone_continues_when_its_window_is_gone(
         self, engine, shipped_rig, tmp_path
     ):
         """The engine is attended; this campaign is not, and the engine ends after it."""
@@ -370,7 +372,7 @@ class TestNobodyLooks:
             until(client, lambda status: status.samples > before + 500_000)
 
     @pytest.mark.thorough
-    def test_an_unattended_run_goes_on_alone(self, engine, shipped_rig, tmp_path):
+    def test_an_unattended_run_continues_alone(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
         client.open(shipped_rig)
@@ -382,7 +384,7 @@ class TestNobodyLooks:
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
-    def test_an_armed_engine_disarms_itself_when_nobody_asks(
+    def test_an_armed_engine_disarms_itself_without_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         client.open(shipped_rig)
@@ -450,7 +452,7 @@ class TestItsEnd:
         kept(tmp_path / "run.h5", "was told to end")
 
     @pytest.mark.thorough
-    def test_a_client_of_an_engine_that_was_killed_is_told_so(self, engine, shipped_rig, tmp_path):
+    def test_a_client_of_a_killed_engine_gets_an_error(self, engine, shipped_rig, tmp_path):
         process = engine()
         running(process.client, shipped_rig, tmp_path)
         process._process.kill()

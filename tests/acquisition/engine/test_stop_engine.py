@@ -63,5 +63,5 @@ def test_before_the_first_run_of_a_campaign_nothing_plays(driving, tmp_path):
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
 
 
-def test_a_hold_is_only_told(driving):
+def test_a_hold_is_only_reported(driving):
     assert stop_engine(the_engine(None), "hold") is StopDelivery.TOLD

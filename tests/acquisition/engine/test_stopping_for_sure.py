@@ -153,7 +153,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                 EngineClient.attach(process.address).close()
             assert resident_bytes(process.pid) - before < 20e6
 
-    def test_a_slow_one_has_one_deadline_for_all_that_it_says(self, process):
+    def test_a_slow_one_has_one_deadline_for_all_that_it_states(self, process):
         at = process.address
         with socket.create_connection((at.host, at.port)) as slow:
             slow.sendall(HEAD.pack(MAGIC, 900, 0))
@@ -183,7 +183,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
 
 
 class TestNoDescriptorIsLeft:
-    def test_a_stop_is_told_and_a_recording_is_finished(self, running, tmp_path):
+    def test_a_stop_is_reported_and_a_recording_is_finished(self, running, tmp_path):
         with without_descriptors(running):
             assert stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors") in StopDelivery
             ended_by(tmp_path, "no descriptors")
@@ -197,7 +197,7 @@ class TestNoDescriptorIsLeft:
 
 
 class TestAFolderIsRemoved:
-    def test_the_engine_says_so_and_goes_on(self, running, tmp_path):
+    def test_the_engine_reports_it_and_continues(self, running, tmp_path):
         shutil.rmtree(tmp_path)
         told = until_state(running.client, EngineState.READY).messages[-1]
         assert told.kind is MessageKind.FAULT

@@ -41,7 +41,7 @@ def test_the_words_on_the_wire_stay():
     assert set(VERBS) == WORDS
 
 
-def test_what_ends_or_shows_a_run_is_permitted_in_every_state():
+def test_anything_that_ends_or_shows_a_run_is_permitted_in_every_state():
     assert {word for word, verb in VERBS.items() if verb.states} == RESTRICTED
 
 
@@ -81,7 +81,7 @@ def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
     jobs.run()
 
 
-def test_whoever_sees_a_bench_closed_may_open_it_at_once(shipped_rig):
+def test_anyone_who_sees_a_bench_closed_may_open_it_at_once(shipped_rig):
     """The closing thread shows the state a moment before it is done, and opening was refused in between."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
@@ -113,7 +113,7 @@ def looked_after_until(handler, is_over):
         handler.enforce_deadlines()
 
 
-def test_whoever_arms_has_the_time_to_start(shipped_rig, tmp_path):
+def test_anyone_who_arms_has_the_time_to_start(shipped_rig, tmp_path):
     """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
     engine = Engine(Supervision.ATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
@@ -186,7 +186,7 @@ def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
         ('{"ask": "beat", "loud": true}', "beat.loud"),
     ],
 )
-def test_a_request_that_is_not_understood_does_nothing_and_says_where(handler, request_text, where):
+def test_a_request_that_is_not_understood_does_nothing_and_states_where(handler, request_text, where):
     answer = json.loads(answer_to(handler, Message(request_text.encode())).text)
     assert where in answer["refused"]
     assert "nothing was done" in answer["refused"]

@@ -114,7 +114,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
         ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
-def test_a_kind_says_what_decides_the_motion_of_the_base(kind, level):
+def test_a_kind_states_what_decides_the_motion_of_the_base(kind, level):
     assert by_kind[kind].level_at(250.0) == level
 
 
@@ -141,7 +141,7 @@ def test_words_of_a_plan_name_the_level_that_it_holds(kind, said):
 @pytest.mark.parametrize(
     "kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine", "held_response"]
 )
-def test_what_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_to(kind):
+def test_anything_that_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_to(kind):
     for direction, approach in ((Direction.UP, Approach.UP), (Direction.DOWN, Approach.DOWN)):
         turned = by_kind[kind].turned(direction)
         assert turned.approach is approach
@@ -149,7 +149,7 @@ def test_what_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_
 
 
 @pytest.mark.parametrize("kind", ["dwell", "held_dwell", "white_noise", "resonance_tracking"])
-def test_what_has_no_direction_cannot_be_turned(kind):
+def test_anything_that_has_no_direction_cannot_be_turned(kind):
     assert by_kind[kind].turned(Direction.UP) is None
     assert by_kind[kind].approach is Approach.REST
 

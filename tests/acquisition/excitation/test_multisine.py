@@ -106,7 +106,7 @@ def test_band_edges_that_are_harmonics_belong_to_the_band(start, width, repetiti
     assert lines[-1] == start + width
 
 
-def test_held_lines_are_those_of_a_finely_sampled_picture():
+def test_held_lines_match_a_finely_sampled_picture():
     (values,) = flat_periods(BAND, 1, seed=2)
     picture = np.repeat(values, OVERSAMPLING)
     fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)

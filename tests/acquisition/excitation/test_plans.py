@@ -139,7 +139,7 @@ def test_an_unknown_kind_lists_the_known_ones():
         ),
     ],
 )
-def test_a_plan_that_cannot_be_played_says_what_can(kind, fields, sentence):
+def test_a_plan_that_cannot_be_played_states_what_can(kind, fields, sentence):
     with pytest.raises(ValidationError) as refused:
         kind(amplitude_vpp=1.0, **fields)
     assert sentence in str(refused.value)

@@ -72,6 +72,6 @@ def test_limits_know_the_highest_level_before_anything_moves():
         ({"lowest_vpp": 0}, "greater than 0"),
     ],
 )
-def test_what_makes_no_levels_is_refused_with_what_is_allowed(changed, said):
+def test_anything_that_makes_no_levels_is_refused_with_what_is_allowed(changed, said):
     with pytest.raises(ValidationError, match=said):
         plan(**changed)

@@ -119,7 +119,7 @@ def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
     assert faults("specimen", text) == []
 
 
-def test_a_specimen_may_say_the_version_it_was_written_for(tmp_path):
+def test_a_specimen_may_state_the_version_it_was_written_for(tmp_path):
     path = tmp_path / "mine.toml"
     text = 'format_version = 1\nmodel = "gong2025"\nname = "mine"\n'
     path.write_text(text, encoding="utf-8")
@@ -155,7 +155,7 @@ def test_a_specimen_may_say_the_version_it_was_written_for(tmp_path):
         ),
     ],
 )
-def test_what_is_loaded_passes_the_schema(kind, text, tmp_path):
+def test_anything_that_is_loaded_passes_the_schema(kind, text, tmp_path):
     path = tmp_path / "file.toml"
     path.write_text(text, encoding="utf-8")
     load_toml(path, MODELS[kind])

@@ -20,7 +20,7 @@ class Plan(FrozenModel):
 
 
 @pytest.mark.parametrize("key", ["Float", "Range", "float", "Masses", "str", "dict[str,Any]"])
-def test_a_key_named_as_a_kind_of_value_is_told_by_its_name(tmp_path, key):
+def test_a_key_named_as_a_kind_of_value_is_reported_by_its_name(tmp_path, key):
     for text, told in (
         (f'values = [1.0]\n"{key}" = 1\n', f"{key} is not a known key"),
         (f'[values]\nstart = 1.0\nstep = 1.0\n"{key}" = 1\n', f"values.{key} is not a known key"),
@@ -41,7 +41,7 @@ def test_a_key_named_as_a_kind_of_value_is_told_by_its_name(tmp_path, key):
         ("3", "give a table"),
     ],
 )
-def test_an_excitation_of_no_known_kind_is_told_which_there_are(tmp_path, excitation, told):
+def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path, excitation, told):
     file = tmp_path / "campaign.toml"
     file.write_text(f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n')
     with pytest.raises(ConfigurationError) as refused:
@@ -107,7 +107,7 @@ def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told
         ('began = "-1.5"\n', "began = '-1.5': give a date, time and time zone"),
     ],
 )
-def test_what_a_value_should_be_is_said_without_a_word_of_python(tmp_path, text, told):
+def test_what_a_value_should_be_is_stated_without_a_word_of_python(tmp_path, text, told):
     class Words(FrozenModel):
         few: Annotated[tuple[float, ...], Field(min_length=1, max_length=2)] = (1.0,)
         pair: tuple[float, float] = (1.0, 2.0)

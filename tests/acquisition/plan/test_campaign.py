@@ -113,7 +113,7 @@ class TestDefaults:
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
 
-    def test_they_say_nothing_to_another_kind(self, tmp_path):
+    def test_they_state_nothing_to_another_kind(self, tmp_path):
         text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
         assert len(loaded(tmp_path, text).measurements) == 1
 
@@ -224,7 +224,7 @@ def test_the_paper_s_campaign_has_its_levels_band_and_times():
     assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)
 
 
-def test_the_page_on_campaigns_says_of_every_kind_what_it_needs(tmp_path):
+def test_the_page_on_campaigns_states_of_every_kind_what_it_needs(tmp_path):
     page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.*=.*) \|$", page, re.MULTILINE)
     assert {kind for kind, _ in rows} == set(EXCITATION_KINDS)

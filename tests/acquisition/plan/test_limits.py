@@ -47,7 +47,7 @@ def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
     )
 
 
-def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
+def test_a_sweep_is_checked_where_the_rig_answers_most(rig):
     sweep = SineSweep(amplitude_vpp=1, start_hz=10, stop_hz=100, duration_s=100)
     loads = predicted_loads(sweep, rig)
     grid_hz = np.linspace(10, 100, 20_000)
@@ -56,7 +56,7 @@ def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
     assert loads[BaseQuantity.STROKE].peak == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
+def test_a_waveform_s_peaks_match_an_integration_in_time(rig):
     """The Fourier prediction against a step-by-step solution of the shaker's equations, nearly unladen."""
     light = {"masses_kg": tuple(1e-6 * each for each in rig.specimen.masses_kg), "contact": "linear"}
     rig = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=light)})

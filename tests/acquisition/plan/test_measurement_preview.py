@@ -20,7 +20,7 @@ def rig():
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_peak_and_size_are_those_of_the_signal(rig, name):
+def test_peak_and_size_match_the_signal(rig, name):
     seen = preview_measurement(QUICK[name], rig)
     assert seen.is_allowed
     assert float(np.max(np.abs(seen.volts))) == pytest.approx(seen.peak_v, rel=1e-6)
@@ -36,7 +36,7 @@ def test_a_sine_is_one_line_at_its_place_and_height(rig):
     assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
 
 
-def test_limits_come_with_the_most_used_first_and_a_broken_one_is_said(rig):
+def test_limits_come_with_the_most_used_first_and_a_broken_one_is_stated(rig):
     excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
     seen = preview_measurement(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
     uses = [check.use for check in seen.checks]
@@ -59,7 +59,7 @@ def test_the_band_is_what_is_excited(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
 
 
-def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_said_without_it(rig):
+def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_stated_without_it(rig):
     assert preview_measurement(QUICK["dwell"], rig).least_growth_time_s is None
     smart = load_campaign(ROOT / "campaigns" / "smart.toml").measurements
     (dwell,) = (each for each in smart if each.name == "dwell_260")
@@ -69,7 +69,7 @@ def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_said_
     assert preview_measurement(dwell, slow).least_growth_time_s == pytest.approx(2.0 + 10 * 2 * 0.1)
 
 
-def test_of_a_branch_that_a_fast_loop_follows_no_growth_time_is_told_for_it_decides_nothing():
+def test_of_a_branch_that_a_fast_loop_follows_no_growth_time_is_reported_for_it_decides_nothing():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     fast = load_rig(ROOT / "hardware_configs" / "virtual_rig_controller.toml")
     (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements

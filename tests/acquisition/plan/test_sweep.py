@@ -131,7 +131,7 @@ class TestChains:
         assert whole_s[1] - 2 * whole_s[0] == pytest.approx(0.5 * 20 * 20)
         assert len(made(1200, lead_points=2).points()) == 1200
 
-    def test_there_and_back_is_one_chain(self):
+    def test_up_and_down_is_one_chain(self):
         plan = campaign(
             amplitude_vpp=[0.5],
             direction=["up_then_down"],
@@ -144,7 +144,7 @@ class TestChains:
         last = plan.points()[-1].measurement.excitation
         assert [tone.frequency_hz for tone in last.lead_in] == [200, 205, 205]
 
-    def test_a_level_chain_downwards_is_led_from_above_and_held_against_the_limits_there(self, rig):
+    def test_a_level_chain_downwards_is_led_from_above_and_checked_against_the_limits_there(self, rig):
         plan = campaign(
             measurement={"ramp_s": 0.3, "excitation": {**DWELL, "frequency_hz": 200}},
             amplitude_vpp=[0.5, 1.0, 2.0],

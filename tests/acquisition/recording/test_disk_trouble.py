@@ -22,7 +22,7 @@ def trouble():
         yield trouble
 
 
-def test_the_first_refusal_comes_at_once_and_every_further_one_tells_the_rig_first():
+def test_the_first_refusal_comes_at_once_and_every_further_one_shows_the_rig_first():
     told = []
     trouble = DiskTrouble(lambda: told.append(len(told)))
     for _ in range(2):

@@ -37,7 +37,7 @@ def test_a_channel_is_named_scaled_and_dimensioned(file, make_block):
     assert velocity.attrs["_FillValue"].dtype == velocity.dtype
 
 
-def test_the_file_says_what_it_is(file):
+def test_the_file_states_what_it_is(file):
     assert file.attrs["Conventions"] == b"CF-1.11"
     assert file.attrs["format"] == b"vibench-recording"
     assert file.attrs["format_version"] == 1

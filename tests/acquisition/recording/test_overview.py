@@ -87,7 +87,7 @@ def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header
         assert "default" not in file.attrs
 
 
-def test_a_file_without_an_overview_says_so(recorded):
+def test_a_file_without_an_overview_reports_it(recorded):
     path, _ = recorded
     with h5py.File(path, "r+") as file:
         del file["overview"]

@@ -21,7 +21,7 @@ def path(tmp_path, make_header, make_block):
     return tmp_path / "a.h5"
 
 
-def test_a_recording_says_everything_that_was_known_at_its_start(path, make_channel):
+def test_a_recording_states_everything_that_was_known_at_its_start(path, make_channel):
     with open_recording(path) as recording:
         assert recording.channel("m0_velocity") == make_channel("m0_velocity", long_name="m0 velocity")
         assert recording.plan == {"kind": "dwell", "frequency_hz": 260.0}
@@ -71,7 +71,7 @@ def test_an_unknown_channel_is_answered_with_the_known_ones(path):
         recording.read("m2_velocity")
 
 
-def test_a_closed_recording_says_so(path):
+def test_a_closed_recording_reports_it(path):
     recording = open_recording(path)
     recording.close()
     with pytest.raises(RecordingError, match="closed"):

@@ -72,7 +72,7 @@ def test_either_name_can_be_given(tmp_path, abandoned):
     assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"
 
 
-def test_an_incomplete_copy_is_made_anew(tmp_path, abandoned):
+def test_an_incomplete_copy_is_made_again(tmp_path, abandoned):
     part, _ = abandoned(tmp_path)
     (tmp_path / "a.h5.tmp").write_bytes(b"half a copy")
     recover(part)
@@ -121,7 +121,7 @@ def test_a_living_recording_can_be_read_by_h5py_alone(tmp_path, make_header, mak
             assert recording.state is RecordingState.RECORDING
 
 
-def test_nothing_to_recover_is_said(tmp_path):
+def test_nothing_to_recover_is_stated(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing to recover; give the path of a \.h5\.part"):
         recover(tmp_path / "a.h5")
     (tmp_path / "a.h5").touch()

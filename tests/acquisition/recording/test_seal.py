@@ -171,7 +171,7 @@ def test_a_new_seal_over_changed_content_has_another_name(recorded):
         assert recording.seal != before
 
 
-def test_a_recording_without_a_seal_is_told_as_such(recorded):
+def test_a_recording_without_a_seal_is_reported_as_such(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -188,7 +188,7 @@ def test_a_recording_without_a_seal_is_told_as_such(recorded):
         assert "before recordings had one" in found.sentence
 
 
-def test_without_a_seal_samples_are_held_against_the_checksum_of_their_channel(recorded):
+def test_without_a_seal_samples_are_checked_against_the_checksum_of_their_channel(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -218,7 +218,7 @@ def test_the_seal_of_another_recording_is_none_of_this_one(recorded):
     assert state_of(path) is SealState.DAMAGED
 
 
-def test_a_finished_recording_that_is_called_unfinished_is_held_against_its_seal(recorded):
+def test_a_finished_recording_that_is_called_unfinished_is_checked_against_its_seal(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_scale(file)
@@ -285,7 +285,7 @@ def test_with_a_key_a_seal_is_signed(recorded, key_file, monkeypatch):
     assert state_of(path, key=seal_key(other)) is SealState.OTHER_KEY
 
 
-def test_who_seals_anew_without_the_key_is_found_out(recorded, key_file):
+def test_who_seals_again_without_the_key_is_found_out(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_sample(file)
@@ -323,7 +323,7 @@ def with_result(recorded):
     return path
 
 
-def test_a_result_has_a_seal_of_its_own_and_leaves_that_of_its_recording_alone(with_result):
+def test_a_result_has_its_own_seal_and_leaves_that_of_its_recording_alone(with_result):
     with open_recording(with_result) as recording:
         assert recording.check_seal("whole").state is SealState.INTACT
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.INTACT]
@@ -389,7 +389,7 @@ def test_a_result_that_is_small_only_while_it_is_packed_is_not_read(with_result,
 
 
 @pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])
-def test_what_is_no_group_of_results_is_refused_in_a_sentence(recorded, what):
+def test_anything_that_is_no_group_of_results_is_refused_in_a_sentence(recorded, what):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["results"]
@@ -433,14 +433,14 @@ class TestChangedAfterTheCheck:
             with pytest.raises(RecordingError, match="no longer what they were when the seal was checked"):
                 recording.read_counts(role, at - 5, at - 4)
 
-    def test_a_file_that_is_opened_again_is_held_against_the_check(self, long):
+    def test_a_file_that_is_opened_again_is_checked_against_the_check(self, long):
         with open_recording(long) as recording:
             recording.check_seal("whole")
         self.written_over(long, f"file[{recording.roles[0]!r}].attrs['delay_s'] = 0.001")
         with pytest.raises(RecordingError, match="no longer what it was when its seal was checked"):
             open_recording(long)
 
-    def test_what_was_read_before_the_check_is_what_is_checked(self, long):
+    def test_anything_that_was_read_before_the_check_is_what_is_checked(self, long):
         sound = long.read_bytes()
         self.written_over(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:

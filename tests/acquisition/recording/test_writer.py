@@ -149,7 +149,7 @@ def test_an_open_ended_recording_takes_what_comes(tmp_path, make_header, make_bl
         np.testing.assert_array_equal(recording.read_counts("m0_velocity", 190_000), counts[1])
 
 
-def test_a_recording_that_raises_says_failed_and_why(tmp_path, make_header, make_block):
+def test_a_recording_that_raises_states_failed_and_why(tmp_path, make_header, make_block):
     def measure():
         with create_recording(tmp_path / "a.h5", make_header()) as writer:
             writer.append(make_block(0, BLOCK)[1])
@@ -179,7 +179,7 @@ def test_a_recording_can_only_end_in_an_ending(tmp_path, make_header):
         writer.finish(RecordingState.INTERRUPTED)
 
 
-def test_events_and_segments_say_where_they_belong(tmp_path, make_header, make_block):
+def test_events_and_segments_state_where_they_belong(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.begin_segment("steady", realisation=3, frequency_hz=260.0, direction="up")
         writer.append(make_block(0, 100)[1])

@@ -52,7 +52,7 @@ def test_force_over_acceleration_tends_to_the_suspended_mass():
     assert abs(force / acceleration) == pytest.approx(suspended_mass_kg(RIG.shaker), rel=1e-3)
 
 
-def test_the_undamped_unpowered_table_resonates_where_stiffness_and_mass_say():
+def test_the_undamped_unpowered_table_resonates_where_stiffness_and_mass_state():
     shaker = RIG.shaker
     resonance_hz = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     model = with_shaker(force_constant_n_per_a=1e-6, suspension_damping_ns_per_m=0.1)

@@ -106,7 +106,7 @@ def test_a_ramp_takes_as_long_as_its_commands_and_the_recorder_stays_with_it(ben
     assert up.size / RATE == pytest.approx(6 * 0.25, abs=0.01)
 
 
-def test_a_drive_that_falls_behind_ends_the_run_and_says_where(bench, tmp_path):
+def test_a_drive_that_falls_behind_ends_the_run_and_states_where(bench, tmp_path):
     plan = sweep(0.05)
     bench.world.latency_s = 0.02
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
@@ -124,7 +124,7 @@ def test_a_drive_that_falls_behind_ends_the_run_and_says_where(bench, tmp_path):
 
 
 @pytest.mark.parametrize("stall_s", [0.25, 0.8])
-def test_one_late_moment_is_noted_and_the_run_goes_on(bench, tmp_path, stall_s):
+def test_one_late_moment_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
     bench.world.latency_s = 0.02
     plan = sweep(0.1)
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:

@@ -89,7 +89,7 @@ def test_a_run_that_stands_still_is_silenced_sooner_once_it_is_stopped(recording
     until(lambda: terminal_v(virtual) < SILENT_V, drive_guard.STOPPED_BLOCKS * 0.1 + 3.0)
 
 
-def test_a_run_that_goes_on_is_left_alone(recording, monkeypatch):
+def test_a_run_that_continues_is_left_alone(recording, monkeypatch):
     virtual, run = recording
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 5)
     began_s = monotonic()
@@ -170,7 +170,7 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
     DRIVES_ON.confirm_silence(guard)
 
 
-def test_a_long_ramp_shows_that_it_goes_on(announced, monkeypatch):
+def test_a_long_ramp_shows_that_it_continues(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
@@ -210,7 +210,7 @@ def test_nothing_begins_without_memory_to_hold_back(monkeypatch):
         DriveGuard(Output(), StopSwitch())
 
 
-def test_what_is_done_beside_starts_no_thread_later(monkeypatch):
+def test_anything_that_is_done_beside_starts_no_thread_later(monkeypatch):
     beside, done = Beside("test"), []
     monkeypatch.setattr(threading.Thread, "start", lambda self: pytest.fail("a thread was started"))
     beside.do(lambda: done.append(1))

@@ -102,7 +102,7 @@ def test_a_device_in_another_programs_hands_is_named_before_anything_plays(labor
     assert terminal_v(virtual) < 1e-2
 
 
-def test_a_pulled_usb_cable_tells_the_operator_to_switch_the_amplifier_off(laboratory, tmp_path):
+def test_a_pulled_usb_cable_advises_the_operator_to_switch_the_amplifier_off(laboratory, tmp_path):
     virtual, connected = laboratory()
     pull = when_recording(virtual.faults.pull_usb_cable)
     with pytest.raises(InstrumentLost, match="amplifier") as failure, bench_on(connected) as bench:
@@ -157,7 +157,7 @@ def test_a_wrong_load_at_the_panel_is_found_before_the_full_level(laboratory, tm
     assert terminal_v(virtual) < 1e-2
 
 
-def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(laboratory, tmp_path):
+def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_continues(laboratory, tmp_path):
     virtual, connected = laboratory()
     blind = when_recording(lambda: virtual.faults.over_range(0.2))
     with bench_on(connected) as bench:

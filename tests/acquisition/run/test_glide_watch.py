@@ -62,7 +62,7 @@ def test_a_sweep_that_begins_late_ends_behind(spacing):
     assert watch.more_cycles == pytest.approx(-(lost - 40 / RATE * 440), abs=0.4)
 
 
-def test_what_was_read_elsewhere_in_between_begins_the_count_anew():
+def test_anything_that_was_read_elsewhere_in_between_begins_the_count_again():
     watch = GlideWatch(CHANNELS, RATE)
     blocks = recorded(100.0 * np.arange(5120) / RATE)
     watch.take(blocks[:3], 100.0, 0.3)

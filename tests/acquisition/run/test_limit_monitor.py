@@ -101,7 +101,7 @@ def test_each_limit_ends_the_run_when_it_is_passed_and_is_named(
 
 
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
-def test_a_run_that_keeps_every_limit_goes_on(rig, kept, frequency_hz, peaks, quantity, limit):
+def test_a_run_that_keeps_every_limit_continues(rig, kept, frequency_hz, peaks, quantity, limit):
     five_per_cent_below = {role: 0.95 * peak for role, peak in peaks.items()}
     monitor = monitor_of(only(rig, kept))
     watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
@@ -163,7 +163,7 @@ def test_an_over_range_that_is_only_flagged_is_not_taken_for_an_amplitude(rig):
         monitor.require_safe(Block(first, volts, overloads))
 
 
-def test_a_gap_begins_the_integration_anew(rig):
+def test_a_gap_begins_the_integration_again(rig):
     monitor = monitor_of(only(rig, "stroke_m"))
     blocks = sine_blocks(rig, 12.0, base_acceleration=20.0)
     watch(monitor, blocks[:20])

@@ -187,7 +187,7 @@ def test_a_channel_without_a_sensor_names_the_table_to_add():
         Rig.model_validate(said)
 
 
-def test_a_first_day_asks_for_the_sensors_that_the_template_has(tmp_path):
+def test_a_first_day_requests_the_sensors_that_the_template_has(tmp_path):
     template = shipped("hardware_configs/virtual_rig_accelerometers.toml")
     keys = {each.key for each in questions_for(template.read_text())}
     assert "vibrometer.serial" not in keys

@@ -94,7 +94,7 @@ def test_what_sounds_at_the_end_is_released_without_a_step():
     assert synthesizer.is_over
 
 
-def test_what_is_appended_after_the_end_begins_with_the_next_sample():
+def test_anything_that_is_appended_after_the_end_begins_with_the_next_sample():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     synthesizer.take(4321)

@@ -69,7 +69,7 @@ def test_a_sweep_of_the_generator_is_the_planned_one_from_its_first_sample_to_it
     assert (found.response.frequency_hz[0], found.response.frequency_hz[-1]) == pytest.approx(ends, rel=0.1)
 
 
-def test_a_generator_without_a_sweep_of_its_own_is_told_before_anything_plays():
+def test_a_generator_without_its_own_sweep_is_reported_before_anything_plays():
     with pytest.raises(LimitExceeded, match=r"AFG1022.*set swept_by = \"computer\""):
         require_within_limits(sweep(), load_rig("virtual_rig"))
 

@@ -105,7 +105,7 @@ class TestThePlanIsCarriedOut:
         assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
         assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
 
-    def test_the_blocks_tell_the_progress(self, bench, tmp_path):
+    def test_the_blocks_show_the_progress(self, bench, tmp_path):
         shown = play(run_of(bench, tmp_path))
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
@@ -301,7 +301,7 @@ class TestEveryWayOut:
             ("digitizer.read", RuntimeError),
         ],
     )
-    def test_a_failure_silences_and_says_why(self, bench, tmp_path, state, call, fault):
+    def test_a_failure_silences_and_states_why(self, bench, tmp_path, state, call, fault):
         run = run_of(bench, tmp_path)
         upto(run, state)
         bench.world.faults[call] = [lambda: fault("it broke")]
@@ -356,7 +356,7 @@ class TestEveryWayOut:
             assert_ended_without_a_jump(bench)
 
     @every_state
-    def test_an_error_of_whoever_watches_ends_the_run(self, bench, tmp_path, state):
+    def test_an_error_of_anyone_who_watches_ends_the_run(self, bench, tmp_path, state):
         def watch():
             with run_of(bench, tmp_path) as run:
                 upto(run, state)
@@ -470,7 +470,7 @@ class TestStopLevels:
         )
 
     @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
-    def test_a_held_run_stays_as_it_is_and_goes_on_where_it_was(self, bench, tmp_path, state):
+    def test_a_held_run_stays_as_it_is_and_continues_where_it_was(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         before = upto(run, state)
         run.switch.hold()
@@ -584,7 +584,7 @@ class TestTheBenchCheck:
 
 
 class TestOverloads:
-    def test_an_overload_is_kept_and_the_run_goes_on(self, bench, tmp_path):
+    def test_an_overload_is_kept_and_the_run_continues(self, bench, tmp_path):
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         run = run_of(bench, tmp_path)
         play(run)

@@ -262,7 +262,7 @@ def test_every_stop_alone_and_beside_every_fault_in_every_state(laboratory, tmp_
     carried_out(laboratory, tmp_path, state, STOPS[stop], fault)
 
 
-def test_the_stated_time_of_an_abort_is_that_of_the_shipped_rig(rig):
+def test_the_stated_time_of_an_abort_matches_the_shipped_rig(rig):
     assert shortest_ramp_s(rig) + BLOCK_S < ABORT_S
 
 

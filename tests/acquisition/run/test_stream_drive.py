@@ -128,7 +128,7 @@ class TestThePlanIsCarriedOut:
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert streaming_bench.recorder.header.expected_samples == streaming_bench.recorder.samples
 
-    def test_the_states_are_those_of_a_generators_run(self, streaming_bench, tmp_path):
+    def test_the_states_match_a_generators_run(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         seen = list(dict.fromkeys(progress.state for progress in run))
         # With an output, to be armed takes the time of what is written ahead.
@@ -143,7 +143,7 @@ class TestThePlanIsCarriedOut:
         assert np.max(np.abs(streaming_bench.world.streamed)) <= 0.5 * 0.02
         run.close()
 
-    def test_the_setting_shown_is_that_of_what_is_heard(self, streaming_bench, tmp_path):
+    def test_the_setting_shown_matches_what_is_heard(self, streaming_bench, tmp_path):
         shown = play(run_of(streaming_bench, tmp_path))
         settings = {progress.state: progress.amplitude_vpp for progress in shown}
         assert settings[RunState.CHECKING] == pytest.approx(0.02)
@@ -193,7 +193,7 @@ class TestEveryWayOut:
         if state is not RunState.CHECKING:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
-    def test_a_stream_that_is_asked_to_hold_is_ramped_down_and_says_why(self, streaming_bench, tmp_path):
+    def test_a_stream_that_is_asked_to_hold_is_ramped_down_and_states_why(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()

@@ -138,7 +138,7 @@ def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laborato
     kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
-def test_a_server_that_dies_leaves_at_most_what_was_written_and_says_so(laboratory, tmp_path):
+def test_a_server_that_dies_leaves_at_most_what_was_written_and_reports_it(laboratory, tmp_path):
     virtual, connected = laboratory()
     die = when_recording(virtual.faults.lose_daq_server)
     with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING") as failure, bench_on(connected) as bench:

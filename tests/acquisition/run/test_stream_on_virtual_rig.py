@@ -91,7 +91,7 @@ def played(streamed):
 
 
 @pytest.mark.thorough
-def test_what_is_recorded_is_what_the_plan_previews_to_the_converters_noise(streamed):
+def test_anything_that_is_recorded_is_what_the_plan_previews_to_the_converters_noise(streamed):
     expected = played(streamed)
     begin = streamed.segments["ramp_up"].start
     assert streamed.segments["ramp_down"].stop - begin == expected.size
@@ -143,7 +143,7 @@ def test_the_check_at_low_level_plays_through_the_output(streamed):
     assert streamed.state is RecordingState.COMPLETE
 
 
-def test_the_recording_says_what_played(streamed):
+def test_the_recording_states_what_played(streamed):
     assert "analogue output" in streamed.log
     assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
 

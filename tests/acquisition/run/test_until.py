@@ -151,7 +151,7 @@ def test_a_stop_ends_a_recording_that_waits_for_a_bound(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_recording_goes_on_when_the_analysis_has_died(rig, tmp_path, monkeypatch):
+def test_the_recording_continues_when_the_analysis_has_died(rig, tmp_path, monkeypatch):
     began = UntilWatch.wait_until_ready
 
     def kill_when_ready(watch, switch):

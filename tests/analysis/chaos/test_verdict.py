@@ -77,21 +77,21 @@ def chaos():
     return points
 
 
-def test_chaos_that_ends_is_judged_by_what_it_became(chaos):
+def test_chaos_that_ends_is_classified_by_what_it_became(chaos):
     points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
     assert "2100 drive periods, otherwise before" in found.why
 
 
-def test_a_periodic_motion_that_is_lost_for_good_is_judged_by_the_chaos_after_it(chaos):
+def test_a_periodic_motion_that_is_lost_for_good_is_classified_by_the_chaos_after_it(chaos):
     points = np.vstack((np.full((750, 2), 0.2), chaos[:2250]))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.CHAOTIC
     assert found.evidence.periods == 2100, "the block in which it was lost is not judged"
 
 
-def test_a_settled_end_is_judged_by_itself_though_the_transient_was_longer(chaos):
+def test_a_settled_end_is_classified_by_itself_though_the_transient_was_longer(chaos):
     points = np.vstack((chaos[:2100], np.full((900, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 900)
@@ -144,7 +144,7 @@ def test_scatter_close_to_the_noise_carries_no_verdict():
     ],
     ids=["no contact", "impacts that repeat", "chaos"],
 )
-def test_the_specimen_moves_as_its_points_say(frequency_hz, amplitude_m, kind, period):
+def test_the_specimen_moves_as_its_points_state(frequency_hz, amplitude_m, kind, period):
     states = stroboscopic_section(gong2025(), Harmonic(frequency_hz, amplitude_m), 2600)[1100:]
     points = states[:, [0, 3]] / np.array([1.0, 2 * np.pi * frequency_hz])
     size = np.sqrt(np.mean(points**2))
@@ -215,7 +215,7 @@ def known_exponent(name):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["duffing", "henon", "stops"])
-def test_the_exponent_of_points_is_no_less_than_is_said(name):
+def test_the_exponent_of_points_is_no_less_than_is_stated(name):
     """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
     points, exponent = known_exponent(name)
     points = points / (np.sqrt(2) * points.std(axis=0))

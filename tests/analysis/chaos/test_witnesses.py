@@ -84,7 +84,7 @@ def test_neighbours_of_a_flow_part_at_the_rate_of_the_exponent(lorenz):
     assert found.exponent / 0.01 == pytest.approx(0.9056, rel=0.08)
 
 
-def test_there_is_no_exponent_where_noise_fills_the_room_below_saturation():
+def test_there_is_no_exponent_where_noise_fills_the_package_below_saturation():
     noise = np.random.default_rng(0).standard_normal((2000, 3))
     assert not divergence(noise, steps=8).is_resolved
     clean, noisy = henon(3000), henon(3000) + 0.2 * np.random.default_rng(1).standard_normal(3000)
@@ -101,7 +101,7 @@ def test_henon_with_noise_is_more_than_linear_noise_and_an_autoregression_is_not
 
 
 @pytest.mark.thorough
-def test_linear_noise_is_rejected_no_more_often_than_the_test_says():
+def test_linear_noise_is_rejected_no_more_often_than_the_test_states():
     rejected = sum(
         surrogate_test(autoregression(np.random.default_rng(seed), 400), seed=seed).rejects_linear_noise
         for seed in range(60)
@@ -135,7 +135,7 @@ def test_a_neighbour_is_the_nearest_point_that_is_not_near_in_time():
         assert reach[neighbour] == pytest.approx(distance)
 
 
-def test_what_is_too_short_is_refused():
+def test_anything_that_is_too_short_is_refused():
     with pytest.raises(NotEnoughData, match="200 values"):
         zero_one(np.ones(100))
     with pytest.raises(NotEnoughData, match="neighbour"):

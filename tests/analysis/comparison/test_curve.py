@@ -161,7 +161,7 @@ def test_chaotic_wiggles_are_no_modes_and_a_resonance_beside_them_stays_one(dept
     ("modes_hz", "damping"),
     [((95, 260, 268), 0.005), ((95, 266, 500), 0.03), ((100, 120, 140), 0.01), ((94, 264, 500), 0.002)],
 )
-def test_modes_that_can_be_told_apart_are_listed(modes_hz, damping):
+def test_modes_that_can_be_distinguished_are_listed(modes_hz, damping):
     found = curve_peaks(respond(np.arange(40.0, 700.0, 0.1), modes_hz, damping))
     assert [each.frequency_hz for each in found] == pytest.approx(modes_hz, rel=0.01)
 

@@ -35,13 +35,13 @@ def test_the_whole_result_is_kept_for_reports(compared):
     assert failures == ()
 
 
-def test_what_is_asked_for_is_what_is_estimated(streamed_file):
+def test_anything_that_is_requested_is_what_is_estimated(streamed_file):
     found = compare_recording(
         streamed_file(), FrequencyResponseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
     )
     assert found.curves[0].note.startswith("h1, ")
 
 
-def test_a_recording_that_ended_too_early_says_so(streamed_file):
+def test_a_recording_that_ended_too_early_reports_it(streamed_file):
     with pytest.raises(NotEnoughData, match="streamed"):
         compare_recording(streamed_file(samples=10), FrequencyResponseRequest(), Simulation.LEFT_OUT)

@@ -26,7 +26,7 @@ def swept():
     )
 
 
-def test_a_swept_run_says_what_the_chain_itself_did(swept):
+def test_a_swept_run_states_what_the_chain_itself_did(swept):
     (run,) = swept.runs
     drive, chain = LinearSweep(150.0, 600.0, 3.0, 10e-6), chain_of(gong2025(), 3)
     alone = integrate_chain(chain, drive, 3.0, sample_rate_hz=20e3)
@@ -61,7 +61,7 @@ def test_the_figure_shades_the_gaps_and_its_tables_hold_what_is_drawn(swept):
     assert drawn.png.startswith(b"\x89PNG")
 
 
-def test_a_recorded_base_motion_drives_a_chain_and_is_told_where_it_is_coherent(noise_file):
+def test_a_recorded_base_motion_drives_a_chain_and_is_reported_where_it_is_coherent(noise_file):
     found = chain_answer(
         ChainRequest(lengths=(2,), drive="recorded", recording=str(noise_file()), duration_s=60.0)
     )
@@ -94,7 +94,7 @@ def test_cells_take_turns_and_what_is_replaced_is_replaced_in_all():
         ({"start_hz": 10.0, "stop_hz": 300.0, "step_hz": 1e-3}, "take a larger step"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_in_one_sentence(options, said):
+def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(options, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**options)
 

@@ -55,7 +55,7 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
         (BranchMethod.BALANCE, "No harmonic balance of at most 64 harmonics was found"),
     ],
 )
-def test_that_nothing_was_found_is_told_in_the_words_of_the_method(method, said):
+def test_that_nothing_was_found_is_reported_in_the_words_of_the_method(method, said):
     """A balance finds none among stops that knock, where shooting finds motions; "none" alone was said."""
     none = BranchDiagram(BranchRequest(start=100.0, stop=120.0, method=method, harmonics=64), (), 1.0)
     assert none.cost_sentence.startswith(said)
@@ -189,7 +189,7 @@ def test_a_figure_has_dashes_where_motions_are_unstable_and_marks_at_events(alon
     assert [each.name for each in drawn.tables] == ["branches", "branches_special_points"]
 
 
-def test_what_a_bench_can_hold_is_told_in_figure_sentence_table_and_json():
+def test_what_a_bench_can_hold_is_reported_in_figure_sentence_table_and_json():
     growth_s = FOLDED.growth_time_s
     assert np.isinf(growth_s[:3]).all()
     assert growth_s[3:] == pytest.approx([1 / (115.0 * math.log(1.2)), 1 / (105.0 * math.log(1.5))])
@@ -260,7 +260,7 @@ def test_a_spectrum_adds_up_and_is_kept(tmp_path):
     assert lower.get_ylabel() == "dimension"
 
 
-def test_a_lossy_contact_has_no_check_by_the_dampers_and_says_so():
+def test_a_lossy_contact_has_no_check_by_the_dampers_and_reports_it():
     request = SpectrumRequest(model="rigid:0.8", start=260.0, stop=260.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)
     assert math.isnan(found.largest_sum_difference)
@@ -269,7 +269,7 @@ def test_a_lossy_contact_has_no_check_by_the_dampers_and_says_so():
 
 
 @pytest.mark.thorough
-def test_a_balance_says_how_far_its_harmonics_reach():
+def test_a_balance_states_how_far_its_harmonics_reach():
     options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
     first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))
     many = diagram_of(BranchRequest(method=BranchMethod.BALANCE, **options))

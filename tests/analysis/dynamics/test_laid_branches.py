@@ -37,7 +37,7 @@ def diagram(level):
     return diagram_of(BranchRequest(recorded_level=level, start=low, stop=high, places=2, starts=0))
 
 
-def test_the_level_is_that_of_every_step(level, stepped_file):
+def test_the_level_matches_every_step(level, stepped_file):
     (result,) = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT).results
     found = result.analysis.response
     assert [each[0] for each in level] == sorted(each[0] for each in level)
@@ -51,7 +51,7 @@ def test_a_dwell_has_no_level_over_frequency(dwell_file):
         level_of_drive(compared(dwell_file()))
 
 
-def test_a_report_lays_branches_over_the_steps_and_says_how_their_levels_differ(
+def test_a_report_lays_branches_over_the_steps_and_states_how_their_levels_differ(
     diagram, stepped_file, tmp_path
 ):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)

@@ -64,7 +64,7 @@ def test_a_crate_is_never_overwritten(folder, crate):
         pack_folder(folder, crate, CrateFacts(LICENCE), {})
 
 
-def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
+def test_anything_that_cannot_be_deposited_is_refused(folder, tmp_path):
     with pytest.raises(InvalidRequest, match="no address of a licence"):
         pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
     with pytest.raises(InvalidRequest, match="without a name"):

@@ -331,7 +331,7 @@ def test_neither_export_nor_import_holds_a_long_file_in_memory(tmp_path):
     assert peak < 0.4 * samples * 8
 
 
-def test_a_recording_says_where_it_came_from(tmp_path):
+def test_a_recording_states_where_it_came_from(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     recording, _ = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", 'serial = "V-7"')))
     said = recording.bench["imported"]
@@ -509,7 +509,9 @@ def hdf5_bytes(kept):
         ),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said_once_and_in_plain_words(known, tmp_path, name, content, said):
+def test_anything_that_is_wrong_with_a_file_is_stated_once_and_in_plain_words(
+    known, tmp_path, name, content, said
+):
     (tmp_path / name).write_bytes(uff_bytes(known, **content) if isinstance(content, dict) else content)
     with pytest.raises(UnusableData, match=said) as refused, opened_source(tmp_path / name) as source:
         source.read(source.channels[0], 0, source.channels[0].samples)
@@ -553,7 +555,7 @@ def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
         ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
     ],
 )
-def test_a_file_that_is_not_what_its_suffix_says_is_one_sentence(tmp_path, name, content, said):
+def test_a_file_that_is_not_what_its_suffix_states_is_one_sentence(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises((InvalidRequest, UnusableData), match=said), opened_source(tmp_path / name):
         pass
@@ -622,7 +624,7 @@ def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
 
 
 @pytest.mark.parametrize("to", [Format.MAT, Format.CSV])
-def test_what_was_exported_as_matlab_or_text_comes_back(known, known_values, tmp_path, to):
+def test_anything_that_was_exported_as_matlab_or_text_comes_back(known, known_values, tmp_path, to):
     path, *_ = export_samples(excerpt(known, to_s=1.0), to, tmp_path / f"a.{to.value}")
     head = DWELL.replace("8000.0", "51200.0").replace("settle_s = 1,", "settle_s = 0,")
     channels = (

@@ -53,7 +53,7 @@ def test_the_steps_of_a_sweep_are_one_part():
     assert part.segment.label == "sweep"
 
 
-def test_told_parts_take_the_plans_labels_in_order():
+def test_reported_parts_take_the_plans_labels_in_order():
     told = [{"start_s": 1.0, "stop_s": 1.5}, {"start_s": 4.0, "stop_s": 4.5}]
     parts = place_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
     assert ranges(parts) == [(1000, 1500), (4000, 4500)]

@@ -140,7 +140,7 @@ def allowed(kind, fault):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize("kind", [*SAYS_TIMES, *SAYS_STARTS, "wav"])
 @pytest.mark.parametrize("seed", [43])
-def test_what_a_file_says_of_time_reaches_the_recording(tmp_path, kind, seed):
+def test_what_a_file_states_of_time_reaches_the_recording(tmp_path, kind, seed):
     rng = np.random.default_rng(seed)
     third = SAYS_TIMES.index(kind) % 3 if kind in SAYS_TIMES else 0
     faults = (
@@ -260,7 +260,7 @@ def test_starts_and_rates_beside_channels_are_read(tmp_path, suffix, fact):
         import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "wrong.h5")
 
 
-def test_a_mapping_overrides_the_times_of_a_file_and_says_so(tmp_path):
+def test_a_mapping_overrides_the_times_of_a_file_and_reports_it(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
     content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}
     with open_recording(

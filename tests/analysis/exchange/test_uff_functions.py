@@ -69,7 +69,7 @@ def test_pyuff_reads_every_line_and_both_axes(known, tmp_path, lines, is_even, i
     assert read["id1"].strip() == "m0 velocity over base acceleration"
 
 
-def test_records_are_as_wide_as_the_definition_says(known, tmp_path):
+def test_records_are_as_wide_as_the_definition_states(known, tmp_path):
     hz = np.array([1.0, 2.5, 7.25])
     path, _ = export_functions(
         excerpt(known), [function(hz, np.array([1 + 2j, -3j, 5e-7 + 0j]))], Format.UFF, tmp_path / "a.uff"
@@ -85,7 +85,7 @@ def test_records_are_as_wide_as_the_definition_says(known, tmp_path):
     assert (lines[start - 1], lines[-1]) == ("    -1", "    -1")
 
 
-def test_densities_are_those_of_the_chosen_channels_and_seconds(known, known_values, tmp_path):
+def test_densities_match_the_chosen_channels_and_seconds(known, known_values, tmp_path):
     chosen = excerpt(known, ["m0_velocity"], 0.2, 1.3)
     functions = spectral_functions(chosen, FrequencyResponseRequest())
     path, _ = export_functions(chosen, functions, Format.UFF, tmp_path / "a.uff")
@@ -133,7 +133,7 @@ def recorded(path, parts):
         ([("", 2.5, VOLTS)], 1.0, "over 2.5 s of the recording"),
     ],
 )
-def test_densities_are_over_what_was_played_and_say_so(tmp_path, parts, lines_hz, told):
+def test_densities_are_over_what_was_played_and_report_it(tmp_path, parts, lines_hz, told):
     run = CliRunner().invoke(
         app, ["export", str(recorded(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
     )
@@ -154,7 +154,7 @@ def test_where_nothing_was_played_there_are_no_densities(tmp_path):
                 spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest())
 
 
-def test_a_format_without_a_place_for_spectra_says_which_has_one(known, tmp_path):
+def test_a_format_without_a_place_for_spectra_states_which_has_one(known, tmp_path):
     with pytest.raises(InvalidRequest, match=r"spectra were asked for as csv.*ask for uff"):
         export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())

@@ -154,7 +154,7 @@ def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_parts_beyond_the_planned_ones_are_those_of_feedback(dwell_file):
+def test_parts_beyond_the_planned_ones_match_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]
@@ -201,7 +201,7 @@ def test_quantities_get_the_prefix_in_which_they_read_one_to_a_thousand(largest,
     assert unit == expected[1]
 
 
-def test_a_figure_of_steps_is_titled_and_told_by_its_own_kind(stepped_file):
+def test_a_figure_of_steps_is_titled_and_reported_by_its_own_kind(stepped_file):
     found = result(stepped_file).analysis
     plan = SettledSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5)
     assert STEPPED_FREQUENCIES.title(plan, found.response).startswith("Settled sine, 2 Vpp")

@@ -40,5 +40,5 @@ def test_between_two_powers_of_ten_the_numbers_are_those_between_them():
     assert {"$4\\cdot10^{-5}$", "$6\\cdot10^{-5}$"} <= {text for text, *_ in _numbers(3e-5, 7e-5)}
 
 
-def test_over_many_decades_only_powers_of_ten_are_told():
+def test_over_many_decades_only_powers_of_ten_are_reported():
     assert all(np.log10(float(text)) % 1 == 0 for text, *_ in _numbers(0.005, 50))

@@ -101,7 +101,7 @@ def test_a_transmission_without_noise_gives_the_specimen_back(true):
         assert fit.value(name).value == pytest.approx(value, rel=1e-6)
 
 
-def test_the_intervals_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_they_must(true):
+def test_the_intervals_hold_the_truth_as_often_as_they_state_and_are_no_wider_than_they_must(true):
     rng = np.random.default_rng(20250101)
     draws = 120
     fits = [fit_specimen(measured(true, rng), NOMINAL) for _ in range(draws)]
@@ -165,7 +165,7 @@ def test_no_frequency_is_claimed_better_than_the_converters_clock(true):
         assert found.low <= value <= found.high, name
 
 
-def test_what_is_not_free_stays_as_the_bench_says(true):
+def test_anything_that_is_not_free_stays_as_the_bench_states(true):
     fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
     assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
@@ -246,7 +246,7 @@ def test_chi_square_of_a_right_model_is_one_however_few_averages_its_scatter_com
     assert fit.reduced_chi_square == pytest.approx(1.0, abs=4 / math.sqrt(lines_hz.size))
 
 
-def test_it_finds_a_specimen_that_is_far_from_what_the_bench_says():
+def test_it_finds_a_specimen_that_is_far_from_what_the_bench_states():
     far = with_values(NOMINAL, {name: value * 1.07 for name, value in TRUE.items()})
     fit = fit_specimen(measured(far, np.random.default_rng(3)), NOMINAL)
     for name in LINEAR:
@@ -254,7 +254,7 @@ def test_it_finds_a_specimen_that_is_far_from_what_the_bench_says():
     assert fit.reduced_chi_square < 1.5
 
 
-def test_the_gap_cannot_be_told_from_a_transmission(true):
+def test_the_gap_cannot_be_reported_from_a_transmission(true):
     clean = measured(true, np.random.default_rng(4))
     with pytest.raises(InvalidRequest, match="tells any of"):
         fit_specimen(clean, NOMINAL, (Parameter.GAP,))

@@ -44,7 +44,7 @@ def holds(number, true):
 
 
 @pytest.mark.thorough
-def test_the_mean_gap_and_m1_are_told_and_what_is_flat_is_not_determined(buried):
+def test_the_mean_gap_and_m1_are_reported_and_what_is_flat_is_not_determined(buried):
     with open_recording(buried.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
     told = {each.what: each for each in found}
@@ -93,7 +93,7 @@ def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),
     ],
 )
-def test_what_statistics_cannot_tell_is_said_in_a_sentence(buried, specimen, stretch_s, why):
+def test_what_statistics_cannot_tell_is_stated_in_a_sentence(buried, specimen, stretch_s, why):
     with open_recording(buried.path) as recording, pytest.raises(AnalysisError, match=why):
         statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
 

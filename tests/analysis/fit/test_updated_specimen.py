@@ -94,7 +94,7 @@ def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(updated
     assert 0.3 < updated.reduced_chi_square < 3
 
 
-def test_the_report_says_what_was_fitted_and_what_the_bench_says(measured, updated):
+def test_the_report_states_what_was_fitted_and_what_the_bench_states(measured, updated):
     said = list(findings(replace(measured, model_said=updated.sentences)))
     assert said[: len(updated.sentences)] == list(updated.sentences)
     assert [
@@ -160,7 +160,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
         bracketed_gap(dwells[:1], gong2025())
 
 
-def test_a_swept_response_lags_by_what_its_rate_says():
+def test_a_swept_response_lags_by_what_its_rate_states():
     """Against the motion itself, for which the steady answer comes too early."""
     rate, free, at_hz = 10.0, gong2025(contact="linear"), np.array([252.0, 257.0, 262.0, 272.0, 280.0])
     motion = synthetic.chirp(8.0, 225.0, 305.0, 1e-6)
@@ -176,7 +176,7 @@ def test_a_swept_response_lags_by_what_its_rate_says():
     assert np.max(np.abs(lagging / seen - 1)) < 0.5 * np.max(np.abs(steady / seen - 1))
 
 
-def test_without_a_sweep_the_gap_stays_and_the_fit_says_why(measured):
+def test_without_a_sweep_the_gap_stays_and_the_fit_states_why(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m

@@ -138,13 +138,13 @@ def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
     assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
 
 
-def test_one_realisation_says_that_it_cannot_show_distortion(analysed):
+def test_one_realisation_states_that_it_cannot_show_distortion(analysed):
     periodic = analysed(np.zeros_like, realisations=1).response.periodic
     assert distortion(periodic).distortion_share is None
     assert "one realisation cannot show distortion" in distortion_caption(periodic)
 
 
-def test_noise_larger_than_the_transmission_is_told_in_whole_percent(analysed):
+def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analysed):
     periodic = analysed(np.zeros_like, realisations=1).response.periodic
     noisy = replace(periodic, noise_variance=np.full_like(periodic.noise_variance, 1e3))
     share = 100 * distortion(noisy).noise_share

@@ -75,7 +75,7 @@ def test_an_estimator_that_noise_biases_is_remarked(streamed_noise, tmp_path, es
 
 
 @pytest.mark.parametrize("window", list(Window))
-def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file, window):
+def test_the_resolution_requested_is_the_noise_bandwidth_of_a_line(streamed_file, window):
     found = response(streamed_file(), resolution_hz=3.0, window=window).frequency_response
     assert found.resolution_hz == pytest.approx(3.0, rel=1e-3)
     assert found.settings.window == window.value
@@ -83,7 +83,7 @@ def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("averages", [4.0, 25.0])
-def test_the_averages_asked_for_are_reached_and_hardly_passed(streamed_file, averages):
+def test_the_averages_requested_are_reached_and_hardly_passed(streamed_file, averages):
     found = response(streamed_file(), averages=averages).frequency_response
     assert averages <= found.n_eff < 1.25 * averages
 
@@ -94,7 +94,7 @@ def test_the_averages_asked_for_are_reached_and_hardly_passed(streamed_file, ave
     window=st.sampled_from(Window),
     overlap=st.floats(0, 0.8),
 )
-def test_the_longest_segment_leaves_the_averages_asked_for(samples, averages, window, overlap):
+def test_the_longest_segment_leaves_the_averages_requested(samples, averages, window, overlap):
     segment = longest_segment(samples, averages, window, overlap)
     if segment < 32:
         return
@@ -149,7 +149,7 @@ def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
         ({"confidence": 95.0}, "between 0 and 1"),
     ],
 )
-def test_a_request_without_meaning_says_what_is_allowed(asked, said):
+def test_a_request_without_meaning_states_what_is_allowed(asked, said):
     with pytest.raises(InvalidRequest, match=said):
         FrequencyResponseRequest(**asked)
 

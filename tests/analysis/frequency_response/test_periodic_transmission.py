@@ -113,7 +113,7 @@ def test_the_delay_of_the_response_channel_is_removed():
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
-def test_the_bounds_hold_the_truth_as_often_as_they_say(count):
+def test_the_bounds_hold_the_truth_as_often_as_they_state(count):
     """Noise and distortion both: a static cube makes the realisations differ beyond the noise."""
     rng = np.random.default_rng(count)
     period, orders, cube = 128, np.arange(1, 31), 0.02
@@ -154,7 +154,7 @@ def test_a_static_cube_is_approximated_by_the_closed_form(sigma):
     assert np.mean(result.distortion_variance) > 1e-6
 
 
-def test_noise_and_distortion_are_told_apart():
+def test_noise_and_distortion_are_distinguished():
     rng = np.random.default_rng(5)
     orders = np.arange(1, 101)
     period, periods, noise = 512, 4, 0.5
@@ -205,7 +205,7 @@ def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
     assert abs(np.mean(error.real)) < 4 / np.sqrt(orders.size)
 
 
-def test_one_realisation_says_that_its_bounds_hold_noise_only():
+def test_one_realisation_states_that_its_bounds_hold_noise_only():
     orders = np.arange(5, 105)
     drive = multisine(orders, orders**2.0, 512, 2048)
     result = periodic_frequency_response([(drive, drive, drive)], RATE, repetition_hz=10.0)

@@ -241,7 +241,7 @@ def test_frequency_and_damping_of_every_mode_are_held_by_their_bounds():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("accelerometer", [0.3, 0.003])
-def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(accelerometer):
+def test_bounds_of_every_mode_hold_where_two_realisations_show_the_noise(accelerometer):
     """The base moves a third of what it does elsewhere where the first mode pulls at it, one line wide."""
     rate, points, realisations = 4096.0, 2048, 2
     driven = np.arange(25, 301)

@@ -48,7 +48,7 @@ def pyfrf_answer(noisy_pair, request):
         (Estimator.HV, "get_Hv", {"noise_ratio": 1.0}),
     ],
 )
-def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
+def test_h1_h2_and_hv_match_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
     window, theirs = pyfrf_answer
     ours = transmissibility(
         *noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how
@@ -59,7 +59,7 @@ def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, me
     )
 
 
-def test_coherence_is_that_of_pyfrf(noisy_pair, pyfrf_answer):
+def test_coherence_matches_pyfrf(noisy_pair, pyfrf_answer):
     window, theirs = pyfrf_answer
     ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window)
     np.testing.assert_allclose(

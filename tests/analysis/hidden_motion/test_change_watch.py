@@ -41,7 +41,7 @@ def test_the_alarm_is_given_once():
     assert watch.has_changed
 
 
-def test_blocks_that_lie_out_by_chance_bring_alarms_as_rarely_as_is_said():
+def test_blocks_that_lie_out_by_chance_bring_alarms_as_rarely_as_is_stated():
     """At a share so large that alarms can be counted, Lorden's bound of their rate holds; and as stated."""
     rng = np.random.default_rng(8)
     day = np.where(rng.random(10 * 36_000) < 0.01, OUT, WITHIN)

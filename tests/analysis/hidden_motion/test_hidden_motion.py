@@ -53,7 +53,7 @@ def impacts_scored(motion, recorded, found, true):
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "seed"), [(260.0, 1.5, 43), ("sweep", 1.5, 44), ("noise", 10.0, 45)]
 )
-def test_a_track_goes_on_where_the_vibrometer_has_no_light(world_recording, kind, level_vpp, seed):
+def test_a_track_continues_where_the_vibrometer_has_no_light(world_recording, kind, level_vpp, seed):
     """Ten times a second; bridges that were taken for motion lost a third of the track and all numbers."""
     recorded = world_recording(kind, level_vpp, seed=seed, duration_s=3.0, dropouts_per_s=10.0)
     motion = told(recorded)
@@ -74,7 +74,7 @@ def test_a_track_goes_on_where_the_vibrometer_has_no_light(world_recording, kind
     ("kind", "level_vpp", "largest_rms_m"),
     [(260.0, 1.5, 0.1e-6), ("sweep", 1.5, 0.1e-6), ("noise", 10.0, 0.2e-6)],
 )
-def test_tracked_p_and_its_impacts_are_those_of_the_world(world_recording, kind, level_vpp, largest_rms_m):
+def test_tracked_p_and_its_impacts_match_the_world(world_recording, kind, level_vpp, largest_rms_m):
     recorded = world_recording(kind, level_vpp, seed=41)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
@@ -114,7 +114,7 @@ def test_a_stop_on_one_side_is_followed_and_its_numbers_are_found(world_recordin
 
 
 @pytest.mark.thorough
-def test_a_mass_that_chatters_along_its_stop_is_followed_where_no_contact_model_tells_its_impacts(
+def test_a_mass_that_chatters_along_its_stop_is_followed_where_no_contact_model_shows_its_impacts(
     world_recording,
 ):
     """Five impacts a period, most of them with hardly any flight between."""
@@ -147,7 +147,7 @@ def test_ten_times_the_noise_is_still_followed(world_recording):
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "largest_rms_m"), [(260.0, 1.5, 1e-6), ("noise", 10.0, 1.5e-6)]
 )
-def test_without_a_contact_model_motion_impacts_and_gaps_are_told(
+def test_without_a_contact_model_motion_impacts_and_gaps_are_reported(
     world_recording, kind, level_vpp, largest_rms_m
 ):
     recorded = world_recording(kind, level_vpp, seed=41)
@@ -232,7 +232,7 @@ def test_a_motion_that_has_settled_for_half_of_the_time_is_searched_all_the_same
 
 
 @pytest.mark.thorough
-def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_told(world_recording):
+def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_reported(world_recording):
     """Of rigid stops, described as Hertz's, gaps were told as (42.3 +- 0.9) um, where 45 is true."""
     usual = gong2025()
     recorded = world_recording(
@@ -243,7 +243,7 @@ def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_told(world
 
 
 @pytest.mark.thorough
-def test_what_no_track_confirms_is_told_without_bounds(world_recording):
+def test_what_no_track_confirms_is_reported_without_bounds(world_recording):
     """Of an m0 that is 3 % heavier than described both gaps were told as (44.0 +- 0.2) um; 45 is true."""
     usual = gong2025()
     m0, m1, m2 = usual.masses
@@ -275,7 +275,7 @@ def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
     assert motion.specimen.exponent == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_track_that_does_not_hold_is_said_and_not_shown(world_recording, described_otherwise):
+def test_a_track_that_does_not_hold_is_stated_and_not_shown(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
@@ -296,7 +296,7 @@ def test_a_motion_that_meets_no_stop_determines_no_gap(world_recording):
     assert motion.free_gaps == (None, None)
 
 
-def test_what_cannot_be_told_is_refused_in_a_sentence(world_recording):
+def test_anything_that_cannot_be_reported_is_refused_in_a_sentence(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):

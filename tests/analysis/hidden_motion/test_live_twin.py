@@ -48,7 +48,7 @@ def test_gaps_and_mass_are_found_on_the_way(dwell):
     assert found[Hidden.M1].value == pytest.approx(2.1e-3, rel=1e-3)
 
 
-def test_a_forecast_errs_as_it_says(dwell):
+def test_a_forecast_errs_as_it_states(dwell):
     _, seen, _, truth = dwell
     errors, said = [], []
     for end, each in seen:

@@ -71,12 +71,12 @@ def covered(found):
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
-def test_noise_alone_tells_nothing(factor):
+def test_noise_alone_shows_nothing(factor):
     assert not told(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
 
 
 @pytest.mark.thorough
-def test_one_weak_sine_does_not_tell_the_dampers_that_were_described():
+def test_one_weak_sine_does_not_show_the_dampers_that_were_described():
     """Bounds as narrow as the search, about the description, missed the truth in each of ten."""
     rng = np.random.default_rng(3)
     inside = []

@@ -85,7 +85,7 @@ def test_settings_that_average_nothing_are_refused():
         SpectrumSettings(averages=1)
 
 
-def test_what_is_left_out_counts_no_more_and_what_comes_after_does():
+def test_anything_that_is_left_out_counts_no_more_and_what_comes_after_does():
     rng = np.random.default_rng(5)
     spectra = fed(rng.standard_normal((2, 10_000)), 1000)
     spectra.add(np.full((2, 2000), 1e6, dtype=np.float32))

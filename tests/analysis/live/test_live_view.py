@@ -39,7 +39,7 @@ def test_lanes_show_the_newest_seconds_in_the_channels_units(view):
     assert time_histories.high[3].max() == pytest.approx(3 * A0 * 2 * np.pi * 260, rel=1e-3)
 
 
-def test_responses_grow_as_the_run_goes_on(view):
+def test_responses_grow_as_the_run_continues(view):
     history = view.history()
     assert history.frequency_hz.size >= 10
     assert np.allclose(history.frequency_hz, 260.0, atol=0.01)
@@ -126,7 +126,7 @@ def watched_sweep(lead_in_s):
     return view
 
 
-def test_what_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_its_course():
+def test_anything_that_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_its_course():
     history = watched_sweep(LEAD_IN_S).history()
     assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
     assert history.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)

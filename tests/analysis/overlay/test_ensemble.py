@@ -93,7 +93,7 @@ def test_each_draw_is_set_into_the_others():
     np.testing.assert_allclose(found._z_of_draws, by_hand, rtol=1e-9)
 
 
-def test_the_band_holds_a_further_draw_as_often_as_it_says():
+def test_the_band_holds_a_further_draw_as_often_as_it_states():
     rng = np.random.default_rng(2)
     held = np.mean([curve(rng, 16, 40).share_in_band for _ in range(400)])
     assert held == pytest.approx(0.95, abs=0.006)

@@ -49,7 +49,7 @@ def test_a_sweep_and_its_simulation_begin_to_collide_within_a_hertz_and_agree_be
     assert np.max(np.abs(laid.difference.decibel[before])) < 0.02
 
 
-def test_what_disagrees_with_the_twin_is_said_first(sweep_file):
+def test_what_disagrees_with_the_twin_is_stated_first(sweep_file):
     _, laid = laid_over(sweep_file)
     (curve, *_) = laid.ensemble
     draws = 1 + 1e-3 * np.random.default_rng(1).standard_normal((9, 1))

@@ -57,7 +57,7 @@ def test_a_short_voltage_and_one_without_noise_are_given_as_they_are(samples):
     assert PlayedVoltage(volts, 1e-9).drawn(rng).shape == volts.shape
 
 
-def test_the_noise_of_a_channel_is_that_of_all_its_quiet_blocks():
+def test_the_noise_of_a_channel_matches_all_its_quiet_blocks():
     """The quietest of 240 alone was 9 to 12 % too low."""
 
     class Recorded:

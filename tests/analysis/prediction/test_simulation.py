@@ -32,7 +32,7 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 
         ({"gap_m": -1.0}, "greater than 0"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused_in_words(given, said):
+def test_anything_that_cannot_be_simulated_is_refused_in_words(given, said):
     with pytest.raises(ValidationError, match=re.escape(said)):
         SimulationRequest(**given)
 
@@ -56,7 +56,7 @@ def test_the_answer_grows_to_the_linear_transmission():
     assert trace.name == "model linear, 5 µm, Response II, predicted"
 
 
-def test_the_answer_is_that_of_the_specimen_that_is_named(tmp_path):
+def test_the_answer_matches_the_specimen_that_is_named(tmp_path):
     """A shipped one by its name, one of one's own by its file."""
     file = tmp_path / "own.toml"
     file.write_text(
@@ -98,7 +98,7 @@ def test_similarity_is_of_the_frequencies_that_both_models_have():
     assert progress.troubles == ("b at 300 Hz: no",)
 
 
-def test_bands_of_impacts_are_told_apart():
+def test_bands_of_impacts_are_distinguished():
     progress = SimulationProgress(5e-6, 10, "n")
     progress.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
     assert progress.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))

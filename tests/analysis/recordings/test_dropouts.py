@@ -123,7 +123,7 @@ def test_what_rings_after_a_blow_is_no_dropout():
     [np.zeros(51_200), np.full(51_200, np.nan), motion(6)[:300], np.round(motion(7), 2)],
     ids=["silent", "lost", "short", "coarse"],
 )
-def test_nothing_is_found_where_nothing_can_be_told(velocity):
+def test_nothing_is_found_where_nothing_can_be_reported(velocity):
     assert found_dropouts(velocity, RATE_HZ) == ()
 
 
@@ -147,7 +147,7 @@ def rig():
     return load_rig("virtual_rig")
 
 
-def test_a_dwell_with_dropouts_says_what_it_says_without(rig, tmp_path):
+def test_a_dwell_with_dropouts_states_what_it_states_without(rig, tmp_path):
     """Response I was 91 where it is 1.63, and a warning called that a lower bound."""
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
     results = []
@@ -164,7 +164,7 @@ def test_a_dwell_with_dropouts_says_what_it_says_without(rig, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("dropouts_per_s", "seed"), [(20.0, 2), (20.0, 13), (60.0, 1)])
-def test_a_dwell_with_clustered_dropouts_says_what_it_says_without_or_nothing(
+def test_a_dwell_with_clustered_dropouts_states_what_it_states_without_or_nothing(
     rig, tmp_path, dropouts_per_s, seed
 ):
     """Response I was 58 +- 16 where it is 3.21; with 60 a second, 48 +- 51."""

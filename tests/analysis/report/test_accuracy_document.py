@@ -61,12 +61,12 @@ def test_the_page_has_the_shares_of_scenes_whose_start_is_forgotten(benchmark, p
     assert "start is forgotten" not in without
 
 
-def test_the_page_says_when_a_promise_is_not_kept(benchmark, page_of):
+def test_the_page_states_when_a_promise_is_not_kept(benchmark, page_of):
     assert benchmark.worst_error(Accuracy.QUICK) <= Accuracy.QUICK.promise
     assert "**no**" not in page_of(replace(benchmark, lotteries=()))
 
 
-def test_a_transient_errs_by_no_more_than_the_promise_times_its_growth_and_than_its_answer_says(
+def test_a_transient_errs_by_no_more_than_the_promise_times_its_growth_and_than_its_answer_states(
     benchmark, page_of
 ):
     page = page_of(benchmark)

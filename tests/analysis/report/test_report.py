@@ -136,7 +136,7 @@ def test_a_warning_that_changes_a_conclusion_is_at_the_top_and_any_other_at_its_
         assert f"Figure 1; not simulated; {what.lower()}" in page.visible
 
 
-def test_a_report_says_how_it_was_measured_and_that_it_was_simulated(page):
+def test_a_report_states_how_it_was_measured_and_that_it_was_simulated(page):
     for said in ("S-m0_velocity", "serial G-7", "amplifier gain", "6400 samples/s", "0123abc"):
         assert said in page.text
     assert "These recordings come from simulated instruments" in page.text
@@ -158,7 +158,7 @@ def test_figures_are_saved_beside_the_report_with_their_numbers(written):
     assert names == {".png", ".svg", ".csv"}
 
 
-def test_one_recording_makes_a_report_of_its_own(dwell_file, tmp_path):
+def test_one_recording_makes_its_own_report(dwell_file, tmp_path):
     results = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT)
     path = write_report(results, tmp_path / "one.html")
     page = Page(path.read_text(encoding="utf-8"))
@@ -173,7 +173,7 @@ def test_a_report_of_nothing_is_refused(tmp_path):
         recordings_in(tmp_path)
 
 
-def test_recordings_in_a_folder_come_in_the_order_they_were_begun(dwell_file, noise_file, tmp_path):
+def test_recordings_in_a_folder_come_in_the_order_they_were_started(dwell_file, noise_file, tmp_path):
     shutil.copy(dwell_file("weak", name="b", started_utc="2026-02-28T12:00:00+00:00"), tmp_path)
     shutil.copy(noise_file(name="a"), tmp_path)
     (tmp_path / "broken.h5").write_bytes(b"nothing")
@@ -182,7 +182,7 @@ def test_recordings_in_a_folder_come_in_the_order_they_were_begun(dwell_file, no
     assert failed[0].name == "broken.h5"
 
 
-def test_a_summary_is_json_and_says_the_results(campaign):
+def test_a_summary_is_json_and_states_the_results(campaign):
     document = json.loads(json.dumps(campaign_summary(campaign), allow_nan=False))
     assert document["failures"][0]["recording"] == "stopped.h5"
     kinds = [each["kind"] for each in document["results"]]

@@ -39,7 +39,7 @@ def said(**parts):
     return summary(campaign(**parts), ())
 
 
-def test_the_papers_campaign_is_told_in_three_findings():
+def test_the_papers_campaign_is_reported_in_three_findings():
     results = campaign(
         (noise(0.05, 94.61, 266.2, 499.6), noise(1.0, 201.0), noise(10.0, 199.1, 428.5)),
         (dwell(0.05, MotionKind.PERIODIC), dwell(1.5, MotionKind.CHAOTIC), dwell(10.0, MotionKind.CHAOTIC)),
@@ -64,7 +64,7 @@ def test_the_papers_campaign_is_told_in_three_findings():
         (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, 199.0 Hz."),
     ],
 )
-def test_what_becomes_of_the_resonances_is_told_as_it_was_measured(strong, words):
+def test_what_becomes_of_the_resonances_is_reported_as_it_was_measured(strong, words):
     assert words in said(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
 
 

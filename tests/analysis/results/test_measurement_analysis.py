@@ -86,7 +86,7 @@ def test_a_sweep_finds_where_the_simulated_masses_began_to_collide(sweep_file):
     assert found.response.drive_amplitude_m[20:-5] == pytest.approx(5e-6, rel=1e-3)
 
 
-def test_every_step_of_a_stepped_sine_is_a_dwell_of_its_own(stepped_file):
+def test_every_step_of_a_stepped_sine_is_its_own_dwell(stepped_file):
     found = analysed(stepped_file)
     assert isinstance(found, SteppedSineAnalysis)
     assert found.response.frequency_hz == pytest.approx([150.0, 180.0], rel=1e-7)
@@ -103,7 +103,7 @@ def test_a_stopped_dwell_is_analysed_over_what_there_is_and_warns(dwell_file):
     assert verdict(found, "Parts") is Verdict.WARNING
 
 
-def test_a_recording_that_ended_before_its_dwell_says_so_with_its_name_and_its_reason(dwell_file):
+def test_a_recording_that_ended_before_its_dwell_reports_it_with_its_name_and_its_reason(dwell_file):
     path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
     with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
         analysed(path)
@@ -136,7 +136,7 @@ def test_a_faultless_recording_passes_its_checks(dwell_file):
     assert verdict(found, "Drive frequency") is Verdict.PASSED
 
 
-def test_a_drive_at_another_frequency_than_the_plan_is_told():
+def test_a_drive_at_another_frequency_than_the_plan_is_reported():
     planned_hz = np.array([100.0, 200.0, 300.0])
     assert frequency_check(np.array([100.005, 299.99]), planned_hz).verdict is Verdict.PASSED
     told = frequency_check(np.array([100.0, 260.0]), planned_hz)
@@ -147,7 +147,7 @@ def test_a_drive_at_another_frequency_than_the_plan_is_told():
 @pytest.mark.parametrize(
     ("share", "told"), [(1.0, Verdict.PASSED), (0.6, Verdict.WARNING), (1.1, Verdict.NOTE)]
 )
-def test_a_drive_that_is_not_as_loud_as_its_plan_is_told(dwell_file, share, told):
+def test_a_drive_that_is_not_as_loud_as_its_plan_is_reported(dwell_file, share, told):
     generator = load_rig("virtual_rig").generator.model_dump(mode="json")
     facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
     setting_v = facts.measurement.excitation.amplitude_vpp / 2

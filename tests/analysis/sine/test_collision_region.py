@@ -130,7 +130,7 @@ def test_what_rings_of_the_steps_of_a_fast_weak_sweep_is_no_collision(
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("duration_s", [6, 2])
-def test_a_fast_sweep_that_collides_is_told_to(tmp_path, duration_s):
+def test_a_fast_sweep_that_collides_is_reported_too(tmp_path, duration_s):
     plan = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=duration_s, settle_s=1)
     with open_bench(load_rig("virtual_rig")) as bench:
         run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
@@ -138,7 +138,7 @@ def test_a_fast_sweep_that_collides_is_told_to(tmp_path, duration_s):
     assert sum(each.high_hz - each.low_hz for each in result.analysis.collisions.regions) > 80
 
 
-def test_without_a_specimen_ringing_and_weak_impacts_are_not_told_apart():
+def test_without_a_specimen_ringing_and_weak_impacts_are_not_distinguished():
     """Orders 2 and 3 show the impacts of strong collisions, whatever is known of the specimen."""
     strong, _ = found(20e-6, 240.0, 300.0, known=None)
     assert len(strong.regions) == 1
@@ -187,7 +187,7 @@ def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(d
     assert np.isfinite(outcome.steady_over_swept) == is_stated
 
 
-def test_steady_sines_reach_as_far_as_the_linear_specimen_says():
+def test_steady_sines_reach_as_far_as_the_linear_specimen_states():
     """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
     outcome = judged(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))

@@ -31,7 +31,7 @@ def test_the_section_lies_on_the_orbit_once_a_drive_period(analyses):
     assert max(nearest) < 0.06 * np.max(np.abs(section.orbit_displacement_m))
 
 
-def test_the_portraits_say_the_verdict_and_hold_the_points(analyses):
+def test_the_portraits_state_the_verdict_and_hold_the_points(analyses):
     drawn = portraits_figure(list(analyses.values()))
     assert drawn.png.startswith(b"\x89PNG")
     for analysis, each in zip(analyses.values(), drawn.tables, strict=True):

@@ -64,7 +64,7 @@ def test_steps_are_counted_by_what_they_do():
     ]
 
 
-def test_nothing_is_said_without_feedback():
+def test_nothing_is_stated_without_feedback():
     assert list(feedback_sentences(())) == []
 
 
@@ -84,7 +84,7 @@ def analysed(tmp_path):
     return played
 
 
-def test_a_tracked_resonance_is_analysed_and_said(analysed):
+def test_a_tracked_resonance_is_analysed_and_stated(analysed):
     tracked = ResonanceTracking(
         amplitude_vpp=0.2,
         start_hz=265,

@@ -96,7 +96,7 @@ def test_what_a_periodic_motion_holds_besides_is_noise(tmp_path):
     assert louder.with_rest_as_noise(is_known_to_repeat=True) is louder
 
 
-def test_what_is_too_large_for_noise_stays_what_it_was(tmp_path):
+def test_anything_that_is_too_large_for_noise_stays_what_it_was(tmp_path):
     found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
     assert np.isnan(found.rest_error_i)
     assert found.with_rest_as_noise(is_known_to_repeat=True) is found

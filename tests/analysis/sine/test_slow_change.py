@@ -119,7 +119,7 @@ def unsettled_step(folder, hz, damping, seed):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_step_that_has_not_settled_is_told_to_change_or_has_a_bound_that_holds(tmp_path, seed):
+def test_a_step_that_has_not_settled_is_reported_to_change_or_has_a_bound_that_holds(tmp_path, seed):
     """44.38 +- 0.51 was said instead of 49.97, and 246.6 +- 0.58 instead of 249.8."""
     rng = np.random.default_rng(seed)
     hz, damping = (

@@ -144,7 +144,7 @@ def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blo
     np.testing.assert_allclose(y[inner], x[::factor][inner], atol=3e-5)
 
 
-def test_what_would_alias_is_removed():
+def test_anything_that_would_alias_is_removed():
     decimator = Decimator(1, 4)
     x = np.cos(2 * np.pi * 0.18 * np.arange(20_000))[np.newaxis]
     y = np.concatenate((decimator.add(x), decimator.finish()), axis=1)[0]
@@ -238,7 +238,7 @@ def test_the_vibrometers_delay_is_removed_from_the_phase():
 @pytest.mark.parametrize(
     ("quality", "shift_hz", "amplitude"), [(10, 0.02, 1.001), (50, 0.12, 1.000), (250, 0.45, 0.943)]
 )
-def test_a_resonance_passed_at_one_hertz_a_second_shifts_as_theory_says(quality, shift_hz, amplitude):
+def test_a_resonance_passed_at_one_hertz_a_second_shifts_as_theory_states(quality, shift_hz, amplitude):
     """A 260 Hz resonator, exact step response between samples; the ISO 7626 limit at Q 250 is 0.97 Hz/s."""
     _, phase = sweep(40, 240.0, 280.0)
     natural = 2 * np.pi * 260
@@ -286,7 +286,7 @@ def test_a_meaningless_sweep_is_refused():
     ("played_to_hz", "verdict"), [(350.0, Verdict.PASSED), (349.5, Verdict.PASSED), (334.0, Verdict.WARNING)]
 )
 @pytest.mark.parametrize("is_downward", [False, True])
-def test_a_sweep_whose_end_was_not_played_is_told(played_to_hz, verdict, is_downward):
+def test_a_sweep_whose_end_was_not_played_is_reported(played_to_hz, verdict, is_downward):
     ends = (150.0, 350.0, played_to_hz) if not is_downward else (350.0, 150.0, 500.0 - played_to_hz)
     _, phase = sweep(6.0, ends[0], ends[2])
     response = sweep_response(np.cos(phase), np.cos(phase), np.cos(phase), RATE, low_hz=150.0, high_hz=350.0)

@@ -56,7 +56,7 @@ def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
     assert tracked_resonances([lost(0, 1.0)]) == ()
 
 
-def test_a_level_that_was_not_met_says_in_how_many_periods_and_what_was_there_instead():
+def test_a_level_that_was_not_met_states_in_how_many_periods_and_what_was_there_instead():
     missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met", periods=150)
     moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
     met = note(2, 0.4, 98.6, periods=120)
@@ -103,5 +103,5 @@ def test_a_mode_is_said_to_soften_or_harden_only_past_the_uncertainty(strong_hz,
     assert sentence.endswith(said)
 
 
-def test_one_level_tells_no_backbone():
+def test_one_level_shows_no_backbone():
     assert backbone_sentence(tracked_resonances([note(0, 0.5, 100.0)])) == ""

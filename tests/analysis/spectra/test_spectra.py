@@ -30,7 +30,7 @@ def test_a_sine_on_a_line_holds_half_its_amplitude_squared():
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
-def test_the_bounds_hold_the_density_as_often_as_they_say(overlap):
+def test_the_bounds_hold_the_density_as_often_as_they_state(overlap):
     rng = np.random.default_rng(2)
     inside = trials = 0
     for _ in range(300):

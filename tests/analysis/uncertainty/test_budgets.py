@@ -113,7 +113,7 @@ def test_a_budget_is_what_propagation_of_distributions_gives(samples, weak):
         assert budget.share(Cause.CHANCE) == 0.0
 
 
-def test_what_is_not_stated_is_said_and_is_not_zero(weak):
+def test_anything_that_is_not_stated_is_stated_and_is_not_zero(weak):
     amplitude, _, second = budgets_of(weak)
     assert second.not_stated == (
         Cause.VIBROMETER,
@@ -173,7 +173,7 @@ def test_a_statement_needs_its_source():
 
 
 @pytest.mark.parametrize("bounded", [False, True])
-def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
+def test_the_scatter_of_a_maximum_is_distinguished_from_one_window(bounded):
     """Against many windows: of unbounded motion, and of one whose largest value has a bound."""
     rng = np.random.default_rng(5)
     values = rng.beta(2, 3, (400, 2000)) if bounded else rng.exponential(size=(400, 2000))
@@ -209,7 +209,7 @@ def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, 
             Contribution(Cause.NOISE, sd, "a bias, by mistake")
 
 
-def test_a_colliding_sweep_has_chance_and_says_what_only_draws_tell(sweep_file):
+def test_a_colliding_sweep_has_chance_and_states_what_only_draws_tell(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
     (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))

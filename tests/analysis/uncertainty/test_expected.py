@@ -26,7 +26,7 @@ NOISE = WhiteNoise(
 
 
 @pytest.mark.thorough
-def test_noise_is_known_as_well_as_was_said_before(tmp_path):
+def test_noise_is_known_as_well_as_was_stated_before(tmp_path):
     plan = Measurement(name="weak", excitation=NOISE, ramp_s=0.3)
     expected = expected_uncertainty(plan, RIG)
     path = tmp_path / "weak.h5"
@@ -88,7 +88,7 @@ def dwell(at_hz, level_vpp):
     return Measurement(name="dwell", excitation=excitation)
 
 
-def test_a_chaotic_dwell_is_told_to_be_chance_and_a_quiet_one_noise():
+def test_a_chaotic_dwell_is_reported_to_be_chance_and_a_quiet_one_noise():
     first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
@@ -104,7 +104,7 @@ def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alon
     assert 1e-6 < second.after(5.0) < 1e-3
 
 
-def test_a_rig_that_states_no_noise_is_told_so_and_a_sweep_promises_nothing():
+def test_a_rig_that_states_no_noise_is_reported_and_a_sweep_promises_nothing():
     silent = RIG.model_copy(update={"virtual": None})
     (first, *_) = expected_uncertainty(Measurement(name="weak", excitation=NOISE), silent)
     assert "the sensors' noise is not stated" in first.sentence
@@ -127,7 +127,7 @@ def test_a_motion_that_cannot_be_computed_promises_nothing(monkeypatch):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), (300.0, 5.0)])
-def test_a_dwell_that_collides_is_known_as_well_as_was_said_before(tmp_path, at_hz, level_vpp):
+def test_a_dwell_that_collides_is_known_as_well_as_was_stated_before(tmp_path, at_hz, level_vpp):
     """One run under a base that does not yield told it up to 3.4 times too well."""
     plan = dwell(at_hz, level_vpp)
     said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
@@ -140,7 +140,7 @@ def test_a_dwell_that_collides_is_known_as_well_as_was_said_before(tmp_path, at_
         assert 0.3 < said[name] / told[name] < 4.0, name
 
 
-def test_a_dwell_whose_base_is_held_is_told_at_the_voltage_that_holds_it():
+def test_a_dwell_whose_base_is_held_is_reported_at_the_voltage_that_holds_it():
     """The same base by a setting and by feedback: the same promise."""
     by_setting = expected_uncertainty(dwell(260, 0.05), RIG)
     base_m = base_motion(dwell(260, 0.05).excitation, RIG, np.array([260.0])).amplitude_m
@@ -163,7 +163,7 @@ def test_where_the_beginning_decides_the_motion_nothing_is_promised():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_a_dwell_of_every_shipped_specimen_is_told_or_not_promised(name):
+def test_a_dwell_of_every_shipped_specimen_is_reported_or_not_promised(name):
     """Stops on one side, rigid ones and none at all included."""
     document = RIG.model_dump(mode="json")
     limit_m = document["specimen"]["amplitude_limit_m"]

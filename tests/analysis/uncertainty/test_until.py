@@ -48,7 +48,7 @@ def test_steps_are_predicted_step_by_step():
     assert expected_recorded_s(plan(steps, Until(response_ii=0.01)), RIG) == pytest.approx(6.0)
 
 
-def test_what_cannot_be_known_beforehand_is_not_predicted():
+def test_anything_that_cannot_be_known_beforehand_is_not_predicted():
     assert expected_recorded_s(plan(QUIET, Until(response_i=0.01)), RIG) is None
     assert expected_recorded_s(plan(QUIET, None), RIG) is None
 

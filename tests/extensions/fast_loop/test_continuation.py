@@ -168,7 +168,7 @@ def model_of(rig):
 
 
 @pytest.mark.thorough
-def test_a_branch_is_begun_from_rest_and_its_base_is_a_sine_of_the_level(rig, tmp_path):
+def test_a_branch_is_started_from_rest_and_its_base_is_a_sine_of_the_level(rig, tmp_path):
     hard = hardening(rig)
     points, notes = followed(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
     branch, _ = model_of(hard)
@@ -217,7 +217,7 @@ def test_a_motion_that_is_another_one_afterwards_is_not_determined():
     assert nothing.multiplier is None
 
 
-def test_a_bench_without_a_controller_says_so(rig, tmp_path):
+def test_a_bench_without_a_controller_reports_it(rig, tmp_path):
     with open_bench(rig) as bench, pytest.raises(ConfigurationError, match=r"add \[controller\]"):
         run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
 

@@ -65,7 +65,7 @@ def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
         assert np.abs(row - expected).max() < 4e-3 * np.abs(expected).max()
 
 
-def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch():
+def test_under_a_table_too_heavy_to_move_the_multipliers_match_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
     # The table's own multiplier is one: it stays where it is.
@@ -136,7 +136,7 @@ def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
         assert cost(replace(best, output=factor * best.output, direct=factor * best.direct)) > least
 
 
-def test_a_late_law_loses_motions_that_need_none_and_that_is_told():
+def test_a_late_law_loses_motions_that_need_none_and_that_is_reported():
     late = plant(2e-3)
     hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))
     found = branch()
@@ -157,7 +157,7 @@ def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
     assert largest[2] > 1.1
 
 
-def test_what_is_played_moves_the_base_as_the_transfer_says():
+def test_anything_that_is_played_moves_the_base_as_the_transfer_states():
     model = plant(specimen=LINEAR)
     law = design_law(model)
     step, volt = model.step

@@ -103,7 +103,7 @@ def test_a_frame_is_the_one_of_the_documents(installed):
     assert frame(6, 3, bytes.fromhex("0c0004030201")).hex(" ") == "48 4c 06 03 06 00 0c 00 04 03 02 01 08 d1"
 
 
-def test_a_law_of_two_gains_is_told_exactly_and_any_other_is_refused_with_what_to_do(installed):
+def test_a_law_of_two_gains_is_reported_exactly_and_any_other_is_refused_with_what_to_do(installed):
     from helic_signals import pd_gains
 
     rng = np.random.default_rng(22)
@@ -159,7 +159,7 @@ def test_another_version_of_the_protocol_a_missing_gate_and_an_occupied_board_ar
 
 
 @pytest.mark.thorough
-def test_a_connection_that_is_lost_is_told_and_the_gate_has_closed(played):
+def test_a_connection_that_is_lost_is_reported_and_the_gate_has_closed(played):
     board, bench = played
     board.drop()
     assert board.is_left.wait(10)
@@ -170,7 +170,7 @@ def test_a_connection_that_is_lost_is_told_and_the_gate_has_closed(played):
 
 
 @pytest.mark.thorough
-def test_a_stream_that_ends_is_told_and_silenced(played):
+def test_a_stream_that_ends_is_reported_and_silenced(played):
     board, bench = played
     board.is_mute = True
     bench.digitizer.read(6400)

@@ -87,7 +87,7 @@ def covers(each, size):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("index", [60, 300])
-def test_a_held_motion_is_told_as_stable_or_not_though_only_its_base_and_m0_are_seen(index):
+def test_a_held_motion_is_reported_as_stable_or_not_though_only_its_base_and_m0_are_seen(index):
     fitted, size = told(index, 6, 1.0, 1)
     assert sum(covers(each, size) for each in fitted) >= 5
     for each in fitted:
@@ -95,7 +95,7 @@ def test_a_held_motion_is_told_as_stable_or_not_though_only_its_base_and_m0_are_
         assert (low > 1.0) if size > 1.0 else (high < 1.0)
 
 
-def test_noise_without_changes_tells_nothing():
+def test_noise_without_changes_shows_nothing():
     rng = np.random.default_rng(4)
     motion = np.cos(2 * np.pi * np.arange(24_000) / 100)
     for _ in range(20):
@@ -111,7 +111,7 @@ def test_bounds_are_two_sided():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_bounds_hold_as_often_as_they_say_and_no_verdict_is_wrong():
+def test_bounds_hold_as_often_as_they_state_and_no_verdict_is_wrong():
     """240 draws of 10 motions with low and high noise: 95 % of the bounds, and no wrong side among them."""
     inside, wrong, draws = 0, 0, 0
     for noise in (1.0, 4.0):

@@ -129,7 +129,7 @@ def test_going_over_to_another_program_is_no_jump(wired):
     assert wired.report().state is LoopState.PLAYING
 
 
-def test_it_falls_silent_when_its_host_says_nothing_and_says_why(wired):
+def test_it_falls_silent_when_its_host_says_nothing_and_states_why(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     wired.run(0.4)
     wired.report()
@@ -153,7 +153,7 @@ def test_a_law_that_runs_away_ends_by_itself():
     assert "at its limit of 2 V" in wired.report().reason
 
 
-def test_what_is_no_request_is_refused_in_a_sentence_and_changes_nothing(wired):
+def test_anything_that_is_no_request_is_refused_in_a_sentence_and_changes_nothing(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     for line in (b"{}", b"nonsense", b'{"ask": "play"}', b'{"ask": "play", "program": {"frequency_hz": -1}}'):
         told = json.loads(wired.controller.execute(line).data)

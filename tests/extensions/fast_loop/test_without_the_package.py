@@ -89,7 +89,7 @@ def test_nothing_is_measured(run, given, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_an_old_recording_is_told_by_command_and_report(run, recording, tmp_path):
+def test_an_old_recording_is_reported_by_command_and_report(run, recording, tmp_path):
     told = run("-m", "vibench.cli", "analyse", recording, "--json")
     assert told.returncode == 1
     assert SENTENCE in " ".join(told.stderr.split())

@@ -43,7 +43,7 @@ def background(qapp):
     background.close()
 
 
-def test_a_process_that_dies_is_told_and_others_do_what_is_left(background, qtbot):
+def test_a_process_that_dies_is_reported_and_others_do_what_is_left(background, qtbot):
     answers, errors = [], []
     background.ask(leave, answers.append, errors.append, 0)
     dropped = [background.ask(factorial, answers.append, errors.append, 3) for _ in range(5)]

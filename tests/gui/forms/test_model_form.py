@@ -65,7 +65,7 @@ def test_units_and_limits_stand_at_the_field(form):
     assert widget.text() == "1.5 s"
 
 
-def test_what_is_typed_is_in_the_plan(form, qtbot):
+def test_anything_that_is_typed_is_in_the_plan(form, qtbot):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     widget = form.editors["excitation"].form.editors["frequency_hz"].widget
     widget.lineEdit().setText("0,3 kHz")
@@ -92,7 +92,7 @@ def test_a_change_of_kind_keeps_what_both_kinds_have(form):
     assert content["amplitude_vpp"] == MEASUREMENTS["quick-dwell"].excitation.amplitude_vpp
 
 
-def test_what_a_field_says_of_itself_in_the_plan_is_its_explanation(form):
+def test_what_a_field_states_of_itself_in_the_plan_is_its_explanation(form):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     excitation = form.editors["excitation"].form
     assert (

@@ -39,7 +39,7 @@ def test_other_units_and_words_are_refused(text, unit):
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["", "Hz", "m", "s", "Vpp", "m/s²"]))
-def test_what_is_shown_reads_back_as_the_same_number(value, unit):
+def test_anything_that_is_shown_reads_back_as_the_same_number(value, unit):
     assert parse_quantity(quantity_text(value, unit), unit) == value
 
 

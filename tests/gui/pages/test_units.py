@@ -189,7 +189,7 @@ def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
     again.background.close()
 
 
-def test_an_axis_says_the_number_of_its_unit(filled):
+def test_an_axis_states_the_number_of_its_unit(filled):
     plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
     chosen_in(filled, OTHERS)
@@ -239,7 +239,7 @@ def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
         ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
     ],
 )
-def test_a_sentence_is_told_in_the_chosen_units_and_nothing_else_of_it_changes(sentence, told):
+def test_a_sentence_is_reported_in_the_chosen_units_and_nothing_else_of_it_changes(sentence, told):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
     assert UNITS.convert(sentence) == told
 

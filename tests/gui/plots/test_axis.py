@@ -27,7 +27,7 @@ def test_numbers_are_written_as_people_read_them(value, text):
     assert number_text(value) == text
 
 
-def test_the_unit_stands_in_the_label_and_never_with_a_prefix_of_its_own(qapp):
+def test_the_unit_stands_in_the_label_and_never_with_its_own_prefix(qapp):
     item = AxisItem("bottom", LOG_FREQUENCY)
     item.setRange(10, 20000)
     assert item.labelText == "Frequency (Hz)"

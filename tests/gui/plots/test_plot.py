@@ -91,7 +91,7 @@ def test_ticks_are_thinned_to_round_steps(most):
 
 
 @pytest.mark.parametrize("reach", [12.0, 17.0, 19.0, 26.0, 44.0])
-def test_a_low_axis_has_two_numbers_at_least_for_one_alone_says_no_scale(reach):
+def test_a_low_axis_has_two_numbers_at_least_for_one_alone_states_no_scale(reach):
     places = [5.0 * n for n in range(-8, 9) if abs(5.0 * n) <= reach]
     step, values = thin_ticks(5.0, places, 2)
     assert len(values) == 2
@@ -172,7 +172,7 @@ def read_at_one(plot):
     return plot.reading.text
 
 
-def test_what_is_read_is_of_the_curve_that_is_there_now(plot):
+def test_anything_that_is_read_is_of_the_curve_that_is_there_now(plot):
     """It stayed under the pointer while another curve was drawn, or none."""
     curve = plot.curve(curve_style(0), "mass")
     curve.setData([0.0, 1.0], [0.0, 0.004])
@@ -253,7 +253,7 @@ def test_a_disk_that_refuses_a_picture_or_numbers_leaves_no_file(plot, tmp_path,
     assert [*tmp_path.iterdir()] == []
 
 
-def test_what_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
+def test_anything_that_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
     plot.curve(curve_style(0)).setData([0.0, 1.0], [0.0, 0.001])
     plot.show()
     qapp.processEvents()

@@ -19,7 +19,7 @@ def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
     assert label.property("tone") == "active"
 
 
-def test_a_click_on_stop_asks_for_a_stop(qtbot):
+def test_a_click_on_stop_requests_a_stop(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     with qtbot.waitSignal(banner.stop_requested):
@@ -41,7 +41,7 @@ def test_text_and_accents_can_be_read_on_every_ground(theme, contrast):
     assert contrast(theme.base, theme.accent) >= READABLE
 
 
-def test_the_button_says_which_ramp_it_asks_for_and_keeps_its_place(qtbot):
+def test_the_button_states_which_ramp_it_requests_and_keeps_its_place(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.resize(1000, 60)

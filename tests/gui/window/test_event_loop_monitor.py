@@ -27,6 +27,6 @@ def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtb
     monitor.stop()
 
 
-def test_a_loop_that_is_free_is_told_so_on_the_status_line(window, qtbot):
+def test_a_loop_that_is_free_is_reported_on_the_status_line(window, qtbot):
     qtbot.waitUntil(lambda: "latency" in window.status_line.text_of("frames"))
     assert "Longest wait" in window.status_line.tip_of("frames")

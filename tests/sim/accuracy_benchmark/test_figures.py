@@ -24,7 +24,9 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
         ((1.3e-8, 1.0e-8, 0.9e-8), "No level buys digits", ["standard", "reference"]),
     ],
 )
-def test_a_level_that_is_no_better_than_the_one_before_is_not_said_to_buy_digits(state_errors, said, without):
+def test_a_level_that_is_no_better_than_the_one_before_is_not_stated_to_buy_digits(
+    state_errors, said, without
+):
     found = benchmark(*state_errors)
     assert found.advice.startswith(said)
     assert found.advice.endswith("the last costs 2.0 times the first.")

@@ -215,7 +215,7 @@ def test_on_rigid_stops_a_branch_is_exact_and_where_it_is_lost_a_contact_grazes(
             assert branch.events[-1].kind is BifurcationKind.GRAZING
 
 
-def test_under_a_recorded_level_each_point_is_a_motion_of_its_own_level():
+def test_under_a_recorded_level_each_point_is_its_own_motion_level():
     specimen = gong2025()
     path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))
     found = next(shot_branches(specimen, path, 126.0, 138.0, FEW))

@@ -97,7 +97,7 @@ def test_a_sweep_that_hardly_moves_is_the_sine_to_twelve_digits():
 
 
 @pytest.mark.parametrize("drive", [LinearSweep(80.0, 300.0, 0.1, 20e-6), noise(3, 2001, 20e3, 20e-6)])
-def test_a_driven_run_goes_on_from_where_it_was_cut_and_samples_change_nothing(drive):
+def test_a_driven_run_continues_from_where_it_was_cut_and_samples_change_nothing(drive):
     chain = chain_of(gong2025(), 2)
     whole = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE)
     sampled = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE, sample_rate_hz=7e3)

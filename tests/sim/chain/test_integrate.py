@@ -116,7 +116,7 @@ def test_one_cell_by_windows_is_the_specimen_that_the_scalar_engine_follows(law)
         assert distance(ours.motion[0], theirs.final_state) < bound
 
 
-def test_cells_of_every_law_move_together_as_an_independent_integrator_says():
+def test_cells_of_every_law_move_together_as_an_independent_integrator_states():
     paper = gong2025()
     chain = Chain(
         (
@@ -239,7 +239,7 @@ def test_samples_lie_on_the_motion_in_flight_and_in_contact():
         assert distance(run.states[index], shorter.final_state) < 1e-6
 
 
-def test_a_run_cut_within_a_contact_goes_on_as_if_it_had_not_been_cut():
+def test_a_run_cut_within_a_contact_continues_as_if_it_had_not_been_cut():
     chain = chain_of(gong2025(), 2)
     whole = integrate_chain(chain, HARD, 0.01, Accuracy.REFERENCE, lively(2))
     cut_s = float(whole.impacts.times_s[3]) + 8e-6
@@ -262,7 +262,7 @@ def test_sixty_four_cells_driven_hard_stay_finite_and_strike_in_order():
     assert run.impacts.per_cell.sum() == run.impacts.count
 
 
-def test_a_run_with_more_impacts_than_allowed_says_so_and_keeps_what_it_has():
+def test_a_run_with_more_impacts_than_allowed_reports_it_and_keeps_what_it_has():
     run = integrate_chain(chain_of(gong2025(), 2), HARD, 2.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.impacts.count == 2 * (20 + 100)
@@ -292,6 +292,6 @@ def test_a_motion_too_large_for_any_statement_ends_as_not_finite():
         ({"duration_s": 1.0, "initial_state": np.full((2, 6), np.nan)}, r"is not allowed: give finite"),
     ],
 )
-def test_what_is_not_allowed_is_refused_in_one_sentence(options, sentence):
+def test_anything_that_is_not_allowed_is_refused_in_one_sentence(options, sentence):
     with pytest.raises(ValueError, match=sentence):
         integrate_chain(chain_of(gong2025(), 2), **{"drive": HARD, **options})

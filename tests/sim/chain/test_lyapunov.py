@@ -21,7 +21,7 @@ def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode():
     assert found.impacts == 0
 
 
-def test_the_exponent_of_one_chaotic_cell_is_that_of_the_tangent_flow_within_the_errors():
+def test_the_exponent_of_one_chaotic_cell_matches_the_tangent_flow_within_the_errors():
     ours = chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=3.0, settle_s=1.0)
     theirs = lyapunov_exponent(gong2025(), CHAOTIC, duration_s=10.0, settle_s=2.0)
     assert ours.exponent_per_s > 5.0 * ours.standard_error_per_s

@@ -36,7 +36,7 @@ def test_one_cell_is_followed_as_the_specimen_is_in_chaos_too(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:5"])
-def test_lines_of_the_inner_masses_of_one_cell_are_those_of_a_densely_sampled_run(contact):
+def test_lines_of_the_inner_masses_of_one_cell_match_a_densely_sampled_run(contact):
     chain, drive = chain_of(gong2025(contact=contact), 1), Harmonic(220.0, 40e-6, phase_rad=0.7)
     start = np.array([[1e-5, -2e-5, 1.5e-5, 0.05, -0.1, 0.08]])
     duration_s = 5.0 / drive.frequency_hz
@@ -48,7 +48,7 @@ def test_lines_of_the_inner_masses_of_one_cell_are_those_of_a_densely_sampled_ru
     np.testing.assert_allclose(response.lines_m[0, :3], lines, atol=1e-3 * np.abs(lines).min())
 
 
-def test_peaks_and_lines_are_those_of_a_densely_sampled_run():
+def test_peaks_and_lines_match_a_densely_sampled_run():
     chain, drive = chain_of(gong2025(), 3), Harmonic(220.0, 40e-6)
     start = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 6)) * np.repeat([2e-5, 0.15], 3)
     duration_s = 5.0 / drive.frequency_hz
@@ -121,7 +121,7 @@ def test_a_run_of_more_windows_than_anybody_waits_for_is_refused(drive, duration
         (PERIODIC, 1e-3, r"^Window 0\.001 s is not allowed at 130\.0 Hz: .*\.$"),
     ],
 )
-def test_what_cannot_be_observed_is_refused_in_one_sentence(drive, window_s, sentence):
+def test_anything_that_cannot_be_observed_is_refused_in_one_sentence(drive, window_s, sentence):
     with pytest.raises(ValueError, match=sentence):
         chain_response(chain_of(gong2025(), 2), drive, duration_s=2.0, window_s=window_s)
 

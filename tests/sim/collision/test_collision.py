@@ -61,7 +61,7 @@ def test_mirrored_collisions_are_mirrored_to_the_last_bit():
 
 
 @pytest.mark.parametrize(("speed", "drive"), [(1e-6, DRIVE), (0.1, Harmonic(50_000.0, 1e-9))])
-def test_what_is_not_known_beforehand_is_left_to_the_steps(speed, drive):
+def test_anything_that_is_not_known_beforehand_is_left_to_the_steps(speed, drive):
     start = touching(speed)
     state, _ = followed(start, 1e-4, STANDARD, drive)
     by_steps, _ = followed(start, 1e-4, 1e-11, drive)
@@ -78,7 +78,7 @@ def test_a_collision_that_is_cut_in_its_midst_is_resolved_in_steps():
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3])
-def test_peaks_lines_samples_and_small_changes_are_those_of_the_steps(speed):
+def test_peaks_lines_samples_and_small_changes_match_the_steps(speed):
     start, until = touching(speed, 1.0, 20e-6), 1e-4
     state, seen = followed(start, until, STANDARD)
     by_steps, told = followed(start, until, 1e-11)

@@ -86,7 +86,7 @@ def test_a_motion_that_repeats_is_followed_to_the_same_states_for_ever():
     assert off(found.states, alone).max() < 1e-6
 
 
-def test_a_motion_that_ends_in_contact_goes_on_from_there():
+def test_a_motion_that_ends_in_contact_continues_from_there():
     drives, starts = random_scenes(24, 7)
     drives, starts = [drives[0]] * 64, [starts[0] * (1.0 + 1e-3 * k) for k in range(64)]
     found = followed(SPECIMEN, drives, starts, [12] * 64)

@@ -34,7 +34,7 @@ def observed(law, tolerance, drive):
 
 @pytest.mark.parametrize("tolerance", [3e-7, 1e-10])
 @pytest.mark.parametrize("law", LAWS)
-def test_peaks_and_lines_are_those_of_the_samples(law, tolerance):
+def test_peaks_and_lines_match_the_samples(law, tolerance):
     drive = Harmonic(130.0, 20e-6, 0.7)
     record, states, time_s = observed(law, tolerance, drive)
     assert record.impacts > 10 or law == "linear" or law.startswith("power")
@@ -48,7 +48,7 @@ def test_peaks_and_lines_are_those_of_the_samples(law, tolerance):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_what_is_observed_changes_no_step(law):
+def test_anything_that_is_observed_changes_no_step(law):
     drive = Harmonic(260.0, 5e-6)
     motions = []
     for watch in Watch:

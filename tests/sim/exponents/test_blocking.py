@@ -25,7 +25,7 @@ def test_the_error_is_the_closed_form_of_an_autoregression(memory):
     assert np.mean([each.correlation_length for each in found]) == pytest.approx(correlated, rel=0.35)
 
 
-def test_means_scatter_as_their_errors_say():
+def test_means_scatter_as_their_errors_state():
     means = [block_mean(autoregression(0.8, 4096, seed)) for seed in range(150)]
     scores = [each.mean / each.standard_error for each in means]
     assert 0.8 < np.std(scores) < 1.3
@@ -58,6 +58,6 @@ def test_equal_values_have_no_error_and_one_value_has_none_that_is_known():
 
 
 @pytest.mark.parametrize("values", [[], [1.0, np.nan], [[1.0, 2.0]]])
-def test_what_has_no_mean_is_refused(values):
+def test_anything_that_has_no_mean_is_refused(values):
     with pytest.raises(ValueError, match="has no mean here"):
         block_mean(values)

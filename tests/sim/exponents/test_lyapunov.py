@@ -88,7 +88,7 @@ def test_a_run_ends_as_soon_as_its_error_is_small_enough():
     assert abs(short.exponent_per_s - whole.exponent_per_s) < 4.0 * short.standard_error_per_s
 
 
-def test_a_lost_run_has_no_exponent_and_says_why():
+def test_a_lost_run_has_no_exponent_and_states_why():
     found = lyapunov_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
     assert found.verdict is ExponentVerdict.UNKNOWN
@@ -105,6 +105,6 @@ def test_a_lost_run_has_no_exponent_and_says_why():
         ({"initial_state": np.zeros(5)}, "six finite numbers"),
     ],
 )
-def test_what_makes_no_run_is_refused(options, message):
+def test_anything_that_makes_no_run_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
         lyapunov_exponent(gong2025(), CHAOS, **options)

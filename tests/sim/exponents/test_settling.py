@@ -89,7 +89,7 @@ def test_no_change_is_seen_in_noise_about_nothing():
     ("drive", "source"),
     [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)],
 )
-def test_the_specimens_chaos_that_dies_out_is_told_with_its_time_and_its_exponent(drive, source):
+def test_the_specimens_chaos_that_dies_out_is_reported_with_its_time_and_its_exponent(drive, source):
     # Each start lives in chaos for a time of its own; what comes after is one and the same.
     spread = np.repeat([2e-5, 2e-2], 3)
     starts = [np.random.default_rng(seed).uniform(-1.0, 1.0, 6) * spread for seed in range(14)]

@@ -62,7 +62,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
     ],
 )
-def test_what_cannot_be_mapped_is_told_in_a_sentence(said, complaint):
+def test_anything_that_cannot_be_mapped_is_reported_in_a_sentence(said, complaint):
     with pytest.raises(ValueError, match=complaint):
         Map.model_validate(said)
 
@@ -125,7 +125,7 @@ def test_a_settled_scene_is_the_motion_that_the_whole_answer_describes(frequency
     assert light.error_estimate is None or light.error_estimate == whole.error_estimate
 
 
-def test_the_contact_energy_is_that_of_the_deepest_penetration():
+def test_the_contact_energy_matches_the_deepest_penetration():
     plan = Map(frequency_hz=Range(start=129.0, stop=130.0, points=2), amplitude_m=2e-5)
     scene = plan.scene((0, 1))
     found = settle_scene(scene)
@@ -182,13 +182,13 @@ def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_
         ({"gap_m": Range(start=30e-6, stop=60e-6, points=3)}, False),
     ],
 )
-def test_points_of_one_specimen_that_wait_for_nobody_go_through_lanes(said, lanes):
+def test_points_of_one_specimen_that_wait_for_nobody_go_through_batches(said, lanes):
     plan = Map(frequency_hz=FREQUENCIES, **said)
     assert (map_solver(plan) == InBatches(Question.MOTION)) is lanes
     assert ("lanes" in estimate_map(plan, 1).sentence) is lanes
 
 
-def test_a_scene_settles_the_same_in_lanes_whatever_is_settled_beside_it():
+def test_a_scene_settles_the_same_in_batches_whatever_is_settled_beside_it():
     plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
     scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
     together = [each.prediction for each in solve_scenes(scenes, Question.MOTION)]
@@ -203,7 +203,7 @@ def test_a_scene_settles_the_same_in_lanes_whatever_is_settled_beside_it():
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6)])
-def test_a_periodic_motion_has_the_same_responses_in_lanes(frequency_hz, amplitude_m):
+def test_a_periodic_motion_has_the_same_responses_in_batches(frequency_hz, amplitude_m):
     plan = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m)
     alone = settle_scene(plan.scene((0, 1)))
     beside = solve_scenes([plan.scene((0, 1))], Question.MOTION)[0].prediction

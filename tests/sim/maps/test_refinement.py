@@ -60,7 +60,7 @@ def test_every_cell_is_computed_or_filled_in_once():
     st.floats(9, 40),
     st.sampled_from([2, 4, 8]),
 )
-def test_what_is_wider_than_the_lattice_is_filled_in_right(shape, centre, radius, coarse):
+def test_anything_that_is_wider_than_the_lattice_is_filled_in_right(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
     known, plan = refined(codes, coarse)
     is_wrong = filled_codes(codes, known, plan) != codes

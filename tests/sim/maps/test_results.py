@@ -35,7 +35,7 @@ def test_an_adaptive_map_has_what_the_full_one_has_wherever_it_was_computed(adap
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
 
 
-def test_the_shares_of_a_map_are_those_of_its_points_and_its_audit(adaptive):
+def test_the_shares_of_a_map_match_its_points_and_its_audit(adaptive):
     assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
     audit, cells = adaptive.audit, adaptive.plan.grid.size
     for number, motion in enumerate(adaptive.motions):
@@ -56,7 +56,7 @@ def several_starts():
     return solve_map(plan)
 
 
-def test_several_starts_tell_how_many_motions_there_are(several_starts):
+def test_several_starts_show_how_many_motions_there_are(several_starts):
     counts = several_starts.motion_counts
     for place in np.ndindex(counts.shape):
         found = several_starts.motions_at(*place)
@@ -74,7 +74,7 @@ def test_shares_of_starts_that_every_cell_shares_are_no_surer_than_so_many_start
             assert each.share.high >= of_starts.high - 1e-12
 
 
-def test_a_basin_map_tells_attractors_apart_and_kicks_them():
+def test_a_basin_map_distinguishes_attractors_and_kicks_them():
     plan = Map(
         frequency_hz=160.0,
         amplitude_m=4e-6,

@@ -148,7 +148,7 @@ def test_a_run_may_start_in_contact():
     assert abs(run.final_state[1] - run.final_state[2]) < specimen.gap_m
 
 
-def test_too_many_impacts_end_the_run_and_say_what_to_change():
+def test_too_many_impacts_end_the_run_and_state_what_to_change():
     run = integrate(paper(), PERIODIC, 30.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.end_time_s < 30.0

@@ -37,7 +37,7 @@ def test_without_contact_both_responses_are_the_exact_transmissibility(frequency
         ("rigid:0.9", Harmonic(130.0, 20e-6)),
     ],
 )
-def test_the_responses_are_those_of_the_trajectory(contact, drive):
+def test_the_responses_match_the_trajectory(contact, drive):
     specimen = gong2025(damping_time_s=1e-4 if contact.startswith("power") else 3e-5, contact=contact)
     response = steady_response(specimen, drive, Accuracy.REFERENCE, duration_s=0.5, window_s=0.1)
     run = integrate(specimen, drive, 0.5, Accuracy.REFERENCE, sample_rate_hz=4e5)
@@ -71,7 +71,7 @@ def test_a_run_that_did_not_end_has_no_response():
     assert np.isnan(response.response_ii)
 
 
-def test_a_sweep_by_hand_goes_on_from_the_state_before():
+def test_a_sweep_by_hand_continues_from_the_state_before():
     specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(130.0, 20e-6)
     short = steady_response(specimen, drive, duration_s=2.0, window_s=0.5)
     again = steady_response(specimen, drive, duration_s=0.5, window_s=0.5, initial_state=short.final_state)

@@ -36,7 +36,7 @@ def test_impacts_are_counted_in_the_interval_they_begin_in():
     assert np.flatnonzero(followed.impacts)[:10].tolist() == first.tolist()
 
 
-def test_going_on_from_a_state_is_the_same_as_not_stopping():
+def test_continuing_from_a_state_is_the_same_as_not_stopping():
     drive = shaken_base(2e-6, seconds=0.05)
     rest = Sampled(np.zeros(100), RATE_HZ)
     begun = follow_samples(gong2025(), drive)

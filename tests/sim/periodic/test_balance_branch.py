@@ -45,7 +45,7 @@ def kinds(branch):
     return [event.kind for event in branch.events]
 
 
-def test_a_first_order_branch_folds_where_the_closed_form_says():
+def test_a_first_order_branch_folds_where_the_closed_form_states():
     zeta, alpha, force = 0.02, 0.5, 0.1
     structure, spring = oscillator(2.0 * zeta), PowerSpring(1.0, ((3, alpha),))
     options = BalanceOptions(fewest=1, most=1)
@@ -94,7 +94,7 @@ def test_a_linear_branch_has_no_events_and_reaches_its_end():
     assert np.all(branch.is_stable)
 
 
-def test_a_balance_that_has_not_converged_says_so():
+def test_a_balance_that_has_not_converged_reports_it():
     # Chaos at 260 Hz and 5 um, with no more than 31 harmonics: whatever is found is not called a solution.
     structure, spring = structure_of(gong2025()), spring_of(gong2025())
     found = balance(structure, spring, 260.0, 5e-6, BalanceOptions(fewest=15, most=31))

@@ -18,7 +18,7 @@ def oscillator(damping=0.05, stiffness=1.0):
     return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
-def test_without_a_spring_the_multipliers_are_those_of_the_modes():
+def test_without_a_spring_the_multipliers_match_the_modes():
     specimen = gong2025()
     structure = structure_of(specimen)
     motion = Motion(130.0, np.array([1]), np.array([1e-6 + 0j]))
@@ -41,7 +41,7 @@ def test_without_a_spring_the_multipliers_are_those_of_the_modes():
     "spring",
     [PowerSpring(0.5, ((3, 0.4),)), GapSpring(30.0, 1.0, 0.6, 0.6), GapSpring(30.0, 1.5, 0.6, math.inf)],
 )
-def test_departures_evolve_as_an_independent_integrator_says(spring):
+def test_departures_evolve_as_an_independent_integrator_states(spring):
     structure = oscillator()
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
 
@@ -75,7 +75,7 @@ def test_departures_shrink_in_volume_by_the_damping_alone():
     assert np.log(np.linalg.det(monodromy)) == pytest.approx(-390.081 / 130.0, rel=1e-6)
 
 
-def test_the_multipliers_of_an_impacting_orbit_are_those_of_the_exact_flow():
+def test_the_multipliers_of_an_impacting_orbit_match_the_exact_flow():
     specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(100.0, 5e-6)
     start = integrate(specimen, drive, 3.0, Accuracy.REFERENCE).final_state
     units = np.array([1e-10] * 3 + [1e-7] * 3)

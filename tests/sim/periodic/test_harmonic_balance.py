@@ -71,7 +71,7 @@ def test_harmonic_balance_of_contact_converges_to_the_exact_orbit(exact_orbit, h
     assert 0.1 * true_error < found.left_out < 100.0 * true_error
 
 
-def test_the_largest_displacement_is_that_of_the_exact_orbit(exact_orbit):
+def test_the_largest_displacement_matches_the_exact_orbit(exact_orbit):
     _, drive, _, p = exact_orbit
     found = balanced(exact_orbit, 401)
     largest = np.abs(waveform(p, np.arange(len(p)), SAMPLES)).max()
@@ -95,7 +95,7 @@ def test_what_the_drive_gives_the_dampers_take(exact_orbit):
     assert given == pytest.approx(taken, rel=5e-4)
 
 
-def test_too_few_harmonics_say_so(exact_orbit):
+def test_too_few_harmonics_report_it(exact_orbit):
     few = balanced(exact_orbit, 21)
     assert few.outcome is BalanceEnd.NO_SOLUTION
     more = balanced(exact_orbit, 101)

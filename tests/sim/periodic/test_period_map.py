@@ -25,7 +25,7 @@ def by_differences(mapping, state, drive, step=1e-5):
 
 @pytest.mark.parametrize("shape", list(OrbitShape))
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8", "power:7"])
-def test_the_derivative_is_that_of_differences_of_the_map(contact, shape):
+def test_the_derivative_matches_differences_of_the_map(contact, shape):
     specimen = gong2025(contact=contact)
     state = integrate(specimen, DRIVE, 20 / DRIVE.frequency_hz).final_state
     mapping = PeriodMap(specimen, shape)

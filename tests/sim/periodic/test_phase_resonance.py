@@ -61,13 +61,13 @@ def test_along_a_hardening_mode_every_motion_repeats_and_is_a_quarter_of_a_perio
         ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
     ],
 )
-def test_what_has_no_phase_resonance_to_begin_with_is_refused(band_hz, levels_m, said):
+def test_anything_that_has_no_phase_resonance_to_begin_with_is_refused(band_hz, levels_m, said):
     with pytest.raises(ValueError, match=said):
         phase_resonance_branch(gong2025(), band_hz, levels_m)
 
 
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
-def test_what_newton_does_not_find_is_refused_and_not_told_as_a_motion(low_m):
+def test_what_newton_does_not_find_is_refused_and_not_reported_as_a_motion(low_m):
     """Its last guess was a "motion" at 17 Hz in a band of 92 to 97."""
     with pytest.raises(ValueError, match="No motion with this phase is found"):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))

@@ -52,7 +52,7 @@ def test_an_orbit_is_found_from_a_state_far_from_it():
     np.testing.assert_allclose(again.state / known.state, 1.0, atol=1e-6)
 
 
-def test_the_map_slopes_are_those_of_a_linear_flow():
+def test_the_map_slopes_match_a_linear_flow():
     specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6)
     mapping = PeriodMap(specimen)
     scales = state_scales(specimen, drive)

@@ -232,7 +232,7 @@ def bound_response(specimen, frequency_hz):
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("mode", [0, 1])
-def test_with_a_vanishing_gap_the_resonances_are_those_of_the_bound_pair(restitution, mode):
+def test_with_a_vanishing_gap_the_resonances_match_the_bound_pair(restitution, mode):
     specimen = rigid(restitution, gap_m=1e-10)
     resonance = float(specimen.bound_frequencies_hz[mode])
     for frequency_hz in (0.99 * resonance, resonance):
@@ -358,7 +358,7 @@ def test_the_hard_impact_oscillator_strikes_as_often_as_is_known_of_its_chaos():
     assert run.impacts.count / 20_000.0 == pytest.approx(0.4711, abs=0.002)
 
 
-def test_without_chatter_the_accuracy_asked_for_changes_nothing():
+def test_without_chatter_the_accuracy_requested_changes_nothing():
     finals = [integrate(rigid(0.8), BOUNCING, 2.0, level).final_state for level in Accuracy]
     np.testing.assert_array_equal(finals[0], finals[2])
     np.testing.assert_array_equal(finals[1], finals[2])

@@ -33,7 +33,7 @@ def ledger(tmp_path, monkeypatch):
     ],
     ids=["hertz", "hertz, automatic", "power:5", "linear", "with a tangent"],
 )
-def test_scenes_take_what_was_said_within_the_factor_that_was_said(ledger, contact, duration, observe):
+def test_scenes_take_what_was_stated_within_the_factor_that_was_stated(ledger, contact, duration, observe):
     random = np.random.default_rng(3)
     scenes = [
         Scene(

@@ -13,7 +13,7 @@ def ledger(tmp_path):
     return CostLedger(tmp_path / "costs" / "here.json")
 
 
-def test_where_nothing_was_run_a_plan_stands_as_it_is_and_says_how_little_is_known(ledger):
+def test_where_nothing_was_run_a_plan_stands_as_it_is_and_states_how_little_is_known(ledger):
     expected = ledger.expected(KIND, 2.0)
     assert (expected.time_s, expected.runs) == (2.0, 0)
     assert expected.factor >= 10.0
@@ -21,7 +21,7 @@ def test_where_nothing_was_run_a_plan_stands_as_it_is_and_says_how_little_is_kno
 
 
 @pytest.mark.parametrize("scatter", [0.05, 0.4, 1.0])
-def test_the_stated_factor_holds_as_often_as_it_says(ledger, scatter):
+def test_the_stated_factor_holds_as_often_as_it_states(ledger, scatter):
     random = np.random.default_rng(7)
     held = []
     for run in range(600):

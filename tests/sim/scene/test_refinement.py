@@ -102,14 +102,14 @@ def test_a_motion_without_contact_is_answered_in_closed_form():
     assert found.target.is_met
 
 
-def test_an_error_below_rounding_is_said_not_to_be_reached():
+def test_an_error_below_rounding_is_stated_not_to_be_reached():
     report = solve_scene(asked(error=1e-15)).target
     assert not report.is_met
     assert report.needed_s is None
     assert report.text.endswith("is not known")
 
 
-def test_an_answer_in_a_transient_says_that_it_is_not_settled():
+def test_an_answer_in_a_transient_states_that_it_is_not_settled():
     soon = solve_scene(asked(time_s=1e-6))
     settled = solve_scene(asked(error=1e-6))
     assert soon.error_estimate > abs(soon.response_i / settled.response_i - 1.0) > 1e-3

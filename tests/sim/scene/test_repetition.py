@@ -46,7 +46,7 @@ def test_a_torus_and_a_noise_do_not_repeat():
     assert repetition(section_of(noise), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_two_periods_that_hardly_differ_are_not_told_from_one_that_settles():
+def test_two_periods_that_hardly_differ_are_not_distinguished_from_one_that_settles():
     nearly_one = np.resize([1.0, 1.0 + 5e-6], COUNT)
     assert repetition(section_of(nearly_one), OMEGA, FORGETTING, SHARP) is None
 
@@ -66,10 +66,10 @@ def test_too_short_a_section_says_nothing():
     ],
     ids=["steady growth", "growth that ended", "neither", "still settling", "not looked at"],
 )
-def test_the_growth_of_a_small_change_says_what_does_not_repeat(logarithms, kind):
+def test_the_growth_of_a_small_change_states_what_does_not_repeat(logarithms, kind):
     growth = Growth(np.array(logarithms), 0.5 * len(logarithms))
     assert kind_of(None, growth, fading_s=0.25) is kind
 
 
-def test_what_repeats_is_periodic_however_a_change_grew():
+def test_anything_that_repeats_is_periodic_however_a_change_grew():
     assert kind_of(Repetition(3, 0.0), Growth(np.array([50.0]), 1.0), 0.25) is MotionKind.PERIODIC

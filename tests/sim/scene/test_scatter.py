@@ -22,12 +22,12 @@ def test_it_finds_the_known_scatter_of_a_gumbel_extreme():
     assert found.relative == pytest.approx(truth, rel=0.05)
 
 
-def test_few_blocks_say_nothing():
+def test_few_blocks_state_nothing():
     assert window_scatter(np.random.default_rng(5).uniform(1.0, 2.0, 3), 3) is None
 
 
 @pytest.mark.parametrize("blocks", [1, 5, 10])
-def test_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20(blocks):
+def test_two_windows_differ_by_no_more_than_is_stated_in_19_cases_of_20(blocks):
     """Normal extremes, where one block is a window; with more, what is said errs on the large side."""
     random = np.random.default_rng(6)
     inside = 0

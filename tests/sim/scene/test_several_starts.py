@@ -131,7 +131,7 @@ def test_a_run_of_given_length_has_its_ensemble_too():
         assert found.motion is MotionKind.CHAOTIC_SO_FAR
 
 
-def test_the_scatter_over_starts_is_that_of_their_responses():
+def test_the_scatter_over_starts_matches_their_responses():
     observe = (Observable.RESPONSE, Observable.SCATTER)
     periodic = solve_scene(scene("hertz", 130.0, 20e-6, observe=observe, duration=FixedDuration(4.0, 1.0)))
     assert periodic.scatter < 1e-5
@@ -152,14 +152,14 @@ def test_a_larger_budget_follows_more(short_chaos):
         replace(SHORT_CHAOS, budget_s=-1.0)
 
 
-def test_an_answer_for_json_says_every_motion(lottery):
+def test_an_answer_for_json_states_every_motion(lottery):
     said = lottery.to_dict()["ensemble"]
     assert set(said) == set(Ensemble.__dataclass_fields__)
     assert said["motions"][0]["share"]["share"] == lottery.ensemble.motions[0].share.share
     assert said["motions"][said["asked"]]["motion"] == str(lottery.motion)
 
 
-def test_more_starts_and_another_draw_can_be_asked_for():
+def test_more_starts_and_another_draw_can_be_requested():
     """The same motions, in shares that the other draw's intervals hold."""
     fast = scene("linear_gap", 562.8, 20e-6)
     many = solve_ensemble(fast, starts=24, seed=5)

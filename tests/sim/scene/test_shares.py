@@ -26,7 +26,7 @@ def test_the_intervals_of_all_shares_together_hold_about_19_times_in_20(shares):
     assert held / len(drawn) > 0.93
 
 
-def test_what_is_not_final_may_come_to_any_outcome():
+def test_anything_that_is_not_final_may_come_to_any_outcome():
     settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
     alone = wilson_share(6, 16)
     assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)

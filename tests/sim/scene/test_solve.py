@@ -66,7 +66,7 @@ def test_a_fixed_duration_answers_as_the_plain_run_does(contact, frequency_hz, a
 
 @pytest.mark.parametrize("accuracy", [Accuracy.QUICK, Accuracy.STANDARD])
 @pytest.mark.parametrize(("contact", "frequency_hz", "amplitude_m"), PERIODIC)
-def test_what_repeats_is_no_further_from_the_reference_than_it_says(
+def test_anything_that_repeats_is_no_further_from_the_reference_than_it_states(
     contact, frequency_hz, amplitude_m, accuracy
 ):
     scene = scene_of(contact, frequency_hz, amplitude_m, duration=AutomaticDuration(), accuracy=accuracy)
@@ -155,7 +155,7 @@ def test_responses_of_other_runs_of_the_same_chaos_lie_within_the_error_that_is_
     assert np.count_nonzero(outside) < 8
 
 
-def test_a_torus_is_told_from_chaos():
+def test_a_torus_is_distinguished_from_chaos():
     found = solve_scene(scene_of("power:3", 225.0, 5e-6, duration=AutomaticDuration()))
     assert found.motion is MotionKind.QUASI_PERIODIC
     assert found.scatter < 1e-3
@@ -208,7 +208,7 @@ def test_the_section_holds_a_state_for_every_period_of_the_window():
     np.testing.assert_allclose(quiet.section[-1], quiet.final_state, atol=1e-15)
 
 
-def test_the_exponent_is_that_of_the_motion_reached():
+def test_the_exponent_matches_the_motion_reached():
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
     chaos = solve_scene(replace(CHAOS, observe=observe))
     assert chaos.lyapunov_per_s == pytest.approx(112.0, abs=6.0 * chaos.lyapunov_error_per_s + 2.0)
@@ -217,7 +217,7 @@ def test_the_exponent_is_that_of_the_motion_reached():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
-def test_scatter_from_starts_is_there_when_it_is_asked_for():
+def test_scatter_from_starts_is_there_when_it_is_requested():
     observe = (Observable.RESPONSE, Observable.SCATTER)
     found = solve_scene(replace(CHAOS, observe=observe, duration=FixedDuration(3.0, 1.0)))
     assert 0.003 < found.scatter < 0.3

@@ -38,7 +38,7 @@ def test_the_responses_of_a_transient_are_off_by_no_more_than_is_stated(contact,
     assert found.error_estimate == errors(found).max()
 
 
-def test_a_transient_without_contact_is_exact_and_says_so():
+def test_a_transient_without_contact_is_exact_and_reports_it():
     found = solve_scene(scene_of("hertz", 100.0, 1e-30, duration=FixedDuration(3.0, 1.0)))
     assert found.motion is MotionKind.UNDECIDED
     assert np.all(errors(found) < 1e-10)
@@ -70,7 +70,7 @@ def test_lines_of_a_motion_that_settles_in_its_window_are_the_same_question_at_e
         assert np.all(off <= errors(found) + errors(reference))
 
 
-def test_what_wanders_without_damping_differs_between_starts_by_no_more_than_is_stated():
+def test_anything_that_wanders_without_damping_differs_between_starts_by_no_more_than_is_stated():
     """Of 4 responses of 6 other starts, 19 in 20 should lie within; fewer than 16 are one chance in 10^4."""
     scene = scene_of("hunt_crossley:1", 64.4, 20e-6, 0.0, duration=FixedDuration(3.0, 1.0))
     found = solve_scene(scene)
@@ -88,7 +88,7 @@ def test_what_wanders_without_damping_differs_between_starts_by_no_more_than_is_
     assert np.count_nonzero(inside) >= 16
 
 
-def test_lines_of_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20():
+def test_lines_of_two_windows_differ_by_no_more_than_is_stated_in_19_cases_of_20():
     random, inside = np.random.default_rng(7), 0
     for _ in range(1000):
         one, another = (5.0 + 0.4 * (random.normal(size=10) + 1j * random.normal(size=10)) for _ in range(2))

@@ -201,7 +201,7 @@ def test_a_small_drive_never_touches_the_rubber_stops():
     assert table.structure["limited_steps"] == 0
 
 
-def test_a_motion_that_is_not_finite_is_an_error_that_says_where():
+def test_a_motion_that_is_not_finite_is_an_error_that_states_where():
     table = shaken()
     drive = np.zeros(100)
     drive[40] = np.nan
@@ -209,7 +209,7 @@ def test_a_motion_that_is_not_finite_is_an_error_that_says_where():
         table.move(drive, np.zeros(100))
 
 
-def test_the_state_at_the_ends_of_steps_is_kept_only_when_asked_for():
+def test_the_state_at_the_ends_of_steps_is_kept_only_when_requested():
     table = shaken()
     assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
     assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))

@@ -45,7 +45,7 @@ def complex_tones(samples, rate_hz, frequencies_hz):
 
 
 @pytest.mark.parametrize("rate_hz", [5120.0, 44_100.0])
-def test_weak_tones_come_out_as_the_closed_form_says_in_size_and_phase(rate_hz):
+def test_weak_tones_come_out_as_the_closed_form_states_in_size_and_phase(rate_hz):
     tones_hz = np.array([60.0, 94.0, 201.0, 310.0, 520.0])
     time_s = np.arange(round(7 * rate_hz)) / rate_hz
     volts = 1e-3 * np.sum(np.cos(2 * np.pi * np.outer(tones_hz, time_s)), axis=0)

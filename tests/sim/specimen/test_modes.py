@@ -79,7 +79,7 @@ def test_a_negative_frequency_is_refused():
 
 
 @pytest.mark.parametrize("heavier", [1e2, 1e6, 1e10])
-def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_says(heavier):
+def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_states(heavier):
     omega, damping = 0.8, 0.02
     specimen = dataclasses.replace(
         gong2025(),
@@ -92,7 +92,7 @@ def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_says(heavier):
 
 
 @pytest.mark.parametrize("damping_time_s", [0.3, 30.0])
-def test_modes_far_above_critical_damping_are_told_apart(damping_time_s):
+def test_modes_far_above_critical_damping_are_distinguished(damping_time_s):
     """Proportional damping: the rates s of each mode solve s^2 + omega^2 (1 + damping_time s) = 0."""
     specimen = gong2025(damping_time_s=damping_time_s)
     root = np.sqrt(np.asarray(specimen.masses))
@@ -103,7 +103,7 @@ def test_modes_far_above_critical_damping_are_told_apart(damping_time_s):
     )
 
 
-def test_a_slow_mode_beside_fast_dampings_is_told_apart():
+def test_a_slow_mode_beside_fast_dampings_is_distinguished():
     specimen = dataclasses.replace(gong2025(), dampings=(1e4, 0.3, 3e6))
     rates = modal_form(specimen).rates
     system, _ = state_matrix(specimen)

@@ -67,7 +67,7 @@ def test_dampers_that_couple_the_modes_have_the_ratios_of_the_poles():
     np.testing.assert_allclose(specimen.damping_ratios, [0.71605, 0.16889, 0.03498], atol=1e-5)
 
 
-def test_ratios_of_modes_that_hardly_couple_are_those_of_modes_that_do_not():
+def test_ratios_of_modes_that_hardly_couple_match_modes_that_do_not():
     """The poles of an overdamped mode are real: two of them, whose product is the square of its frequency."""
     for damping_time_s in (2e-5, 1e-2):
         alone = gong2025(damping_time_s=damping_time_s)

@@ -71,7 +71,7 @@ def test_every_shipped_specimen_can_be_moved(name):
     assert math.isfinite(response.response_i)
 
 
-def test_two_masses_are_those_of_their_own_equations_in_and_out_of_contact():
+def test_two_masses_match_their_own_equations_in_and_out_of_contact():
     specimen = load_specimen("two_masses").specimen()
     (_, m1, m2), (_, k1, k2), (_, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
     frequency_hz = np.linspace(20.0, 600.0, 59)
@@ -92,7 +92,7 @@ def test_two_masses_are_those_of_their_own_equations_in_and_out_of_contact():
     assert one.relative_ii == pytest.approx(other.relative_ii, rel=1e-3)
 
 
-def test_a_file_says_every_number_itself(tmp_path):
+def test_a_file_states_every_number_itself(tmp_path):
     specimen = load_specimen(written(tmp_path, WHOLE)).specimen()
     assert specimen.stiffnesses == (2e4, 800.0, 1.2e4)
     assert specimen.gaps_m == (30e-6, math.inf)

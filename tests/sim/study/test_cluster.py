@@ -118,7 +118,7 @@ def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
 
 
 @pytest.mark.slow
-def test_a_cluster_that_dies_is_told_and_what_was_kept_goes_on_elsewhere(
+def test_a_cluster_that_dies_is_reported_and_what_was_kept_continues_elsewhere(
     cluster, longer, truth, tmp_path, require_equal
 ):
     running, address, _ = cluster

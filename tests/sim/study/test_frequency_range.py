@@ -39,7 +39,7 @@ def test_ranges_and_numbers_mix_and_overlaps_count_once():
     assert expand_ranges(given) == [1.0, 2.0, 2.25, 2.5, 3]
 
 
-def test_what_is_no_range_is_left_to_its_validator():
+def test_anything_that_is_no_range_is_left_to_its_validator():
     assert expand_ranges("all") == "all"
     assert expand_ranges({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
     assert expand_ranges([1.0, "two"]) == [1.0, "two"]

@@ -46,7 +46,7 @@ def answers(curve):
         ({"gaps_m": [30e-6, 45e-6], "frequencies_hz": [100.0, 130.0, 160.0, 190.0]}, False),
     ],
 )
-def test_lanes_are_taken_where_a_specimen_is_followed_for_long_and_no_point_waits(changed, in_lanes):
+def test_batches_are_taken_where_a_specimen_is_followed_for_long_and_no_point_waits(changed, in_lanes):
     plan = Study(**{**CURVE, "duration_s": 20.0, "window_s": 1.0} | changed)
     assert (study_solver(plan) == InBatches()) is in_lanes
 
@@ -55,7 +55,7 @@ def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, 
     require_equal(solve_study(curve, workers=3), answers)
 
 
-def test_a_point_of_a_curve_says_what_it_says_alone(curve, answers):
+def test_a_point_of_a_curve_states_what_it_states_alone(curve, answers):
     for place in (4, 11, 19):
         alone = solve_in_lanes(curve.scene((0, 0, 0, 0, 0, place), Rest()))
         frequency_hz = curve.frequencies_hz[place]
@@ -66,7 +66,7 @@ def test_a_point_of_a_curve_says_what_it_says_alone(curve, answers):
         )
 
 
-def test_where_the_start_is_kept_lanes_answer_what_one_motion_alone_does_within_what_both_state():
+def test_where_the_start_is_kept_batches_answer_what_one_motion_alone_does_within_what_both_state():
     scenes = [
         Scene(
             gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(20.0, 1.0), budget_s=0.05
@@ -87,7 +87,7 @@ def test_where_the_start_is_kept_lanes_answer_what_one_motion_alone_does_within_
     assert kept.count(MotionKind.PERIODIC) >= 3
 
 
-def test_what_lanes_do_not_serve_is_answered_as_without_them():
+def test_what_batches_do_not_serve_is_answered_as_without_them():
     drive, length = Harmonic(130.0, 20e-6), FixedDuration(2.0, 0.5)
     scenes = [
         Scene(gong2025(contact="rigid:0.5"), drive, duration=length, budget_s=0.0),
@@ -139,7 +139,7 @@ def test_work_that_nobody_can_compute_is_planned_as_none():
     assert np.isfinite(planned_work_s(study))
 
 
-def test_what_has_reached_its_attractor_goes_through_lanes():
+def test_anything_that_has_reached_its_attractor_goes_through_batches():
     # Chaos is another draw there, which is how one sees it.
     scene = Scene(gong2025(), Harmonic(260.3, 20e-6), duration=FixedDuration(6.0, 0.5), budget_s=0.0)
     assert solve_in_lanes(scene).final_state != solve_scene(scene).final_state

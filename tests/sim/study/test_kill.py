@@ -64,7 +64,9 @@ def resumed(path):
 
 
 @pytest.mark.thorough
-def test_a_killed_study_goes_on_and_ends_like_one_that_was_never_interrupted(tmp_path, truth, require_equal):
+def test_a_killed_study_continues_and_ends_like_one_that_was_never_interrupted(
+    tmp_path, truth, require_equal
+):
     path, luck = tmp_path / "a.h5", random.Random(0)
     promised = killed(path, tmp_path / "words", luck.randint(1, 40), luck.uniform(0.0, 0.4))
     kept = open_study(path)

@@ -20,7 +20,7 @@ def test_only_a_base_that_moves_by_more_than_a_thousand_gaps_is_doubted(amplitud
     assert len(said([5e-7, amplitude_m])) == count
 
 
-def test_the_largest_amplitude_is_held_against_the_narrowest_gap():
+def test_the_largest_amplitude_is_checked_against_the_narrowest_gap():
     assert len(said([2e-3, 1e-6], gaps_m=(45e-6, 1e-6))) == 1
     assert len(said([2e-3, 1e-6], gaps_m=(45e-6, 3e-6))) == 0
 

@@ -46,7 +46,7 @@ def test_a_follower_of_what_was_done_before_may_begin_at_once():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_what_is_learnt_of_a_neighbour_changes_the_order():
+def test_anything_that_is_learnt_of_a_neighbour_changes_the_order():
     scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
     assert scheduler.take(0.1, 1) == (3,)
     scheduler.finish(3)

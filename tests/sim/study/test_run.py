@@ -87,7 +87,7 @@ def alone(frequency_hz, amplitude_m, start):
     )
 
 
-def test_a_point_says_what_one_scene_alone_says(small, truth):
+def test_a_point_states_what_one_scene_alone_states(small, truth):
     one = alone(260.0, 20e-6, Rest())
     point = {"amplitude": 20e-6, "frequency": 260.0, "start": "rest"}
     assert truth.values("response_i", **point).item() == one.response_i
@@ -96,7 +96,7 @@ def test_a_point_says_what_one_scene_alone_says(small, truth):
     np.testing.assert_array_equal(truth.values("final_state", **point).ravel(), one.final_state)
 
 
-def test_a_chain_goes_on_from_where_its_predecessor_ended(small, truth):
+def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
     first = alone(200.0, 20e-6, Rest())
     # 200 Hz for 0.2 s are whole turns: the drive goes on at phase zero.
     second = alone(230.0, 20e-6, Given(first.final_state))
@@ -125,7 +125,7 @@ def test_the_base_does_not_jump_where_a_chain_changes_frequency():
     assert list(results.values(CONTINUES).ravel()) != list(range(3))
 
 
-def test_predictions_say_where_they_began(truth):
+def test_predictions_state_where_they_began(truth):
     starts = {(each.start, each.frequency_hz) for each in truth.predictions()}
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
 
@@ -188,7 +188,7 @@ class SolverThatStops:
         )
 
 
-def test_a_run_that_did_not_reach_its_end_is_told_apart(small):
+def test_a_run_that_did_not_reach_its_end_is_distinguished(small):
     store = MemoryStore(small)
     executor = ThreadExecutor(1, SolverThatStops())
     run_study(small, executor, store)

@@ -65,7 +65,7 @@ def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_sce
     assert fields == kept | of_the_study | of_any_length | of_the_call
 
 
-def test_what_comes_out_of_the_file_is_what_went_in(small, tmp_path, require_equal):
+def test_anything_that_comes_out_of_the_file_is_what_went_in(small, tmp_path, require_equal):
     in_memory = solve_study(small)
     in_file = solve_study(small, tmp_path / "a.h5")
     require_equal(in_file, in_memory)
@@ -140,7 +140,7 @@ def test_nothing_in_the_file_needs_a_new_reader(small, tmp_path):
         file.visititems(require_plain)
 
 
-def test_sessions_say_who_computed_which_point(small, tmp_path):
+def test_sessions_state_who_computed_which_point(small, tmp_path):
     path = tmp_path / "a.h5"
     make_file(path, small)
     count = itertools.count()
@@ -177,7 +177,7 @@ def test_a_complete_study_is_not_touched_when_it_is_resumed(small, tmp_path):
     assert path.read_bytes() == before
 
 
-def test_identities_are_those_of_the_scenes(small, tmp_path):
+def test_identities_match_the_scenes(small, tmp_path):
     results = solve_study(small, tmp_path / "a.h5")
     kept = [bytes(each).decode() for each in results.arrays[IDENTITY]]
     assert len(set(kept)) == small.grid.size - 4, "a chain's first point is the scene that starts at rest"
@@ -226,7 +226,7 @@ def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small,
     FileStore(path, small).close()
 
 
-def test_whoever_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_path):
+def test_anyone_who_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_path):
     """A reader holds HDF5's lock while it looks: a study that began just then was refused its own file."""
     path = tmp_path / "a.h5"
     make_file(path, small)
@@ -241,7 +241,7 @@ def test_whoever_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_path):
     ("content", "said"),
     [(None, "does not exist, or is no file"), (b"", "is no readable HDF5"), (b"text", "is no readable HDF5")],
 )
-def test_what_is_no_study_is_refused_in_one_sentence(tmp_path, content, said):
+def test_anything_that_is_no_study_is_refused_in_one_sentence(tmp_path, content, said):
     path = tmp_path / "a.h5"
     if content is not None:
         path.write_bytes(content)

@@ -20,7 +20,7 @@ def test_a_study_comes_back_from_json_as_it_was():
     assert Study.model_validate_json(study.model_dump_json()) == study
 
 
-def test_the_specimen_is_the_papers_when_nothing_else_is_said():
+def test_the_specimen_is_the_papers_when_nothing_else_is_stated():
     study = Study(**LEAST)
     assert study.specimen.specimen() == gong2025()
     assert study.specimen.specimen("power:5", 0.0, 30e-6) == gong2025(0.0, 30e-6, "power:5")
@@ -85,7 +85,7 @@ def test_differences_name_what_differs():
         ("frequencys", [1.0], "frequencys"),
     ],
 )
-def test_what_is_not_allowed_is_named(key, value, said):
+def test_anything_that_is_not_allowed_is_named(key, value, said):
     with pytest.raises(ValidationError, match=said):
         Study.model_validate({**LEAST, key: value})
 

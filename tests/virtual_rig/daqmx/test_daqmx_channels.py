@@ -169,7 +169,7 @@ def test_a_setting_of_a_list_of_channels_reaches_all_of_them(task):
     assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2
 
 
-def test_only_the_device_that_detects_overloads_tells_them_and_only_while_running(task, daq):
+def test_only_the_device_that_detects_overloads_shows_them_and_only_while_running(task, daq):
     daq.world.gain = 6.0  # 12 V on ai1
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
@@ -182,7 +182,7 @@ def test_only_the_device_that_detects_overloads_tells_them_and_only_while_runnin
     assert not task.in_stream.overloaded_chans_exist
 
 
-def test_the_module_says_that_it_does_not_detect_overloads(task):
+def test_the_module_states_that_it_does_not_detect_overloads(task):
     task.ai_channels.add_ai_voltage_chan(MODULE)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()

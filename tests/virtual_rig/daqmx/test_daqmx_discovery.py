@@ -35,7 +35,7 @@ def test_every_device_is_listed_with_product_and_serial_number(system):
     assert all(serials)
 
 
-def test_the_ni_9234_shows_what_its_manual_says(system):
+def test_the_ni_9234_shows_what_its_manual_states(system):
     module = system.devices["cDAQ1Mod1"]
     assert module.product_category is ProductCategory.C_SERIES_MODULE
     assert [channel.name for channel in module.ai_physical_chans] == [f"cDAQ1Mod1/ai{n}" for n in range(4)]
@@ -62,7 +62,7 @@ def test_an_unknown_device_is_refused_with_the_devices_there_are(system):
     assert caught.value.error_code == DAQmxErrors.INVALID_DEVICE_ID
 
 
-def test_a_device_can_bear_the_name_a_configuration_gives_it(connect):
+def test_a_device_can_have_the_name_a_configuration_gives_it(connect):
     daq = connect(catalogue=catalogue_with("NI 9234", "cDAQ2Mod5"))
     system = System.remote(daq.options)
     assert system.devices["cDAQ2Mod5"].product_type == "NI 9234"
@@ -75,7 +75,7 @@ def test_an_impossible_system_is_refused(product, name):
 
 
 @given(st.floats(NI_9234.inputs.rates.minimum_hz, NI_9234.inputs.rates.maximum_hz))
-def test_a_9234_rate_is_the_next_one_up_and_stays_when_asked_for_again(rate_hz):
+def test_a_9234_rate_is_the_next_one_up_and_stays_when_requested_again(rate_hz):
     rates = NI_9234.inputs.rates
     actual = rates.next_up(rate_hz)
     available = 51200 / np.arange(1, 32)

@@ -36,7 +36,7 @@ def refused(call):
     return caught.value.error_code
 
 
-def test_what_was_read_stands_in_the_file_with_units_interval_and_begin(task, tmp_path):
+def test_anything_that_was_read_stands_in_the_file_with_units_interval_and_begin(task, tmp_path):
     logging(task, tmp_path / "read.tdms")
     task.start()
     before = datetime.now(UTC)
@@ -51,7 +51,7 @@ def test_what_was_read_stands_in_the_file_with_units_interval_and_begin(task, tm
         assert abs((began - before).total_seconds()) < 60
 
 
-def test_a_file_is_replaced_and_what_no_program_asks_for_is_refused(task, tmp_path):
+def test_a_file_is_replaced_and_what_no_program_requests_is_refused(task, tmp_path):
     path = tmp_path / "some.tdms"
     for samples in (100, 64):
         logging(task, path)

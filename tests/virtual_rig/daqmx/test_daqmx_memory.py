@@ -59,7 +59,7 @@ def test_samples_that_nobody_reads_are_lost_at_last_where_none_are_lost_usually(
 
 
 @pytest.mark.parametrize("pace", [None, WallPace(speed=5.0)])
-def test_a_world_that_cannot_go_on_is_told_to_whoever_reads_and_whoever_asks_later(connect, pace):
+def test_a_world_that_cannot_go_on_is_reported_to_anyone_who_reads_and_anyone_who_asks_later(connect, pace):
     daq = connect(pace)
 
     def stand_still(*_):

@@ -133,7 +133,7 @@ def test_a_task_without_a_clock_reads_on_demand_where_the_device_can(daq):
     assert np.shape(task.read(5)) == (2, 5)
 
 
-def test_a_delta_sigma_device_runs_its_clock_at_the_default_rate_without_being_asked(daq):
+def test_a_delta_sigma_device_runs_its_clock_at_the_default_rate_by_default(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1")
     assert task.timing.samp_timing_type is SampleTimingType.SAMPLE_CLOCK
@@ -165,7 +165,7 @@ def test_waveforms_carry_samples_times_names_and_units(task):
     ]
 
 
-def test_a_waveform_has_no_more_than_was_asked_for(task):
+def test_a_waveform_has_no_more_than_was_requested(task):
     task.in_stream.waveform_attribute_mode = WaveformAttributeMode.NONE
     waveform = task.read_waveform(8)[0]
     assert not waveform.timing.has_start_time
@@ -195,7 +195,7 @@ def test_a_task_stays_reserved_through_a_stop_if_it_was_reserved_before(task, da
     rival.start()
 
 
-def test_the_world_is_told_to_stop_converting(task, daq):
+def test_the_world_is_commanded_to_stop_converting(task, daq):
     task.read(10)
     assert len(daq.world.conversions) == 1
     task.stop()

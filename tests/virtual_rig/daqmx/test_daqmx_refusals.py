@@ -85,7 +85,7 @@ def test_a_second_task_of_a_name_is_refused_or_joined_as_the_program_wishes(daq,
     assert code_of(lambda: Task("nothing", grpc_options=join)) == DAQmxErrors.INVALID_TASK
 
 
-def test_waiting_for_a_task_that_does_not_end_says_so(task):
+def test_waiting_for_a_task_that_does_not_end_reports_it(task):
     task.start()
     assert code_of(lambda: task.wait_until_done(timeout=0.01)) == (
         DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
@@ -112,7 +112,7 @@ def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
     assert daq.world.played["Dev1/ao0"][0].start_s == 0.25
 
 
-def test_a_read_past_the_end_brings_what_there_is_and_says_so(daq):
+def test_a_read_past_the_end_brings_what_there_is_and_reports_it(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
     task.timing.cfg_samp_clk_timing(1000, samps_per_chan=30)
@@ -122,7 +122,7 @@ def test_a_read_past_the_end_brings_what_there_is_and_says_so(daq):
     assert caught.value.samps_per_chan_read == 30
 
 
-def test_a_chassis_tells_its_trigger_terminal_once_it_is_reserved(daq):
+def test_a_chassis_shows_its_trigger_terminal_once_it_is_reserved(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
     assert code_of(lambda: task.triggers.start_trigger.term) == (

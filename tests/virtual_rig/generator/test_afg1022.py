@@ -177,7 +177,7 @@ def test_reset_is_a_sine_of_one_megahertz_and_one_volt_with_the_output_off():
     assert ask(device, "OUTP?;:OUTP2?;:FUNC?;:FREQ?;:VOLT?;:VOLT:OFFS?") == "0;0;SIN;1.0E+06;1.0E+00;0.0E+00"
 
 
-def test_the_event_register_tells_kinds_of_error_apart_and_clears_when_read():
+def test_the_event_register_distinguishes_kinds_of_error_and_clears_when_read():
     device = generator()
     assert ask(device, "*ESR?") == "128"  # power on
     device.execute(b"NONSENSE")
@@ -265,7 +265,7 @@ def test_the_duty_is_set_and_complained_about():
 
 
 @pytest.mark.parametrize("mode", MODULATIONS)
-def test_a_modulation_left_on_at_the_panel_is_told_and_switched_off(mode):
+def test_a_modulation_left_on_at_the_panel_is_reported_and_switched_off(mode):
     device = generator()
     device.configure(1, replace(device.settings(1), mode=mode))
     assert ask(device, f"{mode.value}:STAT?") == "1"

@@ -90,7 +90,7 @@ def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
     assert rig.render(4) == pytest.approx([1, 1, 0.25 * 1 + 0.75 * 3, 3])
 
 
-def test_what_is_already_rendered_is_never_changed_afterwards():
+def test_anything_that_is_already_rendered_is_never_changed_afterwards():
     rig = Rig()
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")
@@ -200,7 +200,7 @@ def test_a_gated_burst_never_opens_because_the_gate_input_is_empty():
     assert rig.render(2000) == pytest.approx(np.zeros(2000), abs=1e-12)
 
 
-def test_noise_is_accepted_but_the_shape_before_goes_on_playing():
+def test_noise_is_accepted_but_the_shape_before_continues_playing():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON;:FUNC PRN")
     assert rig.generator.execute(b"FUNC?").data == b"PRN\n"

@@ -208,7 +208,7 @@ def test_an_address_in_use_starts_nothing():
         assert serials_on_the_bus() == ["C060606"]
 
 
-def test_the_drivers_scale_says_the_step_that_the_samples_really_have(switch_on):
+def test_the_drivers_scale_states_the_step_that_the_samples_really_have(switch_on):
     program = switch_on()
     program.play(260, 1.0)
     task = program.task()
@@ -219,7 +219,7 @@ def test_the_drivers_scale_says_the_step_that_the_samples_really_have(switch_on)
         assert np.array_equal(np.rint(row / coefficients[1]) * coefficients[1], row)
 
 
-def test_the_devices_bear_the_names_that_the_rig_gives_them(switch_on):
+def test_the_devices_have_the_names_that_the_rig_gives_them(switch_on):
     named = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"device": "ShakerDaq"})})
     program = switch_on(named)
     system = nidaqmx.system.System.remote(program.options)

@@ -76,7 +76,7 @@ def test_a_program_in_another_process_needs_one_line(rig):
     assert np.any(rig.generator.render(0.0, 1e-7, 100))
 
 
-def test_the_proxy_says_about_itself_what_the_device_says(rig, proxy):
+def test_the_proxy_states_about_itself_what_the_device_states(rig, proxy):
     assert proxy.identification == rig.cable.identification
 
 

@@ -91,13 +91,13 @@ def test_a_termination_character_ends_a_transfer_early():
     assert host.read() == (b"1\n", True)
 
 
-def test_a_new_message_throws_away_an_unread_reply_and_says_so():
+def test_a_new_message_throws_away_an_unread_reply_and_reports_it():
     host = Host()
     host.write(b"*IDN?")
     assert host.ask(b"SYST:ERR?") == b'-410,"Query INTERRUPTED"\n'
 
 
-def test_a_read_without_a_query_times_out_and_says_so():
+def test_a_read_without_a_query_times_out_and_reports_it():
     host = Host()
     with pytest.raises(TimeoutError):
         host.read()

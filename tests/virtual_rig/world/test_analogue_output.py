@@ -15,7 +15,7 @@ GRID_RATE_HZ = USUAL_GRID.rate_hz
     st.lists(st.floats(-3.5, 3.5), min_size=1, max_size=50),
     st.lists(st.integers(1, 200), min_size=1, max_size=5),
 )
-def test_the_integral_of_what_is_played_is_that_of_what_was_queued(rate_hz, volts, blocks):
+def test_the_integral_of_what_is_played_matches_what_was_queued(rate_hz, volts, blocks):
     output, step = AnalogueOutput(), 0
     output.queue(np.array(volts), rate_hz, 0)
     played = []

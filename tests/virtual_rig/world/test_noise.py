@@ -17,7 +17,7 @@ def test_blocks_of_any_size_join_to_the_same_noise(sizes, first):
     assert np.array_equal(np.concatenate(parts), whole)
 
 
-def test_no_samples_can_be_asked_for():
+def test_no_samples_can_be_requested():
     assert NoiseStream(1, "here").draw(17, 0).shape == (0,)
 
 

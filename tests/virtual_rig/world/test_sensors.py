@@ -74,7 +74,7 @@ def test_the_accelerometer_clips_at_its_full_scale():
     assert volts[-1] == limit
 
 
-def test_the_decoders_whole_delay_is_that_of_its_bandwidth_and_the_rest():
+def test_the_decoders_whole_delay_matches_its_bandwidth_and_the_rest():
     config = RIG.vibrometer
     bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz)
     assert vibrometer().delay_steps / GRID_RATE_HZ + bandwidth_s == pytest.approx(config.delay_s)

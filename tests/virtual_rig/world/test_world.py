@@ -69,7 +69,7 @@ def phasor(volts, frequency_hz, sample_rate_hz, first_sample=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0])
-def test_every_channel_shows_what_the_model_of_rig_and_specimen_says(frequency_hz):
+def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency_hz):
     world, amplitude_v = World(QUIET, Tone(frequency_hz, 5e-3)), 5e-3
     sampler = world.sample(INPUTS, 51_200.0)
     settle = 150_000
@@ -122,7 +122,7 @@ def test_every_sample_is_an_exact_multiple_of_the_converters_step():
         assert len(np.unique(row)) > 1000
 
 
-def test_an_input_beyond_its_range_clips_and_says_so_once():
+def test_an_input_beyond_its_range_clips_and_reports_it_once():
     world = World(QUIET, Tone(100.0, 12.0))
     sampler = world.sample((Input("cDAQ1Mod1/ai0", 5.0, Coupling.DC),), 51_200.0)
     volts = sampler.read(5000)
@@ -169,7 +169,7 @@ def world_begin(time_s):
     return round(time_s * GRID_RATE_HZ) / GRID_RATE_HZ
 
 
-def test_the_world_is_computed_as_far_as_it_is_asked_for():
+def test_the_world_is_computed_as_far_as_it_is_requested():
     world = World(QUIET, Silence())
     world.advance(0.25)
     assert world.time_s == pytest.approx(0.25, abs=STEP_S)
@@ -283,7 +283,7 @@ class Broken:
         return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)
 
 
-def test_a_motion_that_is_lost_is_told_and_the_world_stands_still():
+def test_a_motion_that_is_lost_is_reported_and_the_world_stands_still():
     world = World(RIG, Broken())
     conversion = world.sample(INPUTS, 51200.0)
     assert np.all(np.isfinite(conversion.read(20000)))

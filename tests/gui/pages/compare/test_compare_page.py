@@ -148,7 +148,7 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
 
 
 @pytest.mark.thorough
-def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, tmp_path, waited):
+def test_anything_that_cannot_be_analysed_or_written_reports_it_and_spoils_nothing(working, tmp_path, waited):
     notices = []
     working.context.noticed.connect(notices.append)
     working.add_prediction((mode("model"),))
@@ -162,7 +162,7 @@ def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, 
     assert len(working.curves.curves) == known
 
 
-def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_told(page):
+def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_reported(page):
     frequency_hz = np.arange(100.0, 300.0)
     ones, none = np.ones_like(frequency_hz), np.full_like(frequency_hz, np.nan)
     curves = {

@@ -177,7 +177,7 @@ def test_a_recording_without_overview_is_opened_all_the_same(opened):
     assert np.nanmax(drawn(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
 
-def test_a_broken_file_says_why_and_what_to_do(page, opened, folder, qtbot):
+def test_a_broken_file_states_why_and_what_to_do(page, opened, folder, qtbot):
     with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "no readable HDF5 file" in said.args[0].what
@@ -223,7 +223,7 @@ def test_a_search_leaves_rows_that_hold_the_words(page):
     assert page.table.model().rowCount() == 4
 
 
-def test_a_campaign_says_how_far_it_is_and_shows_its_own_recordings(page):
+def test_a_campaign_states_how_far_it_is_and_shows_its_own_recordings(page):
     assert page.campaigns.isVisible()
     assert page.campaigns.itemText(1) == "▲ night: 1 of 3 done, 1 queued, 1 failed"
     page.campaigns.setCurrentIndex(1)
@@ -378,7 +378,7 @@ def test_a_forged_note_is_not_shown(record, tmp_path):
     assert "not as they were saved: results note" in said
 
 
-def test_the_facts_say_a_state_once(begin_recording, tmp_path):
+def test_the_facts_state_a_state_once(begin_recording, tmp_path):
     writer, _ = begin_recording(tmp_path, "ended")
     path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
     with open_recording(path) as recording:
@@ -398,7 +398,7 @@ HINTS = (("broken.h5", "broken.h5"), ("whole.h5", "Reading|Working|Zoom in"), ("
 
 
 @pytest.mark.parametrize(("name", "hint"), HINTS)
-def test_no_picture_asks_for_a_recording_while_one_is_chosen(
+def test_no_picture_requests_a_recording_while_one_is_chosen(
     page, folder, tmp_path, name, hint, begin_recording
 ):
     path = folder / name

@@ -53,7 +53,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
     assert not np.array_equal(page.map.image.image, before)
 
 
-def test_what_is_in_sight_is_computed_finer(page, waited):
+def test_anything_that_is_in_sight_is_computed_finer(page, waited):
     mapped(page, waited)
     page.map.plot.setXRange(110.0, 120.0, padding=0.0)
     page.map.plot.setYRange(-5.2, -5.0, padding=0.0)
@@ -93,7 +93,7 @@ def test_a_level_lies_on_the_map_as_a_line(page):
     assert up.tolist() == [6e-6, 7e-6]
 
 
-def test_what_is_too_large_for_a_window_is_told(page):
+def test_anything_that_is_too_large_for_a_window_is_reported(page):
     page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
     assert not page._begin.isEnabled()
     assert "810000 points are too many for a window" in page.form.complaint
@@ -122,7 +122,7 @@ def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
     page.cancel()
 
 
-def test_before_a_map_the_axes_show_what_the_form_says_also_with_a_level(context, qtbot):
+def test_before_a_map_the_axes_show_what_the_form_states_also_with_a_level(context, qtbot):
     """With a recorded level they ran from 10 to 10^6 um."""
     page = MapsPage(context)
     qtbot.addWidget(page)

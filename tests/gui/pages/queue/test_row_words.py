@@ -20,7 +20,7 @@ def test_a_row_names_the_level_of_the_base_and_a_sweep_its_kind():
     assert (what["sweep"], what["branch"]) == ("sine sweep, 1.5 Vpp", "sweep of dwell")
 
 
-def test_rows_say_levels_and_what_the_folder_holds_already(tmp_path):
+def test_rows_state_levels_and_what_the_folder_holds_already(tmp_path):
     """After the window was opened again everything was said to be planned."""
     campaign = load_campaign(CAMPAIGNS / "quick.toml")
     seen = replace(preview_campaign((campaign, None, tmp_path)), complete=frozenset({"dwell"}))
@@ -42,6 +42,6 @@ def test_rows_say_levels_and_what_the_folder_holds_already(tmp_path):
         ("queued", "", "queued"),
     ],
 )
-def test_a_state_is_said_once(state, reason, said):
+def test_a_state_is_stated_once(state, reason, said):
     row = RowStatus(name="dwell", state=state, reason=reason, file="")
     assert point_rows(None, (row,), EngineState.RUNNING)[0][3] == said

@@ -28,7 +28,7 @@ def opened(qapp, tmp_path):
     ("text", "why"),
     [(None, "cannot be read"), ("name = 3 4", "is not valid TOML"), ("name = 'a'", "generator")],
 )
-def test_a_bench_that_cannot_be_used_says_why_and_is_not_remembered(opened, tmp_path, text, why):
+def test_a_bench_that_cannot_be_used_states_why_and_is_not_remembered(opened, tmp_path, text, why):
     bench = tmp_path / "bench.toml"
     if text is not None:
         bench.write_text(text, encoding="utf-8")

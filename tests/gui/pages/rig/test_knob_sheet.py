@@ -26,7 +26,7 @@ def test_a_sheet_needs_every_tick_and_a_name(qtbot):
     assert form.sheet() is None
 
 
-def test_a_simulated_rig_asks_for_nothing(qtbot):
+def test_a_simulated_rig_requests_nothing(qtbot):
     form = KnobSheetForm()
     qtbot.addWidget(form)
     form.show_rig(load_rig(CONFIGS / "virtual_rig.toml"))

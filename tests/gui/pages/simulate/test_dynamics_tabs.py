@@ -55,7 +55,7 @@ def asked(view, request):
 
 
 @pytest.mark.thorough
-def test_branches_are_found_drawn_and_told_with_error_and_cost(page, waited):
+def test_branches_are_found_drawn_and_reported_with_error_and_cost(page, waited):
     view = page.branches
     asked(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
     assert view.simulator.is_busy
@@ -142,7 +142,7 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
 
 
 @pytest.mark.thorough
-def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_said(page, waited, tmp_path):
+def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_stated(page, waited, tmp_path):
     view = page.chain
     asked(view, ChainRequest(lengths=(2, 5), drive="none"))
     waited(lambda: not view.simulator.is_busy, 100.0)
@@ -157,7 +157,7 @@ def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_said(p
     assert view.simulator.background.workers[0].process.is_alive()
 
 
-def test_what_is_not_allowed_cannot_be_asked(page):
+def test_anything_that_is_not_allowed_cannot_be_asked(page):
     view = page.branches
     view.form.form.show_content({"method": "first-order"})
     assert not view._begin.isEnabled()
@@ -172,7 +172,7 @@ def test_a_dark_theme_reaches_the_tabs(page):
 
 
 @pytest.mark.parametrize("name", ["branches", "spectrum", "chain"])
-def test_while_a_tab_still_looks_it_says_so_and_gives_no_answer(page, name):
+def test_while_a_tab_still_looks_it_reports_it_and_gives_no_answer(page, name):
     """Branches said: no periodic motion was found; 0.0 s."""
     view = getattr(page, name)
     view.begin()

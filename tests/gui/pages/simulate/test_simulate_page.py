@@ -66,7 +66,7 @@ def test_cancelling_is_at_once_and_keeps_what_was_found(page, waited):
     assert page.progress.done == page.progress.asked == 6
 
 
-def test_a_dead_process_is_told_and_the_next_request_begins_another(page, waited):
+def test_a_dead_process_is_reported_and_the_next_request_begins_another(page, waited):
     said = []
     page.context.noticed.connect(said.append)
     asked(page, step_hz=0.05)
@@ -80,7 +80,7 @@ def test_a_dead_process_is_told_and_the_next_request_begins_another(page, waited
     assert page.progress.done == 6
 
 
-def test_what_is_not_allowed_cannot_be_begun(page):
+def test_anything_that_is_not_allowed_cannot_be_started(page):
     page.form.form.show_content({"window_s": 50.0})
     assert not page._begin.isEnabled()
     assert "Window 50.0 s is not allowed" in page.form.complaint
@@ -154,7 +154,7 @@ def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(p
     assert not page.motions.isVisible()
 
 
-def test_points_that_failed_are_told_at_the_end(page):
+def test_points_that_failed_are_reported_at_the_end(page):
     said = []
     page.context.noticed.connect(said.append)
     page._grow((Trouble("a at 300 Hz: a contact made no progress"),))
@@ -186,7 +186,7 @@ def test_a_signal_is_left_out_by_emptying_its_field(page):
     assert page.form.value.signal_hz is None
 
 
-def test_curves_of_another_scene_than_the_form_says_lie_under_a_veil_and_the_scene_is_kept(page):
+def test_curves_of_another_scene_than_the_form_states_lie_under_a_veil_and_the_scene_is_kept(page):
     page._request = SimulationRequest(**LINEAR)
     page.form.show_value(SimulationRequest(**LINEAR))
     assert page.plots.isEnabled()

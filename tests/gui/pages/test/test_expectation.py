@@ -36,7 +36,7 @@ def test_the_predicted_time_of_a_test_with_until_stands_before_it(page):
     assert page.expectation.text().startswith("Will record for about 2 s, until known. Will be known: ")
 
 
-def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_page_says_why(page):
+def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_page_states_why(page):
     fast_loop = pytest.importorskip(
         "vibench_fast_loop.branch_continuation", reason="pip install -e extensions/fast_loop"
     )
@@ -71,7 +71,7 @@ def test_every_limit_that_is_passed_stands_among_the_reasons(page):
     assert all(check.complaint() in said for check in passed)
 
 
-def test_another_name_asks_for_no_other_prediction_not_even_while_one_is_made(page, qtbot):
+def test_another_name_requests_no_other_prediction_not_even_while_one_is_made(page, qtbot):
     page.context.selection.choose_rig(RIG)
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
     page.form.show_value(Measurement(name="before", excitation=plan))
