@@ -318,7 +318,7 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Return the extremes of every channel, fine to coarse."""
+    """Return the extremes of every channel, fine to coarse; ``on_read`` receives the progress."""
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
@@ -330,7 +330,7 @@ def overview_levels(
 
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
-    """Return the stored extremes of one channel, fine to coarse; see `has_overview`.
+    """Return the stored extremes of the channel ``role``, fine to coarse; see `has_overview`.
 
     Raises InvalidRequest when the file contains none.
     """

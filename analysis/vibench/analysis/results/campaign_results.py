@@ -270,7 +270,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
 
 
 def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
-    """Merge results of separate recordings into one campaign."""
+    """Merge results of separate recordings into one campaign called ``name``."""
     return CampaignResults(
         name,
         tuple(result for part in parts for result in part.results),

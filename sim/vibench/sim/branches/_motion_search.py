@@ -112,7 +112,7 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 
 
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
-    """Return a random state between the stops, shape (6,) [m, m/s].
+    """Draw a state between the stops by ``rng``, shape (6,) [m, m/s].
 
     m0 and m2 lie within three times the gap, or the motion without stops where that is larger; velocities
     spread as far, times 2 pi f.
