@@ -118,7 +118,7 @@ def scrolled_sideways(page):
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
-def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, theme):
+def test_every_field_has_a_visible_edge(window, qapp, qtbot, contrast, theme):
     """WCAG 2.1, section 1.4.11: at least 3, against what is inside and what is outside."""
     window.context.choose_theme(theme)
     qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)

@@ -210,7 +210,7 @@ def test_a_seal_of_which_a_part_is_gone_is_none(recorded, change):
     assert state_of(path) is state_of(path, "quick") is SealState.DAMAGED
 
 
-def test_the_seal_of_another_recording_is_none_of_this_one(recorded):
+def test_the_seal_of_another_recording_is_refused(recorded):
     path, other = recorded(), recorded("b.h5")
     with h5py.File(path, "r+") as file, h5py.File(other) as source:
         del file["seal"]

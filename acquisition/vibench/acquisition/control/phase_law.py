@@ -242,7 +242,7 @@ class PhaseSearch:
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # From the best try, not from the line's own crossing: other modes bend it further out.
+        # Start from the best try, because other modes bend the line away from its crossing.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)

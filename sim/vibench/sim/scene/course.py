@@ -45,7 +45,7 @@ class SceneRun:
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
-    """When it was known to be settled; None where that was not looked for, or not found."""
+    """When it was found to be settled; None if not checked or not found."""
     ended: str
     """Reason for its end."""
     path: tuple[Stretch, ...]
@@ -100,7 +100,7 @@ class FixedCourse:
             seen = replace(seen, window=whole, leaked=leaked)
         has_settled = self.way is not None and self.way.repeats is not None
         path = lead if has_settled else (*lead, last, *window.stretches)
-        # Since when it repeats was not looked for.
+        # The start of the repetition was not determined.
         return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
@@ -132,7 +132,7 @@ def classify(
 MOST_LOOKS = 4096
 """States that are kept of a long lead at most: enough to see other starts part from it."""
 LOOKS = 16
-"""How often it is looked for on a long lead whether the motion repeats, at least."""
+"""Least number of checks on a long lead whether the motion repeats."""
 LONGEST_SLICE = 1 << 16
 """Drive periods between two looks, at most: their states are held."""
 

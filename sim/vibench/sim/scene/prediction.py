@@ -38,7 +38,7 @@ class StartMemory(StrEnum):
     """On the way a small change grew until nothing of the start was left: another run of the same scene, on
     another machine or at another accuracy, may reach another motion."""
     UNKNOWN = "unknown"
-    """It was not looked for: there was no budget."""
+    """Not determined, because there was no budget."""
 
 
 @dataclass(frozen=True)
@@ -203,15 +203,15 @@ class ScenePrediction:
     error_estimate: float | None = None
     """The largest of the four."""
     section: Floats | None = None
-    """States once a drive period within the window, where a Poincare section was asked for, shape (n, 6)."""
+    """States once per drive period within the window, if a Poincaré section was requested, shape (n, 6)."""
     spectrum_hz: Floats | None = None
-    """Frequencies of the lines, where a spectrum was asked for, shape (lines,)."""
+    """Frequencies of the lines, if a spectrum was requested, shape (lines,)."""
     spectrum: Floats | None = None
     """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
     """Whether the start decided which motion was reached."""
     ensemble: Ensemble | None = None
-    """What other starts came to where it did not; None where it did, or where there was no budget."""
+    """Motions from other starts if it did not; None if it did, or without a budget."""
     target: TargetReport | None = None
     """What was requested and reached; None where neither an error nor a time was requested."""
 

@@ -1,6 +1,6 @@
-"""A scene answered to a target: as exactly, or within the time, that was requested. SI units.
+"""Solve a scene to a requested error or within a requested time. SI units.
 
-Each answer says how far it may be off; better ones follow until the target is met. In order of cost: a closed
+Each result has an error; better ones follow until the target is met. In order of cost: a closed
 form; a periodic motion, found by Newton's iteration as soon as the motion from the start is seen to approach
 it; the motion in a named window, checked by a stricter run; the mean over starts in a named window, where the
 start is forgotten.
@@ -38,7 +38,7 @@ from .solve import Question, in_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
 
 LONGEST_S = 60.0
-"""Time after which an answer is refined no further, where none was requested [s]."""
+"""Default time limit of refinement [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
 """When the first answer is due, and the nominal cost that it may take in any case [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
@@ -73,7 +73,7 @@ NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
 
 
 class _Clock:
-    """How much of the requested time has passed."""
+    """Clock for the requested time."""
 
     def __init__(self, target: Target) -> None:
         self._began_s = time.monotonic()
@@ -106,7 +106,7 @@ class _Orbit:
 
 @dataclass(eq=False)
 class _Path:
-    """A motion on its way, and the periodic motion that it may approach."""
+    """A running motion, with the periodic motion that it may approach."""
 
     run: FollowedRun
     recent: Floats
@@ -120,7 +120,7 @@ class _Path:
 
 @dataclass(eq=False)
 class _Start:
-    """One of the starts that nobody can tell apart, and what its windows showed."""
+    """One of the indistinguishable starts, with the results of its windows."""
 
     run: FollowedRun
     windows: list[Floats]
@@ -138,7 +138,7 @@ class _Start:
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
-    """Give answers to a scene with a target, each better than the one before; the last one is the best.
+    """Yield results of a scene with a target, each better than the previous one.
 
     Raises ValueError when the scene has no target, the specimen cannot be followed in time, or not even one
     drive period could be followed in the requested time.
@@ -157,7 +157,7 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
 
 
 def refined(scene: Scene) -> ScenePrediction:
-    """Return the last of the answers of `refine_scene`."""
+    """Return the last result of `refine_scene`."""
     *_, last = refine_scene(scene)
     return last
 
@@ -194,7 +194,7 @@ class _Refinement:
         """States that a path keeps."""
 
     def answers(self) -> Iterator[ScenePrediction]:
-        """Follow the motion from its start, and go on by what it turns out to be."""
+        """Follow the motion from its start, and continue according to its kind."""
         for found in self._all():
             self._has_answered = True
             yield found
@@ -240,7 +240,7 @@ class _Refinement:
 
     @property
     def _settle_s(self) -> float:
-        """How long a motion is followed that does not repeat."""
+        """Return the settling time of a motion that does not repeat."""
         longest_s = self._scene.duration.longest_s
         if self._motion.slowest_rate >= 0.0:
             longest_s = min(longest_s, PAPER_DURATION_S)
@@ -254,7 +254,7 @@ class _Refinement:
     def _followed(
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
-        """Follow a motion in short parts; None where time has run out, or the motion was lost."""
+        """Follow a motion in short parts; None if time has run out, or the motion was lost."""
         parts: list[Stretch] = []
         while run.time_s < until_s:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
@@ -270,14 +270,14 @@ class _Refinement:
         return parts
 
     def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
-        """Observe a number of drive periods of a motion; None where time has run out."""
+        """Observe a number of drive periods of a motion; None if time has run out."""
         begins = run.apart()
         made = round(run.time_s * self._frequency_hz)
         parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
         return None if parts is None else window_of(begins, parts)
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
-        """Whether another start has come far from this motion."""
+        """Return whether another start has diverged from this motion."""
         mine, theirs = states_of(ours)[:, :3], states_of(other)[:, :3]
         self._size_m = max(self._size_m, float(np.abs(mine).max(initial=0.0)))
         gap_m = min(self._scene.specimen.gaps_m)
@@ -311,13 +311,13 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """How far a state is from a periodic motion, over a size; infinite where there is none."""
+        """Return the distance of a state from a periodic motion, over a size; infinite without one."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
 
     def _nearest(self, state: Floats, within: float) -> _Orbit | None:
-        """Find the nearest of the periodic motions that are known; None where none is so near."""
+        """Return the nearest known periodic motion within a distance; None without one."""
         found = min(self._orbits, key=lambda each: self._away_from(each, state, 1.0), default=None)
         return found if self._away_from(found, state, 1.0) < within else None
 
@@ -345,7 +345,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # What roundings of the state at the end of a period may come to, through the inverse of the map.
+        # Effect of rounding of the state at the end of a period, through the inverse of the map.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -393,7 +393,7 @@ class _Refinement:
         return _reported(found, self._target, self._clock, 1, None)
 
     def _section(self, states: Floats) -> Floats | None:
-        """Keep states once a drive period where they are observed."""
+        """Return states once per drive period if they are observed."""
         return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
@@ -419,7 +419,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """How far the motion still has to go, over its size, by how it changed in a forgetting time."""
+        """Return the remaining distance of the motion over its size, from its change in a forgetting time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -477,7 +477,7 @@ class _Refinement:
                 return
 
     def _many_starts(self) -> Iterator[ScenePrediction]:
-        """Answer for the mean over starts that nobody can tell apart, in a named window."""
+        """Return the mean over indistinguishable starts in a named window."""
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
@@ -538,7 +538,7 @@ class _Refinement:
         return window is not None
 
     def _next_size(self, starts: Sequence[_Start], begins_s: float) -> tuple[int, int]:
-        """Choose how many starts and windows of each come next: at most twice as much motion as so far."""
+        """Return the next numbers of starts and windows: at most twice as much motion as so far."""
         windows = _windows_of(starts)
         if len(starts) < FEWEST_STARTS:
             return FEWEST_STARTS, windows
@@ -564,7 +564,7 @@ class _Refinement:
         return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
 
     def _more_needed(self, starts: Sequence[_Start]) -> float:
-        """Estimate how many times as much motion reaches the requested error."""
+        """Return the factor of additional motion for the requested error."""
         assert self._target.error is not None
         power = 2.0 if _others(starts) is None else 1.0
         return 1.05 * math.pow(float(_mean_error(starts).max()) / self._target.error, power)
@@ -605,7 +605,7 @@ class _Refinement:
         return _reported(found, self._target, self._clock, len(starts), needed, windows)
 
     def _lost(self) -> ScenePrediction:
-        """Say that the motion could not be followed on."""
+        """Return the result for a motion that could not be followed."""
         run = self._main
         found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)
         found = replace(found, ended=run.outcome.text, outcome=run.outcome)
@@ -653,7 +653,7 @@ class _Refinement:
 
 
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
-    """Return how far the mean over starts may be from that over all starts, relatively, shape (4,).
+    """Return the relative error of the mean over starts, shape (4,).
 
     Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
     Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
@@ -684,7 +684,7 @@ def _windows_of(starts: Sequence[_Start]) -> int:
 
 
 def _others(starts: Sequence[_Start]) -> int | None:
-    """Count the starts that did not come to the motion of most; None where most came to none that repeats."""
+    """Return the starts that did not reach the most common motion; None if that does not repeat."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None

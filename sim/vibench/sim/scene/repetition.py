@@ -19,7 +19,7 @@ from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 
 MOST_PERIODS = 32
-"""Longest period that is looked for, in drive periods."""
+"""Longest period to search, in drive periods."""
 FEWEST_BETWEEN = 8
 """States that are compared lie at least this many drive periods apart."""
 SLOWEST_RATIO = 0.99
@@ -124,7 +124,7 @@ def repetition(
 
 
 def _returns_nowhere(points: Floats, tolerance: float) -> bool:
-    """Whether the last state alone tells that nothing repeats: what chaos costs to look at."""
+    """Return whether the last state alone excludes repetition, which saves time in chaos."""
     changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
     return bool(np.all(changes >= tolerance))
 
@@ -162,7 +162,7 @@ def is_drifting(section: Floats, omega: float) -> bool:
 
 
 def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
-    """How far a motion is from where its changes lead, if they go on shrinking as they do."""
+    """Return the remaining distance of a motion if its changes continue to shrink."""
     late = _change(points[-period:], points[-period - lag : -lag])
     if late < noise:
         return late
@@ -172,7 +172,7 @@ def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
 
 
 def longest_section(forgetting_periods: float) -> int:
-    """States that let every period up to the longest be found."""
+    """Return the number of states needed to find every period up to the longest."""
     return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
 
 
@@ -294,7 +294,7 @@ def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
 
 
 def growth_of(stretches: Sequence[Stretch]) -> Growth:
-    """Growth of a small change over those stretches in which one was carried."""
+    """Return the growth of a small change over the stretches that propagated one."""
     carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
     logarithms = np.array([stretch.growth for stretch in carried])
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))

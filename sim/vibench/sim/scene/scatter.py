@@ -1,8 +1,8 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
 It is the largest value of a window, one draw from an extreme-value distribution: in chaos it scatters by a
-few per cent whatever the accuracy. One run tells its scatter by the extremes of its blocks, many runs from
-slightly different starts tell it directly.
+few per cent whatever the accuracy. The scatter follows from the extremes of blocks of one run, or directly
+from many runs with slightly different starts.
 """
 
 import math
@@ -19,7 +19,7 @@ from .shares import student_quantile
 COVERED = 0.975
 """Share of one tail and the middle: 19 cases of 20 with both tails."""
 FEWEST_BLOCKS = 4
-"""With fewer extremes nothing is said."""
+"""Fewest extremes for an estimate."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 
 
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
-    """Find what the responses of two windows differ by, relatively, in 19 cases of 20, shape (4,).
+    """Return the relative difference of the responses of two windows in 19 cases of 20, shape (4,).
 
     ``blocks`` are those of one window, the last of them, and others before it. None for too few.
     """
@@ -86,7 +86,7 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 
 
 def _lines_apart(parts: Complex) -> float:
-    """Find what the amplitudes of two lines differ by, relatively, in 19 cases of 20.
+    """Return the relative difference of the amplitudes of two lines in 19 cases of 20.
 
     A line is the mean of its parts. Parts that follow one another may be alike: the error of the mean is the
     larger of that from all of them and that from the means of two (Flyvbjerg and Petersen, J. Chem. Phys.
@@ -106,7 +106,7 @@ def _lines_apart(parts: Complex) -> float:
 
 
 def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
-    """Find what the responses of two starts differ by, relatively, in 19 cases of 20.
+    """Return the relative difference of the responses of two starts in 19 cases of 20.
 
     ``answer`` is one of them, ``others`` are more, each of shape (4,). NaN where one was lost.
     """

@@ -72,7 +72,7 @@ def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats
 
 
 def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
-    """Whether another start, pushed away, came far from the path of a motion on its way.
+    """Return whether a slightly displaced start diverged from the path of a motion.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Say of each state, shape (n, 6), whether m1 is at a stop: there lanes give the flight after it."""
+    """Return for each state, shape (n, 6), whether m1 is at a stop, where batches return the next flight."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -106,11 +106,11 @@ class Draw:
     """Number and cost of starts."""
 
     clear: int = CLEAR
-    """That which was asked for among them; enough where they leave no doubt."""
+    """Number of starts, including the requested one, for clear cases."""
     fewest: int = FEWEST
     """Elsewhere."""
     most: int = MOST
-    """Where those came to more than one motion."""
+    """Number if those reached more than one motion."""
     seed: int = SEED
     budget_s: float = math.inf
     """Nominal cost of all of them."""
@@ -138,7 +138,7 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # What does not repeat is followed so much longer with a small change, to tell what it is.
+        # Additional time with a small change for non-repeating motions, to classify them.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
@@ -193,19 +193,19 @@ class SeveralStarts:
             more = self._draw.fewest - self._draw.clear
             spent_s += self._follow_some(more, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
-            # What a start took tells how many more the budget allows.
+            # The cost of a start determines how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
             more = self._draw.most - self._draw.fewest
             self._follow_some(more, budget_s - spent_s, each_s)
 
     @property
     def _is_clear(self) -> bool:
-        """All starts came to one motion, for good."""
+        """Return whether all starts reached one motion permanently."""
         settled = all(each.period is not None for each in self._reached)
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
-        """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
+        """Follow as many more starts as a budget allows, and observe them; return the cost."""
         count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
@@ -221,13 +221,13 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """No start has settled, in so long a time that chaos certainly lasts."""
+        """Return whether no start has settled for so long that chaos certainly lasts."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
     @property
     def _has_settled(self) -> bool:
-        """Some start has come to a motion that repeats."""
+        """Return whether any start has reached a repeating motion."""
         reached = any(each.period is not None for each in self._reached)
         return reached or any(each.repeats is not None for each in self._under_way)
 
@@ -241,7 +241,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # On what the others have not used of their parts.
+                continue  # With the unused budget of the others.
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
@@ -249,7 +249,7 @@ class SeveralStarts:
 
     @property
     def _lasting_after_s(self) -> float:
-        """How much longer all starts together are followed until chaos certainly lasts, if none settles."""
+        """Return the remaining time of all starts until chaos certainly lasts, if none settles."""
         escape = self.escape
         if escape is None or self._has_settled:
             return math.inf
@@ -296,7 +296,7 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
 
 
 def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
-    """Name the kind of a motion that several starts came to.
+    """Return the kind of a motion reached from several starts.
 
     Chaos that is weak, or comes in bursts, leaves most starts calm for as long as they are watched: where a
     small change has certainly grown from one of them, the growth from all together tells.
@@ -313,7 +313,7 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
 
 
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
-    """Whether two starts came to the same motion, or to its symmetric partner.
+    """Return whether two starts reached the same motion or its symmetric partner.
 
     Motions are known by their period and all four responses, and by these alone where one start has come to
     it too late to be seen to repeat, or to be told from chaos. Of motions that do not repeat only the largest
@@ -338,12 +338,12 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 
 
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Motions that may still come to another."""
+"""Kinds of motions that may still change to another."""
 FEWEST_DRAWS = 3
 """Draws of one motion from which its scatter is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
-"""Gives the relative error of the responses of a motion."""
+"""Function that returns the relative error of the responses of a motion."""
 
 
 def ensemble_of(
@@ -392,7 +392,7 @@ def ensemble_of(
 
 
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
-    """Count the starts of each motion, and say which may still come to another.
+    """Count the starts of each motion, and mark those that may still change to another.
 
     Chaos that does not die out may: one chaotic motion becomes another as suddenly as a periodic one, and
     only what becomes periodic is seen as an escape.
@@ -413,7 +413,7 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    """Return those of the start that shows a motion that repeats best; of others, the mean."""
+    """Return the responses of the best start for a repeating motion, else the mean."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
@@ -422,11 +422,11 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
+    """Return the difference of another draw from the mean of these in 19 cases of 20."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
-        # A calm start of chaos in bursts knows nothing of the bursts.
+        # A calm start of bursting chaos does not show the bursts.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
@@ -443,7 +443,7 @@ ALONE = 0.5
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
-    """Return whether the start decided which motion was reached.
+    """Return whether the start determined which motion was reached.
 
     Parameters
     ----------
@@ -474,9 +474,9 @@ def ensemble_beside(
     follow: Follow,
     draw: Draw | None = None,
 ) -> Ensemble | None:
-    """Follow other starts beside the one asked for, as the budget of the scene allows or as ``draw`` says.
+    """Follow additional starts, within the scene's budget or by ``draw``.
 
-    None where the budget allows too few.
+    None if the budget allows too few.
     """
     if draw is None and Observable.SCATTER in scene.observe:
         draw = Draw(clear=FEWEST)

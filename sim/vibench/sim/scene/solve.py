@@ -57,7 +57,7 @@ class Question(StrEnum):
     """Kind of question about a scene."""
 
     ANSWER = "answer"
-    """Its responses with their errors, and what other starts come to where its own is forgotten."""
+    """Responses with errors, and motions from other starts if they depend sensitively on the start."""
     MOTION = "motion"
     """The motion and its responses alone: for maps, whose neighbouring points tell more than errors."""
 
@@ -285,7 +285,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     if Observable.SPECTRUM in scene.observe:
         found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
-        # As a motion that is followed: what goes on from its end finds the drive where it was at its start.
+        # As for integrated motions, the drive phase at the end equals that at the start.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         found = replace(found, duration_s=duration_s, final_state=_state(motion.state(duration_s)))
     return found
@@ -420,7 +420,7 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 
 
 def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
-    """Make what estimates the error of the responses of a motion that some start came to."""
+    """Return the function that estimates the error of the responses of a motion."""
 
     def error_of(reached: ReachedMotion) -> float | None:
         if reached is asked:
@@ -450,7 +450,7 @@ def _ending(seen: SceneRun, ensemble: Ensemble | None) -> str:
 
 
 def _exponent(scene: Scene, run: FollowedRun) -> "LyapunovEstimate":
-    """Find the largest exponent of the motion that a run has come to."""
+    """Return the largest exponent of the final motion of a run."""
     from ..exponents.lyapunov import Precision, lyapunov_exponent  # noqa: PLC0415 - most scenes ask for none
 
     drive = scene.drive

@@ -51,7 +51,7 @@ PARTED = 0.05
 MEMORIES = 8.0
 """Forgetting times of the slowest mode after which a motion that forgets its start is stationary."""
 MEMBERS = 5
-"""Starts beside the one asked for, where a window does not tell how draws differ."""
+"""Number of additional starts if one window does not show the difference of draws."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,7 @@ def stated_errors(
     slowest_rate: float,
     follow: Follow,
 ) -> StatedErrors:
-    """Find the errors of an answer.
+    """Return the errors of a result.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _more_starts(
 def error_of_settled(
     run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
 ) -> Floats:
-    """How far the responses of a motion that repeats are off, relatively; NaN if the comparison was lost.
+    """Return the relative errors of the responses of a repeating motion; NaN if the comparison failed.
 
     What was answered, and what the next periods would answer, whose steps fall elsewhere, against a stricter
     run, which is followed for as long again: a motion that forgets more slowly than its modes still moves.

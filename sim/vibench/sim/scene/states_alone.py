@@ -27,7 +27,7 @@ from .repetition import Growth, Pace, Repetition, growth_of, longest_section, wa
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
-"""Time between two looks, at least."""
+"""Least time between two checks [s]."""
 PARTS = 4
 """Parts of a stretch over which growth is seen: whether it goes on growing."""
 REMEMBERED = 16.0
@@ -81,7 +81,7 @@ class StatesAlone:
 
     @property
     def is_over(self) -> bool:
-        """It repeats, or was lost."""
+        """Return whether it repeats or was lost."""
         return self.repeats is not None or self.run.outcome is not Outcome.REACHED_END
 
     @property
@@ -90,7 +90,7 @@ class StatesAlone:
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """Set how far it is to be followed: to an instant, or to a cost from its beginning."""
+        """Set the end: an instant, or a cost since the start."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
@@ -100,7 +100,7 @@ class StatesAlone:
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
             goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
-            # An end between two periods is reached, but nothing is looked for there.
+            # An end between two periods is reached without a check.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self._noted(stretch)

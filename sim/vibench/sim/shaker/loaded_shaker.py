@@ -1,8 +1,8 @@
 """Amplifier, coil and table, and the specimen that pushes back on it, step by step under a voltage.
 
-Every quantity handed over is its mean over a step: of the voltage because it is held, of the base's
-acceleration and of m0's velocity because their integrals are known at both ends. Means alias nothing
-that happens inside a step and all lie at the step's middle, so channels agree in phase.
+All quantities are means over a step: the voltage is held, and the integrals of base acceleration and m0's
+velocity are known at both ends. Means do not alias events within a step and lie at its centre, so channels
+agree in phase.
 """
 
 import math
@@ -131,7 +131,7 @@ class ShakenMotion:
     """What happened in a stretch of steps; arrays of one value a step, means over the step."""
 
     amplifier_voltage: FloatArray
-    """At the coil [V]."""
+    """Voltage at the coil [V]."""
     base_acceleration: FloatArray
     """[m/s2]"""
     m0_velocity: FloatArray

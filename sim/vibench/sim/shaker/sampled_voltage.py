@@ -34,16 +34,16 @@ _BLOCK_S = 0.02
 
 
 def identity(frequency_hz: FloatArray) -> ComplexArray:
-    """Show a motion as it is."""
+    """Return a gain of 1."""
     return np.ones(frequency_hz.shape, dtype=np.complex128)
 
 
 @dataclass(frozen=True)
 class DrivenTable:
-    """What a voltage is played into: everything that moves, and how its motion is seen."""
+    """Amplifier, shaker, specimen and sensors under a voltage."""
 
     amplifier: Amplifier
-    """Of no numbers where the voltage is that of the coil."""
+    """Without parameters if the voltage is at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
@@ -56,7 +56,7 @@ class DrivenTable:
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """What the sensors show, shape (samples,); single precision, far below any converter's noise."""
+    """Outputs of the sensors, shape (samples,), in single precision, far below converter noise."""
 
     base_acceleration: Singles
     """[m/s2]"""

@@ -3,8 +3,7 @@
 `solve_study` computes on threads or on a Dask cluster and keeps the answers in memory or in an HDF5 file
 that survives a kill and is resumed where it ended (docs/studies.md, docs/decisions/0010-studies.md). A
 start `up` or `down` continues from the neighbouring frequency. An answer does not depend on where it is
-computed; every file names the software that computed it. Physics is `vibench.sim.scene`'s; this room only
-orders, stores and reports.
+computed; every file names the software that computed it. Physics is in `vibench.sim.scene`.
 
 >>> from vibench.sim.study import Study, frequency_range, solve_study
 >>> study = Study(models=["linear"], frequencies_hz=frequency_range(90.0, 100.0, 5.0), amplitudes_m=[1e-6])

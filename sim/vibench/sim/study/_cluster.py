@@ -20,9 +20,9 @@ from ._executor import Bundle, Reply, Solver, empty_queue, solve_timed
 from ._software import software
 
 CONNECT_PATIENCE_S = 30.0
-"""How long the scheduler, and then its first worker, is waited for."""
+"""Time to wait for the scheduler, and then for its first worker [s]."""
 LOOK_AGAIN_S = 1.0
-"""How often the number of workers is asked for."""
+"""Interval for querying the number of workers [s]."""
 RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 
@@ -54,7 +54,7 @@ class ClusterExecutor:
             self._client.close()
             raise
         self._arrived: queue.SimpleQueue[tuple[Bundle, Future]] = queue.SimpleQueue()
-        # A future that nobody holds is forgotten by the scheduler.
+        # The scheduler drops futures without references.
         self._held: dict[str, Future] = {}
         self._prefix = f"vibench-{uuid.uuid4().hex}"
         self._submitted = 0
@@ -63,7 +63,7 @@ class ClusterExecutor:
 
     @property
     def description(self) -> str:
-        """What it is, for the record."""
+        """Description for the record."""
         return f"Dask cluster at {self._address}, {self.slots} worker thread(s) at first"
 
     @property
@@ -86,7 +86,7 @@ class ClusterExecutor:
         future.add_done_callback(partial(self._note, bundle))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return what has come back; a bundle that the scheduler has dropped comes back empty."""
+        """Return finished bundles; a bundle dropped by the scheduler is empty."""
         arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()
@@ -94,7 +94,7 @@ class ClusterExecutor:
         return [self._reply(bundle, future, answers) for bundle, future in arrived]
 
     def cancel(self) -> Sequence[Reply]:
-        """Let the scheduler drop everything; a worker ends the bundle it is at, for nobody."""
+        """Cancel everything; running bundles are discarded."""
         if self._client.status == RUNNING and self._held:
             self._client.cancel(list(self._held.values()))
         self._held.clear()
@@ -106,11 +106,11 @@ class ClusterExecutor:
         self._client.close()
 
     def _note(self, bundle: Bundle, future: Future) -> None:
-        """Pass on; this is a thread of the client."""
+        """Queue the future, in a thread of the client."""
         self._arrived.put((bundle, future))
 
     def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
-        """Bring all finished answers here in one go; none when they were lost on the way."""
+        """Fetch all finished results at once; none if they were lost."""
         if not futures:
             return {}
         try:
@@ -148,7 +148,7 @@ class ClusterExecutor:
 
 def _connect(address: str, patience_s: float) -> Client:
     try:
-        # Asked first: a client that was started with an address of another form cannot be closed again.
+        # Checked first, because a client with an invalid address cannot be closed.
         get_address_host_port(address)
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:

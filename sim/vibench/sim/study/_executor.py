@@ -1,6 +1,6 @@
-"""The boundary between the queue and whatever computes: threads here, processes elsewhere.
+"""Interface between the queue and workers: local threads or remote processes.
 
-What a scene costs, without what a process pays once: modules loaded, tables of its law.
+Costs of scenes exclude one-time costs of a process: loading modules, tables of its law.
 """
 
 import math
@@ -23,26 +23,26 @@ from ._errors import InvalidStudy
 
 @dataclass(frozen=True)
 class Bundle:
-    """Scenes that are handed over together, so that short ones do not drown in overhead."""
+    """Scenes sent together, to reduce overhead for short ones."""
 
     numbers: tuple[int, ...]
-    """Which points of the study they are."""
+    """Their points of the study."""
     scenes: tuple[Scene, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Reply:
-    """What came back for a bundle."""
+    """Results of a bundle."""
 
     bundle: Bundle
     solved: tuple[Solved, ...]
     """One for each scene, in order; fewer when it was cancelled or failed on the way."""
     error: BaseException | None = None
-    """Why there are fewer, if that was an error."""
+    """Error, if there are fewer."""
 
 
 class Executor(Protocol):
-    """What computes bundles. It may lose workers, but no bundle; the order of replies is its own."""
+    """Executor of bundles. Workers may be lost, but no bundle; replies come in any order."""
 
     @property
     def description(self) -> str:
@@ -50,28 +50,28 @@ class Executor(Protocol):
 
     @property
     def slots(self) -> int:
-        """How many bundles it computes at the same time; may change. None at the moment: 0."""
+        """Number of bundles computed at the same time; may change, also to 0."""
 
     def submit(self, bundle: Bundle) -> None:
-        """Take a bundle, and compute it when its turn comes."""
+        """Queue a bundle."""
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return what has come back; waits for the first, at most ``timeout_s``.
+        """Return replies; waits for the first, at most ``timeout_s``.
 
         Raises ClusterLost when nothing can come back any more.
         """
 
     def cancel(self) -> Sequence[Reply]:
-        """Begin nothing more, end soon, and give what has come back until then. Legal at any time."""
+        """Start nothing more and end soon; replies so far stay available. Legal at any time."""
 
     def close(self) -> None:
-        """Let go of every worker. Legal at any time."""
+        """Release all workers. Legal at any time."""
 
 
 Solver: TypeAlias = SceneSolver
 Kind = tuple[object, ...]
 _solved_before: set[Kind] = set()
-"""Kinds of scenes for which this process is prepared."""
+"""Kinds of scenes already run in this process."""
 
 
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
@@ -107,7 +107,7 @@ Item = TypeVar("Item")
 
 
 class ThreadExecutor:
-    """As many threads as asked for; one for each processor when None.
+    """The requested number of threads; by default one per processor.
 
     Raises InvalidStudy when fewer than one worker is asked for.
     """
@@ -142,13 +142,13 @@ class ThreadExecutor:
         return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:
-        """Begin no scene more, not even within a bundle; those under way come to their end."""
+        """Start no further scene, not even within a bundle; running ones are finished."""
         self._is_cancelled.set()
         self._pool.shutdown(wait=True, cancel_futures=True)
         return self.replies(0.0)
 
     def close(self) -> None:
-        """Let the threads end."""
+        """End the threads."""
         self.cancel()
 
     def _solve_into(self, solved: list[Solved], scenes: Sequence[Scene]) -> None:

@@ -1,12 +1,10 @@
-"""Where answers are kept while a study runs: a file that survives a kill.
+"""File of a running study, which survives a kill.
 
-Order of a commit: cells -> sync -> states -> sync. Whatever moment the process or the power ends, a point
-whose state says that it is done has all its cells. States, like everything else, are written once.
+Order of a commit: cells -> sync -> states -> sync. If process or power end at any moment, a point with the
+state done has all its cells.
 
-The file before its first point: everything known is written, and every place for an answer is there.
-
-After this nothing but bytes at known places is written: HDF5 itself has closed the file, so that no crash
-can catch it between two steps.
+The file is created with all known facts and space for all results. Afterwards only bytes at known places
+are written; HDF5 has closed the file, so that no crash can leave it inconsistent.
 """
 
 import shutil
@@ -39,14 +37,14 @@ from ._software import software
 from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
-"""Of a reader; a writer has a file open for as long as it runs."""
+"""Longest time of a reader [s]; a writer keeps a file open during its run."""
 
 
 def sole_writer(path: Path) -> OpenFile:
     """Open a file to write, and mark it so for as long as it is open.
 
-    Anyone who looks at an answer has the file open for a moment: that is waited for. Raises StudyError when
-    another process has it open for longer, as its writer has, or it cannot be opened.
+    Readers have the file open only briefly. Raises StudyError when another process has it open for longer,
+    as a writer does, or it cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -83,7 +81,7 @@ _COMPONENTS = {
 }
 """What the components of a column are, where that is more than their number."""
 HEAD_BYTES = 2_000_000
-"""More than sessions, axes and attributes take together."""
+"""Upper bound of the size of sessions, axes and attributes."""
 
 
 def make_file(path: Path, plan: GridPlan) -> None:
@@ -203,7 +201,7 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Keeps answers in a study's file; a context that releases it.
+    """Store in a study's file; a context manager that closes it.
 
     Raises StudyError when the file is another study's, is being written by another run, or is no study's
     file.
@@ -242,7 +240,7 @@ class FileStore:
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Commit answers in an order that cannot lie.
+        """Commit answers in a safe order.
 
         Raises StudyError when the disk refuses; what was committed before is kept.
         """
@@ -258,7 +256,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Fill in many points that are not computed: whole columns, in an order that cannot lie."""
+        """Fill in many points that are not computed, as whole columns in a safe order."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())

@@ -1,6 +1,6 @@
-"""What a study's file holds: a grid of points over named axes, columns with their units, and its layout.
+"""Content of a study's file: a grid of points over named axes, columns with units, and the layout.
 
-``docs/studies.md`` says the same for a stranger with h5py, xarray or MATLAB.
+``docs/studies.md`` describes it for users of h5py, xarray or MATLAB.
 """
 
 import math
@@ -16,7 +16,7 @@ from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
-"""Raised whenever an older reader would misunderstand the file."""
+"""Incremented whenever an older reader would misunderstand the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
 """Superblock 0: what every HDF5 reader since 1.8 understands, MATLAB's included."""
@@ -30,7 +30,7 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """What is known of a point; the last thing that is written of it."""
+    """State of a point, written last."""
 
     MISSING = 0
     """Not computed yet."""
@@ -66,7 +66,7 @@ Cell = float | int | bytes | tuple[float, ...]
 
 REAL, WHOLE = "<f8", "<i4"
 MISSING_WHOLE = -1
-"""Stands for a missing whole number or flag; CF's ``_FillValue``."""
+"""Missing whole number or flag; CF's ``_FillValue``."""
 COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
@@ -264,7 +264,7 @@ class StudyAxis:
 
     @property
     def is_ordered(self) -> bool:
-        """Whether it holds numbers, whose neighbours are like each other."""
+        """Whether its values are numbers, so that neighbours are similar."""
         return bool(self.units)
 
 
@@ -274,12 +274,12 @@ def grid_of(axes: tuple[StudyAxis, ...]) -> Grid:
 
 
 class GridPlan(FrozenModel, ABC):
-    """What is to be computed, completely: two equal plans have equal answers."""
+    """Complete plan; equal plans have equal results."""
 
     called: ClassVar[str]
-    """How messages call such a plan."""
+    """Name of such a plan in messages."""
     format: ClassVar[str]
-    """How its files call themselves."""
+    """Format name of its files."""
 
     @property
     @abstractmethod
@@ -289,7 +289,7 @@ class GridPlan(FrozenModel, ABC):
     @property
     @abstractmethod
     def columns(self) -> tuple[Column, ...]:
-        """What is kept of each point."""
+        """Stored columns of each point."""
 
     @property
     def grid(self) -> Grid:
@@ -302,7 +302,7 @@ class GridPlan(FrozenModel, ABC):
         return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
 
     def require_target_alone(self, *names: str) -> None:
-        """Refuse fields that a requested error or time decides by itself; ValueError names the first."""
+        """Refuse fields that a requested error or time sets; the ValueError names the first."""
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")

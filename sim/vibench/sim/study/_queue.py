@@ -1,4 +1,4 @@
-"""Running a study: one queue, whatever computes; answers are kept as they come."""
+"""Run a study: one queue for any executor; results are stored as they arrive."""
 
 import heapq
 import math
@@ -23,11 +23,11 @@ from ._store import Arrays, PointAnswer, Store, is_failed, states
 # How long each point of a study will take: first as planned, then as its neighbours took.
 
 SHORTEST_S = 1e-6
-"""No point is thought to take less: it keeps ratios finite."""
+"""Least time of a point, which keeps ratios finite."""
 
 
 class Costs:
-    """Estimates that get better as points are done.
+    """Estimates of times, improved by finished points.
 
     A run costs about 4 us an impact, and neighbours strike about as often: once a neighbour's time is
     known, it says more than any plan.
@@ -45,7 +45,7 @@ class Costs:
         return float(self._estimate_s[number])
 
     def learn(self, number: int, taken_s: float) -> Iterator[int]:
-        """Note what a point took; the neighbours whose estimates change come back."""
+        """Record the time of a point; return the neighbours whose estimates change."""
         self._taken_s[number] = max(taken_s, SHORTEST_S)
         for each in self._grid.neighbours(number):
             if np.isnan(self._taken_s[each]):
@@ -71,10 +71,10 @@ NOBODY = -1
 
 
 class PointScheduler:
-    """The work that is left, in the order in which it should begin.
+    """Remaining work in the order of starting.
 
     Starting the longest first keeps all workers busy to the end; a point counts with the planned time of
-    all that wait for it in its chain. Points are handed out once, until they are put back.
+    all that wait for it in its chain. Each point is taken once, unless it is put back.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
@@ -83,7 +83,7 @@ class PointScheduler:
         self._is_done = is_done.copy()
         self._is_released = np.zeros(len(after), dtype=np.bool_)
         self.left = 0
-        """How many released points have no answer."""
+        """Number of released points without an answer."""
         self._is_out = np.zeros(len(after), dtype=np.bool_)
         self._is_alone = np.zeros(len(after), dtype=np.bool_)
         self._next = np.full(len(after), NOBODY, dtype=np.int64)
@@ -93,7 +93,7 @@ class PointScheduler:
         self._queue: list[tuple[float, int]] = []
 
     def release(self, numbers: NDArray[np.int64]) -> None:
-        """Let these points be computed, those that have an answer excepted."""
+        """Release these points, except those with an answer."""
         new = numbers[~self._is_released[numbers]]
         self._is_released[new] = True
         self.left += int(np.count_nonzero(~self._is_done[new]))
@@ -103,16 +103,16 @@ class PointScheduler:
 
     @property
     def released(self) -> int:
-        """How many points were let be computed, those with an answer too."""
+        """Number of released points, including those with an answer."""
         return int(np.count_nonzero(self._is_released))
 
     @property
     def is_missing(self) -> NDArray[np.bool_]:
-        """Released points without an answer, shape (points,); those under way too."""
+        """Released points without an answer, shape (points,), including running ones."""
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Hand out the longest point that is ready, and short ones with it until they are ``worth_s``."""
+        """Take the longest ready point, and short ones with it up to ``worth_s``."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -130,13 +130,13 @@ class PointScheduler:
         return tuple(taken)
 
     def learn(self, number: int, taken_s: float) -> None:
-        """Note what a point took: its neighbours' times are known better."""
+        """Record the time of a point, to improve its neighbours' estimates."""
         for changed in self._costs.learn(number, taken_s):
             if self._is_ready(changed):
                 self._push(changed)
 
     def finish(self, number: int) -> None:
-        """Take note of an answer, good or bad: who waited for it may begin."""
+        """Record an answer, so that points that depend on it may start."""
         self._is_done[number] = True
         self.left -= 1
         self._is_out[number] = False
@@ -145,12 +145,12 @@ class PointScheduler:
             self._push(follower)
 
     def put_back(self, number: int) -> None:
-        """Let a point that was handed out be handed out again."""
+        """Put back a taken point."""
         self._is_out[number] = False
         self._push(number)
 
     def put_back_alone(self, number: int) -> None:
-        """Put back one that came to grief among others, to see whether it does so by itself."""
+        """Put back a point that failed in a bundle, to be run alone."""
         self._is_alone[number] = True
         self.put_back(number)
 
@@ -191,11 +191,11 @@ class PointScheduler:
 MOST_IN_BUNDLE = 64
 """Answers that may be lost together with their worker."""
 SHARE = 8
-"""A bundle is at most this part of what is left for each worker, so that all end together."""
+"""Largest bundle relative to the remaining work per worker, so that all end together."""
 QUEUED_PER_SLOT = 2
-"""Bundles handed over for each worker: one to compute, and the next, so that it never waits."""
+"""Bundles per worker: one running and the next, so that it never waits."""
 LOOK_S = 0.2
-"""How often a cancellation is asked for."""
+"""Interval of checks for a cancellation [s]."""
 
 
 class StudyEnd(StrEnum):
@@ -209,7 +209,7 @@ class Points(Protocol):
     """The points of a plan as scenes, and which of them are to be computed."""
 
     bundle_s: float
-    """Worker time of the scenes that are handed over together, at most."""
+    """Largest worker time of a bundle."""
 
     @property
     def grid(self) -> Grid:
@@ -224,7 +224,7 @@ class Points(Protocol):
         """Time that each point is planned to take, shape (points,)."""
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Numbers of the points that what is known so far asks for; asked again when all have an answer."""
+        """Return the points to compute from the results so far; called again when all have an answer."""
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
         """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
@@ -260,7 +260,7 @@ def run_points(
 
 
 class _Session:
-    """One go at a study."""
+    """One session of a study."""
 
     def __init__(self, points: Points, executor: Executor, store: Store) -> None:
         self._executor = executor
@@ -286,7 +286,7 @@ class _Session:
         return self._scheduler.left > 0
 
     def feed(self) -> None:
-        """Hand bundles to the executor until every worker has enough."""
+        """Send bundles to the executor until every worker has enough."""
         self._look()
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
@@ -314,11 +314,11 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Workers spend their first moments on starting: what comes after tells their pace.
+            # Workers need time to start, so their pace is measured afterwards.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:
-        """Where it stands."""
+        """Return the progress."""
         released = self._scheduler.released
         note = f"{self._failed} failed" if self._failed else ""
         return Progress(released - self._scheduler.left, released, self._left_s(), note)
@@ -339,7 +339,7 @@ class _Session:
             self._work_left_s = self._costs.left_s(self._scheduler.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
-        """Take a reply apart; what has no answer goes back to the agenda."""
+        """Return the answers of a reply; put back points without an answer."""
         self._out -= 1
         numbers = reply.bundle.numbers
         for number, scene, solved in zip(numbers, reply.bundle.scenes, reply.solved, strict=False):

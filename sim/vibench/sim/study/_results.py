@@ -1,4 +1,4 @@
-"""Results of a study so far: arrays over its axes, NaN where nothing is known, and states."""
+"""Results of a study so far: arrays over its axes, NaN if unknown, and states."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -81,7 +81,7 @@ def places_of(path: Path, plan: GridPlan) -> Places:
 
 
 def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
-    # States first: an answer that comes while this reads is left for the next time.
+    # States first, so that answers that arrive during reading are ignored consistently.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
     arrays: Arrays = {layout.STATE: state}
@@ -157,7 +157,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class GridResults(Generic[Plan]):
-    """Everything that is known of a plan. Axes in the order of ``plan.axes``."""
+    """Results of a plan. Axes in the order of ``plan.axes``."""
 
     plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
@@ -231,11 +231,11 @@ class GridResults(Generic[Plan]):
 
 @dataclass(frozen=True, eq=False)
 class StudyResults(GridResults[Study]):
-    """Everything that is known of a study."""
+    """Results of a study."""
 
     @property
     def study(self) -> Study:
-        """What was asked for."""
+        """The study."""
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:

@@ -1,4 +1,4 @@
-"""One call that does it all: a study, workers, a place for the answers, and the answers."""
+"""Solve a study: workers, storage and results in one call."""
 
 import hashlib
 import json
@@ -61,7 +61,7 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
         the phase at the start, which follow from it.
     """
     content = _scenes.dump_python(scene, mode="python")
-    # A name changes no motion.
+    # A name does not change the motion.
     content["start"].pop("name", None)
     if content["target"] is None:
         # Files from before there were targets know their scenes.
@@ -129,7 +129,7 @@ scenes that fill the lanes."""
 
 
 class Expansion:
-    """The scenes of a study, made when they are asked for."""
+    """Scenes of a study, created on demand."""
 
     def __init__(self, study: Study) -> None:
         self._study = study
@@ -148,7 +148,7 @@ class Expansion:
         return planned_times(self.grid, self._planned)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Ask for every point."""
+        """Return every point."""
         return np.arange(len(arrays[FINAL_STATE]))
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
@@ -191,7 +191,7 @@ class Expansion:
         return continued_point(int(self.after[number]), arrays)
 
     def _end_phase(self, before: int, arrays: Arrays) -> float:
-        """Phase at which the predecessor's drive stopped: the base goes on from where it is."""
+        """Return the phase at which the predecessor's drive stopped, to continue without a jump."""
         return end_phase(self._study.frequencies_hz[self.grid.place(before)[-1]], before, arrays)
 
     def unchained(self, number: int) -> Scene:
@@ -229,7 +229,7 @@ def planned_work_s(study: Study) -> float:
 
 
 class ExistingStudy(StrEnum):
-    """What to do with a file that is there already."""
+    """Treatment of an existing file."""
 
     REFUSE = "refuse"
     RESUME = "resume"
@@ -247,7 +247,7 @@ def solve_study(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyResults:
-    """Compute what a study asks for, and what its file does not hold yet.
+    """Compute a study, or the missing part of its file.
 
     Raises StudyError in one sentence: a file of another study, a cluster that does not answer, a full disk,
     ...
@@ -282,7 +282,7 @@ def solve_study(
 
 @contextmanager
 def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | ExistingWord) -> Iterator[Store]:
-    """Open the place for the answers to a plan: a file that is made or gone on with, or memory alone."""
+    """Open the store of a plan: a new or continued file, or memory."""
     existing = chosen(ExistingStudy, existing)
     if out is None:
         yield MemoryStore(plan)
@@ -296,7 +296,7 @@ def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | Existin
 
 @contextmanager
 def executor_of(workers: int | None, cluster: str | None, solver: Solver = solve_scene) -> Iterator[Executor]:
-    """Open what computes: ``workers`` threads, or the workers of the Dask scheduler at ``cluster``."""
+    """Return the executor: ``workers`` threads, or the workers of the Dask scheduler at ``cluster``."""
     executor = ThreadExecutor(workers, solver) if cluster is None else _cluster_executor(cluster, solver)
     with closing(executor):
         yield executor

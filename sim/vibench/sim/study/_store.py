@@ -1,4 +1,4 @@
-"""Where answers are kept while a study runs, and the store in memory; that in a file imports h5py."""
+"""Stores of a running study, and the store in memory; the store in a file imports h5py."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,12 +42,12 @@ Arrays = dict[str, NDArray[np.generic]]
 
 @dataclass(frozen=True)
 class PointAnswer:
-    """What is kept of one point."""
+    """Stored results of one point."""
 
     number: int
     state: PointState
     cells: dict[str, Cell]
-    """By column; what is absent stays missing."""
+    """Values by column; absent ones stay missing."""
     taken_s: float = math.nan
     """Processor time, where it is known."""
 
@@ -88,7 +88,7 @@ def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
 
 
 class Store(Protocol):
-    """Keeps answers. What it holds at first needs no computing."""
+    """Store of answers. Points with an initial answer are not computed."""
 
     @property
     def arrays(self) -> Arrays:
@@ -98,20 +98,20 @@ class Store(Protocol):
         """Note that a session begins, and who computes in it."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Keep answers; when it returns they are as safe as they will be."""
+        """Store answers safely before returning."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Fill in many points that are not computed, by column; their state says so."""
 
 
 class MemoryStore:
-    """Keeps answers as long as the process lives."""
+    """Store in memory."""
 
     def __init__(self, plan: GridPlan) -> None:
         self.arrays, self._columns = empty_arrays(plan), plan.columns
 
     def begin(self, executor: str) -> None:
-        """Nobody asks a memory when it began."""
+        """Do nothing: a store in memory has no sessions."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Keep answers."""
@@ -128,7 +128,7 @@ class MemoryStore:
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
-    """Turn a prediction into cells; what was not asked, or not found, stays missing."""
+    """Convert a prediction to cells; values not requested or not found stay missing."""
     return {
         **_cells_of(prediction, NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),

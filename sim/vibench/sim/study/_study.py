@@ -89,7 +89,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 
 
 MOST_POINTS = 10_000_000
-"""A file of 2 GB: a range that asks for more is a slip of the pen."""
+"""Most points: a file of 2 GB."""
 AS_DESCRIBED = "as described"
 """The one label of an axis that leaves to the specimen what a single number cannot say."""
 
@@ -215,7 +215,7 @@ class Study(GridPlan):
 
     @model_validator(mode="after")
     def _scenes_are_allowed(self) -> Self:
-        """Refuse now, and not in each point, a model that nobody knows or a window that is too short."""
+        """Refuse an unknown model or a too short window before any point."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
                 self.scene((model, 0, gap, 0, 0, 0), Rest())
