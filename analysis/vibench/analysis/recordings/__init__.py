@@ -1,6 +1,6 @@
-"""What every analysis reads of one recording: its three channels, its facts, levels and checks.
+"""Common input of all analyses of a recording: three channels, facts, levels and checks.
 
-The channels are drive, base and response, from a recording or a simulation of it; block by block.
-Facts are what was measured, with what, and how it ended, with what feedback noted while it ran. Checks
-say what to look at before trusting it. The format: docs/recording-format.md. Nothing is estimated here.
+The channels are drive, base and response, from a recording or a simulation of it, in blocks. Facts are the
+measurement, its instruments, how it ended, and notes of feedback. Checks warn of problems of the recording.
+The format: docs/recording-format.md.
 """

@@ -1,7 +1,4 @@
-"""How large each channel of a recording was, and how much of its range it used.
-
-What makes a channel useless for any analysis: it never moved, or it was cut off throughout.
-"""
+"""Levels of the channels of a recording relative to their ranges, and channels that are unusable."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -36,7 +33,7 @@ class ChannelLevel:
     header: ChannelHeader
     envelope: Envelope
     rms: float
-    """Over the whole recording, ramps and waits included [unit of the channel]."""
+    """RMS over the whole recording, including ramps and waits [unit of the channel]."""
     peak: float
     """Largest magnitude [unit of the channel]."""
     full_scale: float
@@ -44,7 +41,7 @@ class ChannelLevel:
     share_at_full_scale: float
     """Share of the samples within a thousandth of the full scale, or beyond."""
     flat_tops: tuple[float, ...] = ()
-    """Values at which its peaks are cut, above, below or on both sides [unit of the channel]."""
+    """Values at which its peaks are clipped, above, below or on both sides [unit of the channel]."""
 
     @property
     def share_of_range(self) -> float:
@@ -58,7 +55,7 @@ class ChannelLevel:
 
 
 def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tuple[ChannelLevel, ...]:
-    """Go once through all samples; NotEnoughData when there are none."""
+    """Return the levels from all samples; raises NotEnoughData when there are none."""
     if recording.samples == 0:
         why = f": {recording.reason}" if recording.reason else ""
         raise NotEnoughData(
@@ -73,7 +70,7 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
     counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
     for each in recording.blocks(recording.roles, block):
         parts.append(_extremes(each.values, length))
-        # Lost samples (NaN) are at no limit.
+        # Lost samples (NaN) do not count as clipped.
         cut += np.count_nonzero(np.abs(each.values - offset) >= _AT_FULL_SCALE * full_scale, axis=1)
         for row, shares in enumerate((each.values - offset) / full_scale):
             bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) / 2 * (_COUNTED - 1))
@@ -103,9 +100,9 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
 
 
 _COUNTED = 2**16 + 1
-"""Values, evenly over the range, whose samples are counted to find flat tops."""
+"""Bins over the range to find flat tops."""
 _TOPS = (0.1, 0.03, 0.01)
-"""Heights of a top that are looked at, over that of the peak."""
+"""Height of a top relative to the peak."""
 _FLAT = 0.88
 """Share of a top's samples in its upper half: 0.71 of a smooth peak, 0.84 without curvature, 1 if cut."""
 _FLAT_VALUE = 0.4
@@ -116,7 +113,7 @@ _FEWEST_STEPS = 40
 
 
 def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int | None:
-    """Return the counted value at which the upper peaks are cut; None where they are not."""
+    """Return the value at which the upper peaks are clipped; None if they are not."""
     filled = np.flatnonzero(counts)
     if filled.size < 2:
         return None
@@ -163,7 +160,7 @@ _CLIPPED_SHARE = 0.2
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
-    """Refuse channels that hold nothing to analyse; ``response`` is that whose motion is analysed.
+    """Refuse unusable channels; ``response`` is the analysed channel.
 
     Raises
     ------

@@ -23,7 +23,7 @@ SENSOR_DAMPING_RATIO = 0.02
 
 
 class SensedChannel(Protocol):
-    """A channel, of a recording or of a bench, as far as its sensor is known."""
+    """A channel of a recording or a bench with its sensor."""
 
     @property
     def role(self) -> str:
@@ -39,10 +39,10 @@ class SensedChannel(Protocol):
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
-    """Complex gain of a channel over the motion that it shows, shape (lines,); 1 at low frequency.
+    """Return the complex gain of a channel over its motion, shape (lines,); 1 at low frequency.
 
-    The channel's delay as its header says it, the sensor's mounted resonance, and its bandwidth, whose own
-    delay is part of the header's. A converter's coupling is left out.
+    It includes the delay in the header, the sensor's mounted resonance, and its bandwidth, whose delay is
+    part of the header's, but not the converter's coupling.
     """
     sensor = described_sensor(bench, channel.role)
     part = frequency_hz / _number(sensor, "resonance_hz")
@@ -59,22 +59,22 @@ def coupled_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz:
 
 
 def described_sensor(bench: Mapping[str, Any], role: str) -> Mapping[str, Any]:
-    """Return what a bench configuration says of the sensor of a channel; empty where it says nothing."""
+    """Return a bench configuration's entry on the sensor of a channel; empty without one."""
     return bench.get(sensor_table(role)) or (bench.get("sensors") or {}).get(role) or {}
 
 
 def _number(sensor: Mapping[str, Any], key: str) -> float:
-    """Return a frequency that a sensor states [Hz]; infinite where it states none."""
+    """Return a stated frequency of a sensor [Hz]; infinite if not stated."""
     said = sensor.get(key)
     return float(said) if isinstance(said, int | float) and said > 0 else np.inf
 
 
 OnRead = Callable[[int, int], None]
-"""Called with the samples per channel that are read, and how many there are."""
+"""Callback (samples read, total samples) per channel."""
 
 
 def ignore_reading(samples: int, of: int) -> None:
-    """Watch nothing."""
+    """Ignore the progress."""
 
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", VELOCITY
@@ -88,12 +88,12 @@ class Stretch:
     stop: int
     """One past the last sample."""
     numbers: dict[str, int | float | str]
-    """What the plan says of it: ``realisation``, ``frequency_hz`` ..."""
+    """Numbers of the plan: ``realisation``, ``frequency_hz`` ..."""
     is_complete: bool
 
     @property
     def samples(self) -> int:
-        """How many."""
+        """Number of samples."""
         return self.stop - self.start
 
 
@@ -135,7 +135,7 @@ class RecordedChannels:
     recording: Recording
     on_read: OnRead = ignore_reading
     response: str | None = None
-    """Channel whose motion is analysed; None for that of m0."""
+    """Channel to analyse; None for the motion of m0."""
     _response: ResponseChannel = field(init=False)
 
     def __post_init__(self) -> None:
@@ -173,7 +173,7 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the named parts of the record that hold samples, without averages that somebody rejected."""
+        """Return the named parts of the record with samples, without rejected averages."""
         found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments
@@ -197,7 +197,7 @@ class RecordedChannels:
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, self._response.role):
-                # A clipped peak of an acceleration shifts the velocity as far as its integral reaches.
+                # A clipped peak of an acceleration affects the velocity within the reach of the integral.
                 reach = self._response.reach if each.channel == self._response.role else 0
                 first, last = each.first_sample - reach, each.last_sample + reach
                 marks[max(0, first - start) : max(0, last + 1 - start)] = True
@@ -224,7 +224,7 @@ def far_from(marks: Flags, reach: int) -> Flags:
 
 
 def only_stretch(channels: Channels, label: str) -> Stretch:
-    """Return the one stretch that a sweep or dwell was recorded as; NotEnoughData when there is none."""
+    """Return the single stretch of a sweep or dwell; raises NotEnoughData when there is none."""
     found = channels.stretches(label)
     if not found:
         raise NotEnoughData(
@@ -234,7 +234,7 @@ def only_stretch(channels: Channels, label: str) -> Stretch:
 
 
 def read_whole(channels: Channels, stretch: Stretch) -> Reals:
-    """Read a stretch that must have no hole; UnusableData when samples were lost inside it."""
+    """Read a stretch without holes; raises UnusableData when samples were lost inside it."""
     data = channels.read(stretch.start, stretch.stop)
     lost = int(np.count_nonzero(np.isnan(data[0])))
     if lost:

@@ -1,4 +1,4 @@
-"""What to know before trusting a recording: each check passes, or says what to look at."""
+"""Checks of a recording, each with a verdict and a remark."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from .facts import RecordingFacts
 
 
 class Verdict(StrEnum):
-    """How a check came out."""
+    """Verdict of a check."""
 
     PASSED = "passed"
     NOTE = "note"
@@ -30,7 +30,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was looked at."""
+    """One check."""
 
     what: str
     verdict: Verdict
@@ -54,7 +54,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class AbstractAnalysis(Labelled, Generic[P, R]):
-    """What was found in a recording: of a plan, a response."""
+    """Result of a recording: plan and response."""
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
@@ -63,7 +63,7 @@ class AbstractAnalysis(Labelled, Generic[P, R]):
 
 
 def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
-    """Look at how a recording ended, at overloads, lost samples, levels, rates and calibrations."""
+    """Check the end of a recording, overloads, lost samples, levels, rates and calibrations."""
     return (
         _ending(facts),
         _seal(facts),
@@ -170,10 +170,10 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
 
 
 def _least_peak_v(facts: RecordingFacts) -> float:
-    """Return the lowest peak of the drive of a plan that was carried out; nothing, where it is not known.
+    """Return the lowest expected peak of the drive; None if unknown.
 
-    Feedback is quieter than its setting allows, the peak of streamed noise is a draw, and a few samples a
-    period need not meet the peak of a sine.
+    Feedback may stay below its setting, the peak of streamed noise is random, and few samples per period
+    may miss the peak of a sine.
     """
     excitation = facts.measurement.excitation
     is_open_ended = EXCITATION_KINDS[excitation.kind].is_feedback or isinstance(excitation, StreamedNoise)

@@ -1,4 +1,4 @@
-"""What a recording says about itself: what was measured, with what, and how it ended."""
+"""Facts of a recording: the measurement, its instruments, and how it ended."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -38,7 +38,7 @@ MOST_BYTES = 1e9
 BYTES_A_SAMPLE = 80
 """Bytes per sample of a stretch that is analysed at once: three channels, and what is made of them."""
 LARGEST_PACKING = 16.0
-"""Converters hear noise: it packs 1.2 to 3 times, a computed sine without any 6 times."""
+"""Largest compression ratio: converter noise packs 1.2 to 3 times, a computed sine without noise 6 times."""
 
 
 def require_measured_size(recording: Recording) -> None:
@@ -55,16 +55,15 @@ def require_measured_size(recording: Recording) -> None:
 
 
 def require_checked(recording: Recording) -> None:
-    """Hold a recording against its seal, where this process has not done so; raises as `require_intact`."""
+    """Check a recording against its seal once per process; raises like `require_intact`."""
     if not recording.is_checked:
         require_intact(recording)
 
 
 def require_intact(recording: Recording) -> SealCheck:
-    """Hold every sample, attribute and table against the seal; gives what was found.
+    """Check every sample, attribute and table against the seal; return the result.
 
-    A recording without a seal, made before there were any or not finished yet, is let pass. Raises
-    UnusableData when something is not as it was sealed.
+    Recordings without a seal (old or unfinished) pass. Raises UnusableData when something was changed.
     """
     found = recording.check_seal(SealDepth.WHOLE)
     if found.state is SealState.DAMAGED:
@@ -77,7 +76,7 @@ def require_intact(recording: Recording) -> SealCheck:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordingFacts(RecordingDescription):
-    """Everything but the result."""
+    """Facts of a recording without its result."""
 
     DOCUMENT: ClassVar = (
         "name path state reason origin started_utc bench_check recording_id duration_s sample_rate_hz "
@@ -93,7 +92,7 @@ class RecordingFacts(RecordingDescription):
     overload_s: Mapping[str, float]
     """Time each channel spent near its full scale, by role; channels that never did are left out."""
     dropouts: int
-    """Moments in which the vibrometer lost its light, bridged in every analysis."""
+    """Number of drop-outs of the vibrometer, bridged in every analysis."""
     dropout_s: float
     lost_samples: int
     planned_stretches: int
@@ -101,14 +100,14 @@ class RecordingFacts(RecordingDescription):
     late: tuple[str, ...]
     """When the drive fell behind its plan, a sentence each."""
     check: str
-    """What the check of the bench found before the run; empty when it was left out."""
+    """Result of the bench check before the run; empty if left out."""
     seal: SealCheck
     response: str = VELOCITY
     """Channel whose motion is analysed."""
     feedback: tuple[FeedbackNote, ...] = ()
-    """What a measurement with feedback found while it ran; empty for any other."""
+    """Notes of feedback during the run; empty without feedback."""
     feedback_s: tuple[float, ...] = ()
-    """When each of it was noted, from the beginning of the recording [s]."""
+    """Time of each note since the start of the recording [s]."""
 
     @property
     def mass(self) -> str:
@@ -201,7 +200,7 @@ def _dropouts(recording: Recording, response: str) -> tuple[Dropout, ...]:
 
 
 def plan_of(recording: Recording) -> Measurement:
-    """Read the plan that stands in a recording; UnusableData when this version does not know it."""
+    """Read the plan of a recording; raises UnusableData when this version cannot read it."""
     try:
         return Measurement.model_validate(recording.plan)
     except ValidationError as error:
@@ -221,14 +220,14 @@ def specimen_of(bench: Mapping[str, Any]) -> Specimen:
 
 
 def known_specimen(bench: Mapping[str, Any]) -> Specimen | None:
-    """Build the specimen that the bench configuration describes; None where it says nothing."""
+    """Return the specimen of the bench configuration; None if not described."""
     return specimen_of(bench) if bench.get("specimen") else None
 
 
 def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
-    """Return the specimen that the bench configuration describes; the paper's where it says nothing.
+    """Return the specimen of the bench configuration, by default the paper's.
 
-    Raises UnusableData when what it says is no specimen.
+    Raises UnusableData for an invalid specimen.
     """
     said = bench.get("specimen", {})
     known = {key: said[key] for key in said if key in SpecimenTable.model_fields or key == "model"}
@@ -260,7 +259,7 @@ class _BenchCheck(BaseModel):
 
 
 class _Bench(BaseModel):
-    """What analysis reads of a bench configuration, whatever version wrote it; the rest is left alone."""
+    """The part of a bench configuration that analysis reads, from any version."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -281,7 +280,7 @@ class _Provenance(BaseModel):
 
 
 def _require_bench(recording: Recording) -> None:
-    """Refuse a bench, its check, or a provenance that later steps could not read; raises UnusableData."""
+    """Raise UnusableData for an unreadable bench, bench check or provenance."""
     try:
         _Bench.model_validate(recording.bench)
         _Provenance.model_validate(recording.provenance)

@@ -1,4 +1,4 @@
-"""The velocity of m0, whichever sensor shows its motion: vibrometer, accelerometer or displacement probe."""
+"""Velocity of m0 from any sensor: vibrometer, accelerometer or displacement probe."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -17,18 +17,18 @@ from ..signals.arrays import Reals, Samples
 
 VELOCITY = ROLES[0].value
 RESPONSE_ROLES = tuple(role.value for role in ROLES)
-"""Channels that show the motion of m0, the one that is used first."""
+"""Channels of the motion of m0 in the order of preference."""
 ACCELERATION, DISPLACEMENT = "acceleration", "displacement"
 _MOTIONS = ("velocity", ACCELERATION, DISPLACEMENT)
 LOWEST_INTEGRATED_HZ = 5.0
-"""An acceleration is integrated exactly above it; below it, the velocity fades to nothing."""
+"""Lowest frequency of exact integration [Hz]; below it, the velocity fades to zero."""
 _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
-"""Kaiser's beta: what the ends of the integral leave is below 3e-5 at 5 Hz and falls from there."""
+"""Kaiser's beta: truncation errors of the integral are below 3e-5 above 5 Hz."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
 """Samples, and part of the sample rate up to which the fit is exact to 1e-4 (2e-6 below 0.4)."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
-"""Of the fit; above the band, the derivative is only kept from growing."""
+"""Weights of the fit; above the band, only the gain of the derivative is limited."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
 """Kernels and samples of a block, which is read with half a kernel more on either side."""
 
@@ -70,20 +70,20 @@ def _derivative_weights() -> Reals:
 
 _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = MappingProxyType(
     {
-        # Mirrored with the opposite sign, the velocity goes on as it was, backwards in time.
+        # Mirroring with the opposite sign continues the velocity smoothly.
         ACCELERATION: (integral_kernel, 0.0),
         DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
-"""Kernel, and ``about``: samples beyond an end are this times the last one, minus the mirrored ones."""
+"""Kernel and ``about``: samples beyond an end are ``about`` times the last one, minus the mirrored ones."""
 
 
 @dataclass(eq=False)
 class ResponseChannel:
     """Velocity of a mass; by default that of m0 from the first of `RESPONSE_ROLES` that a recording has.
 
-    An acceleration is integrated, which makes its noise grow towards low frequencies; a displacement is
-    differentiated, which makes it grow towards high ones. Both happen with zero phase.
+    An acceleration is integrated, which increases its noise at low frequencies; a displacement is
+    differentiated, which increases it at high ones. Both have zero phase.
 
     Raises UnusableData when the recording has none of them, or is too short to integrate.
     """
@@ -95,7 +95,7 @@ class ResponseChannel:
     quantity: str = field(init=False)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
-    """Number and velocities of the block that was made last: estimators read one after the other."""
+    """Number and velocities of the last block, because estimators read sequentially."""
 
     def __post_init__(self) -> None:
         found = self.response or response_role(self.recording)
@@ -124,7 +124,7 @@ class ResponseChannel:
         return self._kernel.size // 2
 
     def read(self, start: int, stop: int) -> Reals:
-        """Give velocities [m/s], shape (samples,); lost samples are NaN, a vibrometer's drop-outs bridged."""
+        """Return velocities [m/s], shape (samples,); lost samples are NaN, drop-outs are bridged."""
         if self.quantity not in _CONVERSIONS:
             return BridgedChannel(self.recording, self.role).read(start, stop)
         size = max(_BLOCK_REACHES * self._kernel.size, _LEAST_BLOCK)
@@ -136,7 +136,7 @@ class ResponseChannel:
         return np.concatenate(parts)
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
-        """Give the drop-outs that reach into these samples; only light drops out."""
+        """Return the drop-outs in these samples; only vibrometers have them."""
         if self.quantity in _CONVERSIONS:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
@@ -164,7 +164,7 @@ class ResponseChannel:
 def noise_as_read(
     role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
 ) -> Iterator[Samples]:
-    """Yield white noise of unit variance at a sensor as analyses read it: that of a mass as a velocity."""
+    """Yield white noise of unit variance at a sensor as an analysis reads it, for a mass as a velocity."""
     conversion = None if role.startswith("base_") else _CONVERSIONS.get(_quantity(role))
     kernel = np.ones(1) if conversion is None else conversion[0](rate_hz)
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
@@ -181,7 +181,7 @@ def _mirrored(samples: Reals, count: int, about: float) -> Reals:
 
 def _convolved(samples: Samples, kernel: Reals) -> Reals:
     """Return the part of a convolution that needs no sample beyond the ends."""
-    # By numpy: the window would load scipy.signal when it starts.
+    # numpy, because scipy.signal would delay the start of the window.
     size = next_fast_len(samples.size + kernel.size - 1, real=True)
     whole = np.fft.irfft(np.fft.rfft(samples, size) * np.fft.rfft(kernel, size), size)
     return whole[kernel.size - 1 : samples.size]
@@ -192,7 +192,7 @@ def _quantity(role: str) -> str:
 
 
 def response_roles(recording: Recording) -> tuple[str, ...]:
-    """Name every channel ``<mass>_<quantity>`` that shows the motion of a mass, that of m0 first."""
+    """Return every channel ``<mass>_<quantity>`` of a mass, m0 first."""
     first = response_role(recording)
     others = (
         role
@@ -206,5 +206,5 @@ def response_roles(recording: Recording) -> tuple[str, ...]:
 
 
 def response_role(recording: Recording) -> str | None:
-    """Name the channel that shows the motion of m0; None where there is none."""
+    """Return the channel of the motion of m0; None without one."""
     return next((each for each in RESPONSE_ROLES if each in recording.roles), None)

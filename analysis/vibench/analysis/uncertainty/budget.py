@@ -1,4 +1,4 @@
-"""A quantity with everything that makes it uncertain, combined as the GUM does."""
+"""A quantity with its uncertainty contributions, combined as in the GUM."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from ..tables import Labelled, plus_minus
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Of scatter where the recording ended by it, see `Budget.widened`."""
+"""Widening of scatter if the recording ended by it, see `Budget.widened`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = MappingProxyType(
@@ -30,7 +30,7 @@ RESULT_PATTERNS: Mapping[str, str] = MappingProxyType(
 
 
 class Cause(StrEnum):
-    """What makes a quantity uncertain."""
+    """Cause of uncertainty."""
 
     VIBROMETER = "vibrometer calibration"
     ACCELEROMETER = "accelerometer calibration"
@@ -41,18 +41,18 @@ class Cause(StrEnum):
     CLOCK = "clock"
     NOISE = "noise"
     CHANCE = "chance"
-    """Of a motion that never repeats, or of noise as the specimen answers it: one draw of many."""
+    """Chance: one draw of an irregular motion or of the response to noise."""
 
 
 @dataclass(frozen=True)
 class Contribution:
-    """What one cause adds."""
+    """Contribution of one cause."""
 
     cause: Cause
     relative: float | None
-    """Standard uncertainty that it makes, over the value; None where it is not stated."""
+    """Relative standard uncertainty; None if not stated."""
     source: str
-    """Where the figure comes from, or what is missing."""
+    """Source of the value, or missing information."""
 
     def __post_init__(self) -> None:
         if self.relative is not None and not 0.0 <= self.relative < np.inf:
@@ -63,7 +63,7 @@ class Contribution:
 
 
 def from_scatter(cause: Cause, sd: float, value: float, source: str) -> Contribution:
-    """Return what a standard deviation adds to a value; not stated where their ratio says nothing."""
+    """Return the contribution of a standard deviation; not stated if their ratio is not finite."""
     with np.errstate(all="ignore"):
         relative = float(np.divide(sd, abs(value)))
     return Contribution(cause, relative if np.isfinite(relative) else None, source)
@@ -97,7 +97,7 @@ class Budget(Labelled):
 
     @property
     def not_stated(self) -> tuple[Cause, ...]:
-        """Causes that act, and of which nobody said how much."""
+        """Relevant causes without a stated uncertainty."""
         return tuple(dict.fromkeys(each.cause for each in self.contributions if each.relative is None))
 
     @property
@@ -107,17 +107,17 @@ class Budget(Labelled):
         return f"({said}) {self.unit}" if self.unit and "±" in said else f"{said} {self.unit}".strip()
 
     def share(self, cause: Cause) -> float | None:
-        """Give the relative standard uncertainty of one cause: 0 if it plays no part, None if not stated."""
+        """Return the relative standard uncertainty of one cause: 0 if irrelevant, None if not stated."""
         mine = [each.relative for each in self.contributions if each.cause is cause]
         stated = [each for each in mine if each is not None]
         return None if len(stated) < len(mine) else hypot(*stated)
 
     def widened(self) -> "Budget":
-        """Return the budget of a recording that ended when its scatter was small enough.
+        """Return the widened budget of a recording that ended when its scatter was small enough.
 
-        Such an end is chosen more often where the scatter is underestimated. The factor makes intervals hold
-        in 95 % of Gaussian records of ten parts each, looked at up to nine times at intervals that grow by
-        the square root of two, whatever the wish: `benchmarks/until_coverage.py --rule`.
+        Underestimated scatter ends a recording more often. The factor gives 95 % coverage for Gaussian
+        records of ten parts, checked up to nine times at intervals that grow by the square root of two, for
+        any target: `benchmarks/until_coverage.py --rule`.
         """
         parts = tuple(
             replace(each, relative=WIDENING * each.relative, source=f"{each.source}, its end chosen by it")
@@ -129,7 +129,7 @@ class Budget(Labelled):
 
     @property
     def sentence(self) -> str:
-        """The same in words: expanded, and what adds to it as standard uncertainties, the largest first."""
+        """Return a sentence: expanded uncertainty, and contributions from the largest."""
         causes = dict.fromkeys(each.cause for each in self.contributions)
         parts = sorted(((size, cause.value) for cause in causes if (size := self.share(cause))), reverse=True)
         each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
@@ -161,7 +161,7 @@ _SENSORS = {
 
 @dataclass(frozen=True)
 class Stated:
-    """Relative standard uncertainties of what the channels show, by what a bench configuration says."""
+    """Relative standard uncertainties of the channels from a bench configuration."""
 
     response: tuple[Contribution, ...]
     """Of the channel that shows m0."""
@@ -172,22 +172,21 @@ class Stated:
 
     @property
     def scale_sd(self) -> float:
-        """Relative standard deviation of response over base, as far as stated; 0 where nothing is."""
+        """Stated relative standard deviation of response over base; 0 if none."""
         stated = [each.relative for each in (*self.response, *self.base) if each.relative is not None]
         return float(np.sqrt(np.sum(np.square(stated))))
 
     def timed(self, power: int) -> tuple[Contribution, ...]:
-        """Return the clock's part in what follows a frequency to a power."""
+        """Return the clock's contribution to a quantity proportional to a power of frequency."""
         relative = None if self.clock.relative is None else abs(power) * self.clock.relative
         return (Contribution(Cause.CLOCK, relative, self.clock.source),)
 
 
 def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
-    """Read what the bench configuration in a recording states; ``response`` is the channel of m0.
+    """Return the stated uncertainties of a recording's bench; ``response`` is the channel of m0.
 
-    A calibration is normal with its coverage factor. An alignment within an angle scales by its cosine: the
-    root of the uncorrected mean square is taken (JCGM 100:2008, F.2.4.5), the angle being uniform. A clock
-    within bounds is uniform.
+    Calibrations are normal with their coverage factor. Misalignment scales by the cosine of a uniform
+    angle; the root mean square is taken (JCGM 100:2008, F.2.4.5). Clocks are uniform within bounds.
     """
     inputs = {each.get("role"): each for each in (bench.get("daq") or {}).get("channels") or ()}
     of_response, of_base = (tuple(_channel(bench, role, inputs.get(role, {}))) for role in (response, BASE))

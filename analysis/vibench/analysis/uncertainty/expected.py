@@ -1,4 +1,4 @@
-"""What a plan will be able to tell: uncertainty over recording time, before anything moves."""
+"""Expected uncertainty of a plan over recording time, before anything moves."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -44,13 +44,13 @@ from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, St
 from .quantities import of_one_draw
 
 STEADY = 1e-4
-"""Scatter over size below which a simulated motion repeats."""
+"""Relative scatter below which a simulated motion repeats."""
 _SETTLED_S = 2.5
 _EDGE_PERIODS = 80
-"""At each end, which integration disturbs."""
+"""Time at each end that integration disturbs [s]."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Standard errors by which runs differ that have settled on different motions."""
+"""Difference of runs on different motions, in standard errors."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +68,10 @@ class SimulatedDwell:
 def simulated_dwell(
     measurement: Measurement, rig: Rig, at_hz: float, window_s: float
 ) -> SimulatedDwell | None:
-    """Move amplifier, table and specimen by the plan's voltage, and analyse that like a recording.
+    """Simulate amplifier, table and specimen under the plan's voltage, and analyse that like a recording.
 
-    Started more gently than the generator's staircase begins it, and harder: where both end in one motion, so
-    will what is measured. None where a motion is lost, or the window is too short to be analysed.
+    Runs start more gently and harder than the generator's ramp: if both reach the same motion, the
+    measurement will too. None if a motion is lost, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -109,15 +109,15 @@ def simulated_dwell(
 
 
 def _scatter(found: DwellResponse) -> tuple[float, float]:
-    """Return the relative scatter of both Responses, as the analysis will tell it."""
-    # What does not repeat and is small passes for noise.
+    """Return the relative scatter of both Responses, like the analysis."""
+    # A small non-repeating part counts as noise.
     like_noise = float(np.nan_to_num(found.noise_error_i)) / found.response_i
     chance = of_one_draw(found).relative or 0.0
     return float(np.hypot(like_noise, chance)), found.sd_response_ii / found.response_ii
 
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
-    """Peak at the terminal: as set, or as feedback will set it for the level that it holds."""
+    """Return the peak at the terminal: as set, or as feedback will set it for its level."""
     excitation = measurement.excitation
     if not isinstance(excitation, HeldDwell):
         return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
@@ -131,12 +131,12 @@ _HIGHEST_TURN = 4.0
 """Largest value of Gaussian noise over its rms, within some ten thousand turns."""
 _TIMES = (0.25, 1.0, 4.0, 16.0)
 _HALF_BAND_HZ = 25_600.0
-"""What the white noise of a virtual accelerometer fills."""
+"""Band of the white noise of a virtual accelerometer [Hz]."""
 
 
 @dataclass(frozen=True)
 class Expected(Labelled):
-    """One quantity that a plan wants to know, and how well it will."""
+    """One quantity of a plan with its expected uncertainty."""
 
     DOCUMENT: ClassVar = (
         "quantity cause planned_s=time_s relative_expanded_over_s=curve coverage_factor not_stated"
@@ -146,23 +146,23 @@ class Expected(Labelled):
 
     quantity: str
     time_s: float
-    """Recorded, as planned; of a sine, the window that is looked at."""
+    """Planned recording time, or the window of a sine."""
     scatter: float | None
-    """Relative standard uncertainty by noise or chance after that time; None where it is not stated."""
+    """Relative standard uncertainty by noise or chance after that time; None if not stated."""
     cause: Cause
     lasting: float
-    """By what time does not lessen: calibrations, alignment, clock, as far as they are stated."""
+    """Stated contributions that time does not reduce: calibrations, alignment, clock."""
     not_stated: tuple[Cause, ...]
 
     def after(self, time_s: float) -> float | None:
-        """Relative expanded uncertainty after that time, of what is stated; None where noise is not."""
+        """Return the stated relative expanded uncertainty after that time; None if noise is not stated."""
         if self.scatter is None:
             return None
         return COVERAGE * float(np.hypot(self.scatter * np.sqrt(self.time_s / time_s), self.lasting))
 
     @property
     def curve(self) -> tuple[tuple[float, float | None], ...]:
-        """Recording times [s], from a quarter to sixteen times the planned, and `after` each."""
+        """Recording times [s], from 1/4 to 16 times the planned, with `after` each."""
         return tuple((factor * self.time_s, self.after(factor * self.time_s)) for factor in _TIMES)
 
     @property
@@ -198,7 +198,7 @@ class Expected(Labelled):
 
 
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
-    """Return the uncertainty that the results of a plan will have; opens no instrument.
+    """Return the expected uncertainty of a plan's results; opens no instrument.
 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
     Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
@@ -229,7 +229,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
 
 
 MOST_STEPS = 6
-"""Of which the end is predicted; the others are taken to last as long on average."""
+"""Number of stretches with a predicted end; others are taken to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
@@ -238,16 +238,16 @@ def recorded_s(measurement: Measurement) -> float:
 
 
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict for how long a measurement with `until` will record, all stretches together [s].
+    """Predict the recorded time of a measurement with `until`, over all stretches [s].
 
-    It ends at a look, and at its planned time at the latest. None where the scatter is not known beforehand,
+    It ends at a check, and at its planned time at the latest. None if the scatter is unknown beforehand,
     or without `until`.
     """
     return _in_all(measurement, rig, end_s)
 
 
 def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict after which recorded time all wishes are met, all stretches together [s].
+    """Predict the recorded time until all targets are met, over all stretches [s].
 
     None where it is not known, or no time is long enough.
     """
@@ -291,7 +291,7 @@ def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | Non
 
 
 def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
-    """Return the recorded time after which expected bounds meet the wishes [s]; None if not known."""
+    """Return the recorded time after which expected bounds meet the targets [s]; None if unknown."""
     needs = []
     for name, wish in until.wishes.items():
         found = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
@@ -308,13 +308,13 @@ def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
 
 
 def end_s(need_s: float, first_s: float, longest_s: float) -> float:
-    """Return the time of the look at which a need is met, and the longest at most [s]."""
+    """Return the time of the check at which a need is met, at most the longest [s]."""
     looks = np.ceil(np.log(min(max(need_s, first_s), longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)
     return float(min(first_s * LOOK_FACTOR ** max(0.0, looks), longest_s))
 
 
 def until_checks(facts: RecordingFacts) -> Iterator[Check]:
-    """Compare how long a recording with `until` lasted with what was predicted."""
+    """Compare the duration of a recording with `until` with its prediction."""
     notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
     if not notes:
         return
@@ -360,7 +360,7 @@ def _density(rig: Rig, role: Role) -> float | None:
 
 
 def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
-    """Yield what the fit of the analysis tells of the linear specimen's lines under the sensors' noise."""
+    """Yield the results of a fit to the linear specimen's lines with the sensors' noise."""
     excitation, specimen = measurement.excitation, specimen_of(rig)
     time_s = recorded_s(measurement)
     low_hz, high_hz = excitation.band_hz
@@ -405,7 +405,7 @@ def _expected_lines(
 ) -> FrequencyResponse | None:
     """Return the linear transmission at the lines of a noise, each with its scatter after a recorded time.
 
-    ``density_v`` is that of the voltage at the terminal, one-sided [V^2/Hz]. None if no noise of sensors is
+    ``density_v`` is the one-sided density of the terminal voltage [V^2/Hz]. None if no noise of sensors is
     stated.
     """
     if isinstance(excitation, WhiteNoise | OddMultisine):

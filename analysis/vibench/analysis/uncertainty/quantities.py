@@ -20,7 +20,7 @@ from ..sine.sweep_analysis import SweepAnalysis
 from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
-"""Parts of a window whose maxima tell how that of a whole one scatters."""
+"""Number of parts of a window whose maxima give the scatter of the whole maximum."""
 _ALIKE = 1e-12
 """Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
@@ -79,7 +79,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[B
 
 
 def _chance_share(found: NoiseResponse) -> float:
-    """Part of the lines' variance that the periods' noise does not explain; 0 where nothing tells it."""
+    """Return the share of the lines' variance that the periods' noise does not explain; 0 if unknown."""
     if found.periodic is None or found.periodic.distortion_variance is None:
         return 0.0
     more = float(np.median(found.periodic.distortion_variance))
@@ -146,7 +146,7 @@ def _of_change(relative: float) -> tuple[Contribution, ...]:
 
 
 def of_one_draw(found: DwellResponse) -> Contribution:
-    """Scatter of the largest |x| of a window, as its parts tell it."""
+    """Return the scatter of the largest |x| of a window, from its parts."""
     motion = found.displacement.settled
     window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
