@@ -158,7 +158,7 @@ def _march(
     ``states`` has shape (6, 1 or 2, motions); the second entry is the neighbour.
     """
     tableau, law, scales = method.tableau, law_of(specimen), _scales(drives)
-    numbers = np.transpose([numbers_of(specimen, drive) for drive in drives])
+    numbers = np.array([numbers_of(specimen, drive) for drive in drives]).reshape(-1, 12).T
     has_neighbour, count = states.shape[1] > 1, len(drives)
     floor = method.absolute / method.relative if method.relative < math.inf else 1.0
     slopes = np.zeros((len(tableau.nodes), *states.shape))

@@ -101,3 +101,9 @@ def test_a_step_or_a_tolerance_that_is_none_is_refused(value):
         runge_kutta(value)
     with pytest.raises(ValueError, match="positive and finite"):
         ode45(absolute=value)
+
+
+def test_no_motion_has_no_exponent():
+    """As where nothing collides: the page of the paper's claims follows only motions that do."""
+    assert textbook_exponents(gong2025(), [], ode45()).shape == (0,)
+    assert textbook_exponents(gong2025(), [], runge_kutta(1e-3)).shape == (0,)
