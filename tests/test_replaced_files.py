@@ -1,6 +1,7 @@
 """A user's file is whole under its name at any moment: a disk that refuses leaves the older one, or none."""
 
 import ast
+import errno
 import re
 import subprocess
 import sys
@@ -48,6 +49,21 @@ def test_a_refused_file_leaves_the_older_one_as_it_was(tmp_path, writer, error):
     script = [sys.executable, "-c", WRITERS[writer] + REFUSED, str(tmp_path / "file")]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
     assert (ended.stdout, ended.stderr) == (f"{error}\nTrue ['file']\n", "")
+
+
+@pytest.mark.parametrize("named", [None, "another"])
+def test_a_refused_write_names_the_file(tmp_path, named):
+    """An error of a write has no name."""
+    with pytest.raises(OSError, match="full") as refused, replace_file(tmp_path / "file"):
+        raise OSError(errno.ENOSPC, "full", named)
+    assert refused.value.filename == (named or str(tmp_path / "file"))
+
+
+def test_a_refused_rename_names_the_file(tmp_path):
+    """The unfinished file has a name that nobody gave."""
+    with pytest.raises(FileNotFoundError) as refused, replace_file(tmp_path / "file") as coming:
+        coming.unlink(missing_ok=True)
+    assert refused.value.filename == str(tmp_path / "file")
 
 
 def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path):

@@ -139,6 +139,9 @@ def replace_file(path: Path) -> Iterator[Path]:
     try:
         yield coming
         rename(coming, target)
+    except OSError as error:  # one of a write has no name, and nobody knows the other name
+        error.filename = str(path) if error.filename in (None, str(coming)) else error.filename
+        raise
     finally:
         with suppress(OSError):
             coming.unlink()
