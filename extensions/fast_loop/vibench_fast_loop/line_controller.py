@@ -3,7 +3,7 @@
 import json
 from typing import Self, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from pyvisa import VisaIOError
 
 from vibench.acquisition.drivers import Link, open_link
@@ -16,6 +16,8 @@ from .protocol import LoopFacts, LoopProgram, LoopReport, LoopRequest
 _PART = 0.01
 """Largest relative deviation of a rate from the configuration."""
 _LEAVING_S = 0.1
+_LONGEST_LINE = 1_000_000
+"""Bytes; a faulty controller may never stop."""
 Answer = TypeVar("Answer", bound=BaseModel)
 
 
@@ -89,7 +91,7 @@ class LineController:
             )
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
-            line = self._link.read_raw()
+            line = self._link.read_bytes(_LONGEST_LINE, break_on_termchar=True)
         except (VisaIOError, OSError) as error:
             raise InstrumentLost(
                 f"the real-time controller at {where} does not answer ({error}). It falls silent by itself "
@@ -100,7 +102,7 @@ class LineController:
             if isinstance(told, dict) and "refused" in told:
                 raise InstrumentError(f"the real-time controller at {where} refused: {told['refused']}")
             return kind.model_validate_json(line)
-        except (ValueError, ValidationError) as error:
+        except (ValueError, RecursionError) as error:  # pydantic's are ValueErrors
             raise InstrumentError(
                 f"what answers at {where} is no controller of loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or give the name of its driver"

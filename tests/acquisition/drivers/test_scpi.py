@@ -44,14 +44,14 @@ class Instrument:
         self.written.append(message)
         return len(message)
 
-    def read_raw(self):
+    def read_bytes(self, count, *, break_on_termchar):
         self._live()
         if not self.due:
             raise TIMEOUT
         reply = self.due.popleft()
         if isinstance(reply, BaseException):
             raise reply
-        return reply
+        return reply[:count]
 
     def close(self):
         self._live()

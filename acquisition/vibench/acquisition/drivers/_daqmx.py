@@ -148,7 +148,7 @@ def _excite(made: AIChannel, channel: Channel) -> None:
         made.ai_excit_voltage_or_current = ExcitationVoltageOrCurrent.USE_CURRENT
         made.ai_excit_val = channel.iepe_current_a
         held_a = made.ai_excit_val
-        if abs(held_a - channel.iepe_current_a) > _SAME * channel.iepe_current_a:
+        if not abs(held_a - channel.iepe_current_a) <= _SAME * channel.iepe_current_a:  # refuses a NaN too
             raise _refusal(channel, "sensor current", f"{channel.iepe_current_a:g} A", f"{held_a:g} A")
         return
     try:
@@ -183,7 +183,7 @@ def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None
         return None
     step = coefficients[1]
     rest_v = [abs(each) * (range_v / step) ** power for power, each in enumerate(coefficients) if power != 1]
-    return step if max(rest_v) <= _LINEAR * range_v else None
+    return step if all(each <= _LINEAR * range_v for each in rest_v) else None
 
 
 def _refusal(channel: Channel, what: str, sent: str, got: str) -> SettingRefused:

@@ -155,7 +155,7 @@ class DaqmxOutput:
                 samps_per_chan=self.ahead_samples,
             )
             rate_hz = float(task.timing.samp_clk_rate)
-            if abs(rate_hz - config.sample_rate_hz) > _SAME_RATE * config.sample_rate_hz:
+            if not abs(rate_hz - config.sample_rate_hz) <= _SAME_RATE * config.sample_rate_hz:
                 raise SettingRefused(
                     f"{physical} was asked for {config.sample_rate_hz:g} samples a second and takes "
                     f"{rate_hz:g}: every frequency would be off. It was released; set "

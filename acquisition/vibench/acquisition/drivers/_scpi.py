@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,15 @@ Codes = NDArray[np.uint16]
 
 # An error queue has some tens of entries; more replies than this mean that it is not being emptied.
 _LONGEST_QUEUE = 64
+# A faulty instrument may never stop. SCPI's longest text is an error of 255 letters; 8192 points have 16 kB.
+_LONGEST_TEXT = 300
+_LONGEST_REPLY = 1_000_000
 # Long enough for an old reply that is under way, short enough for an emergency stop [ms].
 _STALE_REPLY_MS = 100.0
 _LATE = pyvisa.constants.StatusCode.error_timeout
 # pyvisa-py passes on the ValueError and OSError of PyUSB when the device is gone.
 _LOST = (ValueError, OSError, pyvisa.errors.InvalidSession)
-_QUEUE_ENTRY = re.compile(r'([+-]?\d+)\s*,\s*"?([^"]*)"?')
+_QUEUE_ENTRY = re.compile(r'([+-]?[0-9]{1,9})\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
@@ -96,7 +100,7 @@ class ScpiInstrument:
     def query(self, message: str) -> str:
         """Return the reply to a query without its line end; bytes outside ASCII are kept readable."""
         # This family writes ohm as the GBK character A6 B8: invalid text must not stop a query.
-        return self._ask(message).decode("gb18030", errors="replace").strip()
+        return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
         """Return the reply to a query; repeat it once if empty, as the first one after ``*CLS`` may be."""
@@ -106,15 +110,15 @@ class ScpiInstrument:
         """Return the number in a reply; text after it is ignored."""
         reply = self.query(message)
         found = _LEADING_NUMBER.match(reply)
-        if found is None:
+        if found is None or not isfinite(number := float(found.group(1))):
             raise InstrumentError(
                 f"{self.name}: {message} was answered {reply!r}, which is not a number; try again"
             )
-        return float(found.group(1))
+        return number
 
     def query_codes(self, message: str) -> Codes:
         """Return a big-endian binary block of 16-bit codes."""
-        reply = self._ask(message)
+        reply = self._ask(message, _LONGEST_REPLY)
         try:
             first, length = pyvisa.util.parse_ieee_block_header(reply, len(reply))
         except ValueError:
@@ -184,11 +188,16 @@ class ScpiInstrument:
         self._link = self._connect()
         self._reply_due = False
 
-    def _ask(self, message: str) -> bytes:
+    def _ask(self, message: str, longest: int) -> bytes:
         with self._dialogue(message):
             self._reply_due = True
             self._link.write(message)
-            reply = self._link.read_raw()
+            reply = self._link.read_bytes(longest + 1, break_on_termchar=True)
+            if len(reply) > longest:
+                raise InstrumentError(
+                    f"{self.name}: {message} was answered by more than {longest} bytes; check its address, "
+                    "switch it off and on, and open the bench again"
+                )
             self._reply_due = False
         LOG.debug("%s answers %r", self.name, reply)
         return reply
@@ -202,7 +211,7 @@ class ScpiInstrument:
                 with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
-                        self._link.read_raw()
+                        self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=True)
                     except pyvisa.VisaIOError as error:
                         if error.error_code != _LATE:
                             raise

@@ -152,7 +152,7 @@ class SoundCardDigitizer:
                 f"the sound card {rig.daq.device!r} cannot be opened at {rig.daq.sample_rate_hz:g} samples "
                 f"a second ({error}); give a rate and channels that it has, and close what else uses it"
             ) from error
-        if abs(card.stream.samplerate - card.rate_hz) > _SAME_RATE * card.rate_hz:
+        if not abs(card.stream.samplerate - card.rate_hz) <= _SAME_RATE * card.rate_hz:
             card.stream.close()
             raise InstrumentError(
                 f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second "

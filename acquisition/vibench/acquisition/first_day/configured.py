@@ -23,6 +23,7 @@ from ..bench.result import BenchReport, CheckResult, Verdict
 from ..check.admission import check_bench
 from ..check.bench_report import bench_report
 from ..errors import AcquisitionError, CheckFailed, ConfigurationError
+from ..host.printable import printable
 from ..host.schema import schema_line
 from ..host.shipped import shipped_folder
 from ..host.toml_file import complaints, from_toml
@@ -436,7 +437,7 @@ def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
     yield f"\n{now:%Y-%m-%d %H:%M %Z}, by {operator}. Configuration: `{config.name}`."
     yield "\n## Instruments\n"
     for part, identity in bench.identities.items():
-        yield f"- {part}: {identity.reply}"
+        yield f"- {part}: {printable(identity.reply)}"
     for one in calibrations(bench.rig, datetime.now(UTC).astimezone().date()):
         yield f"- {one}{'' if one.is_valid else f': {one.advice}'}"
     yield f"\n## Confirmed by hand ({sheet.operator})\n"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..errors import InstrumentError
+from ..host.printable import shortened
 from ..host.toml_file import FrozenModel
 
 Samples = NDArray[np.float64]
@@ -314,8 +315,8 @@ class RealTimeController(Protocol):
 def read_block(digitizer: Digitizer, samples: int) -> Block:
     """Read a block, and refuse an empty one: a caller that waits for more samples would wait for ever.
 
-    Raises InstrumentError when the block is empty, has other channels, or contains volts that are not
-    finite; or the errors of `Digitizer.read`.
+    Raises InstrumentError when the block is empty, has other channels, flags an unknown one, or contains volts
+    that are not finite; or the errors of `Digitizer.read`.
 
     Parameters
     ----------
@@ -336,5 +337,10 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
         raise InstrumentError(
             f"the converter handed over samples that are no numbers, from sample {block.first_sample} on; "
             "its driver must hand over volts, or raise DataLost"
+        )
+    if unknown := {each.channel for each in block.overloads} - set(digitizer.roles):
+        raise InstrumentError(
+            f"the converter reports overloads of {shortened(repr(sorted(unknown)))}; its channels are "
+            f"{', '.join(digitizer.roles)}. Check that no other program changed its task"
         )
     return block

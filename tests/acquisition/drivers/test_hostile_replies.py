@@ -1,0 +1,133 @@
+"""Replies that no instrument should give: a sentence of bounded length, and the output is off."""
+
+import socket
+import threading
+from contextlib import contextmanager, suppress
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import Block, InstrumentError
+from vibench.acquisition.drivers import AFG1022X
+from vibench.acquisition.drivers._daqmx import linear_step_v
+from vibench.acquisition.drivers._scpi import ScpiInstrument
+from vibench.acquisition.drivers._visa_link import open_link
+from vibench.acquisition.instruments import Overload, read_block
+from vibench.virtual_rig.generator.scpi_instrument import Reply
+
+from .conftest import Logged
+
+LONGEST_SENTENCE = 2000
+REPLIES = {
+    "escapes": b"\x1b[2J\x1b]52;c;QUFB\x07\n",
+    "binary": bytes(range(256)),
+    "two megabytes": b"A" * 2_000_000 + b"\n",
+    "six thousand digits": b"9" * 6000 + b"\n",
+    "a code of six thousand digits": b"-" + b"1" * 6000 + b',"x"\n',
+    "infinite": b"1e999\n",
+    "not a number": b"NAN\n",
+    "truncated block": b"#9999",
+    "true": b"TRUE\n",
+    "complaint with escapes": b'-113,"\x1b[2J\x07"\n',
+    "long complaint": b'-113,"' + b"x" * 280 + b'"\n',
+}
+QUERIES = ("SYST:ERR?", "VOLT?", "FREQ?", "STAT?", "DATA:DATA?")
+
+
+class Hostile(Logged):
+    """Answers one query in its own way once ``query`` is set."""
+
+    query = ""
+    answer = b""
+
+    def execute(self, message):
+        reply = super().execute(message)
+        is_wanted = self.query and self.query in message.decode("latin-1")
+        return Reply(self.answer) if is_wanted and reply.data else reply
+
+
+@pytest.mark.parametrize("query", QUERIES)
+@pytest.mark.parametrize("name", REPLIES)
+def test_a_generator_with_hostile_replies_is_off_in_the_end(bus, name, query):
+    plugged = bus.plug_in(listener=Hostile)
+    generator = AFG1022X.open(plugged.config)
+    generator.load_sine(100.0, 1.0)
+    generator.start()
+    plugged.log.query, plugged.log.answer = query, REPLIES[name]
+    said = []
+    for act in (
+        lambda: generator.set_amplitude(0.5),
+        lambda: generator.load_waveform(np.sin(np.arange(64) * np.pi / 32), 100.0, 1.0),
+        generator.close,
+    ):
+        try:
+            act()
+        except InstrumentError as error:
+            said.append(str(error))
+    assert said
+    assert max(map(len, said)) < LONGEST_SENTENCE
+    assert not plugged.is_on
+
+
+@pytest.mark.parametrize("name", [name for name in REPLIES if "complaint" not in name])
+def test_an_identity_is_refused_or_bounded(bus, name):
+    plugged = bus.plug_in(listener=Hostile)
+    plugged.log.query, plugged.log.answer = "*IDN?", REPLIES[name]
+    with pytest.raises(InstrumentError) as refused:
+        AFG1022X.open(plugged.config)
+    assert len(str(refused.value)) < LONGEST_SENTENCE
+    assert not plugged.is_on
+
+
+@contextmanager
+def babbler():
+    """An instrument on a socket that answers the first query without end."""
+    server = socket.create_server(("127.0.0.1", 0))
+
+    def babble():
+        with suppress(OSError):
+            client, _ = server.accept()
+            with client:
+                client.recv(100)
+                while True:
+                    client.sendall(b"A" * 65536)
+
+    thread = threading.Thread(target=babble)
+    thread.start()
+    try:
+        yield f"TCPIP0::127.0.0.1::{server.getsockname()[1]}::SOCKET"
+    finally:
+        server.close()
+        thread.join()
+
+
+def test_a_reply_without_end_is_an_error():
+    with babbler() as resource:
+        instrument = ScpiInstrument(lambda: open_link(resource, "@py"), "the generator")
+        try:
+            with pytest.raises(InstrumentError, match=r"\*IDN\? was answered by more than 300 bytes"):
+                instrument.query("*IDN?")
+        finally:
+            instrument.disconnect()
+
+
+class Converter:
+    """A converter that flags a channel that nobody configured."""
+
+    roles = ("drive_voltage",)
+
+    def read(self, samples):
+        return Block(0, np.zeros((1, samples)), (Overload("\x1b[2J" * 1000, 0, 1),))
+
+
+def test_an_overload_of_an_unknown_channel_is_an_error():
+    with pytest.raises(InstrumentError, match="reports overloads of") as refused:
+        read_block(Converter(), 8)
+    assert str(refused.value).isprintable()
+    assert len(str(refused.value)) < LONGEST_SENTENCE
+
+
+def test_a_scale_that_is_no_number_is_no_step():
+    assert linear_step_v([0.0, 1e-6, 0.0], 5.0) == 1e-6
+    assert linear_step_v([0.0, 1e-6, float("nan")], 5.0) is None
+    assert linear_step_v([float("nan"), 1e-6], 5.0) is None
