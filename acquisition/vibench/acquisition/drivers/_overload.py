@@ -27,15 +27,14 @@ def overload_ranges(
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
     for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
-        if peak_v < OVERLOAD_FRACTION * full_scale_v:
+        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # skips NaN, which `read_block` refuses
             continue
         past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
-        if past.size:
-            breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)
-            firsts = past[np.concatenate(([0], breaks + 1))]
-            lasts = past[np.concatenate((breaks, [past.size - 1]))]
-            found += [
-                Overload(role, first_sample + int(first), first_sample + int(last))
-                for first, last in zip(firsts, lasts, strict=True)
-            ]
+        breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)
+        firsts = past[np.concatenate(([0], breaks + 1))]
+        lasts = past[np.concatenate((breaks, [past.size - 1]))]
+        found += [
+            Overload(role, first_sample + int(first), first_sample + int(last))
+            for first, last in zip(firsts, lasts, strict=True)
+        ]
     return tuple(found)

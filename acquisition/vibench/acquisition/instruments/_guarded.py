@@ -69,14 +69,9 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 
 
 def missing_package(name: str) -> str | None:
-    """Return the sentence that names our package for a name that is not installed.
+    """Return the sentence that names our package for a name such as ``"branch_continuation"``.
 
-    Returns the sentence; None if no package of ours provides that name.
-
-    Parameters
-    ----------
-    name
-        Word in a plan or a hardware configuration, such as ``"branch_continuation"``.
+    Returns None if no package of ours provides that name.
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -89,13 +84,7 @@ def missing_package(name: str) -> str | None:
 
 
 def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
-    """Return the names that a hardware configuration may use, ours and those of installed packages.
-
-    Parameters
-    ----------
-    kind
-        Group of entry points.
-    """
+    """Return the names that a hardware configuration may use, ours and those of installed packages."""
     return tuple(sorted({row.name for row in _rows(kind)}))
 
 
@@ -144,18 +133,9 @@ def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[Ent
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
-    """Load a driver, with a guard if it is not ours.
+    """Load a driver, with a guard if it is not ours; raises ConfigurationError as `plug_in` does.
 
-    Raises ConfigurationError as `plug_in` does.
-
-    Parameters
-    ----------
-    kind
-        Group of entry points.
-    name
-        Name in the hardware configuration.
-    promise
-        Protocol of the entry point's object.
+    ``promise`` is the protocol of the entry point's object.
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)

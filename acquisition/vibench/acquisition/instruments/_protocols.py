@@ -315,8 +315,8 @@ class RealTimeController(Protocol):
 def read_block(digitizer: Digitizer, samples: int) -> Block:
     """Read a block, and refuse an empty one: a caller that waits for more samples would wait for ever.
 
-    Raises InstrumentError when the block is empty, has other channels, flags an unknown one, or contains volts
-    that are not finite; or the errors of `Digitizer.read`.
+    Raises InstrumentError when the block is empty, has other channels, flags an unknown one, or contains
+    volts that are not finite; or the errors of `Digitizer.read`.
 
     Parameters
     ----------
