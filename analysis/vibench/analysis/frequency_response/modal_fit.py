@@ -73,19 +73,9 @@ class Resonance:
         return 0.5 / self.damping_ratio
 
     @property
-    def sd_quality_factor(self) -> float:
-        """Standard deviation of the quality factor."""
-        return self.quality_factor * self.sd_damping_ratio / self.damping_ratio
-
-    @property
     def half_power_bandwidth_hz(self) -> float:
         """2 damping ratio times frequency."""
         return 2 * self.damping_ratio * self.frequency_hz
-
-    @property
-    def sd_half_power_bandwidth_hz(self) -> float:
-        """Standard deviation of the half-power bandwidth."""
-        return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
 
 
 # The window of averaged segments smears modes and correlates the errors of neighbouring lines.

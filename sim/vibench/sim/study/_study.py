@@ -52,25 +52,18 @@ def expand_ranges(given: object) -> object:
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
             # Not isinstance: true is an int too.
-            if {type(start), type(stop), type(step)} <= {float, int}:
-                return frequency_range(_number(start), _number(stop), _number(step))
-            raise ValueError(
-                f"a range from {start!r} to {stop!r} in steps of {step!r} is not allowed: give three numbers"
-            )
+            if not {type(start), type(stop), type(step)} <= {float, int}:
+                raise ValueError(
+                    f"a range from {start!r} to {stop!r} by {step!r} is not allowed: give three numbers"
+                )
+            try:
+                return frequency_range(float(start), float(stop), float(step))
+            except OverflowError as error:
+                raise ValueError("a range has a number of over 300 digits; give a frequency") from error
         case list() | tuple():
             return _flatten(given)
         case _:
             return given
-
-
-def _number(given: float) -> float:
-    """Take a number of a file; whole ones may have hundreds of digits."""
-    try:
-        return float(given)
-    except OverflowError as error:
-        raise ValueError(
-            "a range has a number of more than 300 digits; give one that can be a frequency"
-        ) from error
 
 
 def _flatten(given: list[object] | tuple[object, ...]) -> object:
