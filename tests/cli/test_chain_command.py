@@ -1,6 +1,7 @@
 """`vibench chain`, as it is typed."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -96,7 +97,7 @@ def test_a_run_that_is_lost_states_how_it_ended_and_nothing_else_is_claimed(freq
 def test_a_run_without_time_for_an_error_states_that_it_is_not_known():
     found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
     assert "error not known" in found.output
-    assert "inf" not in found.output
+    assert not re.search(r"\binf\b", found.output)
 
 
 def test_an_exponent_is_reported_with_its_error():
@@ -118,7 +119,7 @@ def test_an_exponent_is_reported_with_its_error():
         (("--cells", "2,,4"), "--cells was given as '2,,4'"),
         (("--amplitude", "1e-6"), "one of --amplitude and --frequency is missing"),
         (("--amplitude", "1e-6", "--frequency", "200:200"), "200 is not below 200"),
-        (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is no number"),
+        (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is not a number"),
         (("--amplitude", "1e-6:2e-6", "--frequency", "200"), "2 numbers are not allowed here"),
         (("--recording", "a.h5", "--frequency", "200"), "a recording has its own base motion"),
         (("--recording", "nowhere.h5"), "nowhere.h5"),

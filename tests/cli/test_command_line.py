@@ -212,7 +212,7 @@ def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stan
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
     assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
-    assert f"{words[-1].removeprefix('--gap=')!r} is no number; give one in SI units" in said
+    assert f"{words[-1].removeprefix('--gap=')!r} is not a number; give one in SI units" in said
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stan
         (("--log-level", "loud", "doctor"), "'--log-level': 'loud' is not one of 'warning', 'info', 'debug'"),
         (("analyse", "x.h5", "--draws=-3"), "-3"),
         (("analyse", "x.h5", "--draws", "1e9"), "'1e9'"),
-        (("analyse", "x.h5", "--draws", "many"), "'many' is no number"),
+        (("analyse", "x.h5", "--draws", "many"), "'many' is not a number"),
     ],
 )
 def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(

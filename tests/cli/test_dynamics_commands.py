@@ -143,7 +143,7 @@ def test_zero_is_named_as_it_was_typed(command):
         (("branches", "--amplitude", "5e-6", "--frequency", "60"), "give one of them as a range"),
         (("branches", "--amplitude", "1e-6:5e-6", "--frequency", "60:70"), "give one of them as a range"),
         (("branches", "--amplitude", "5e-6", "--frequency", "70:60"), "70 is not below 60"),
-        (("branches", "--amplitude", "x", "--frequency", "60:70"), "'x' is no number"),
+        (("branches", "--amplitude", "x", "--frequency", "60:70"), "'x' is not a number"),
         (("branches", "--amplitude", "-1", "--frequency", "60:70"), "-1 is not above 0"),
         (
             ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--model", "rigid:2"),

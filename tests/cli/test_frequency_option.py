@@ -20,8 +20,8 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
         ("10:600:0", "0 is not above 0", "START:STOP:STEP"),
         ("10:600:-1", "-1 is not above 0", "START:STOP:STEP"),
         ("600:10:-1", "-1 is not above 0", "START:STOP:STEP"),
-        ("abc", "'abc' is no number", "one above 0 Hz"),
-        ("10:abc:1", "'abc' is no number", "START:STOP:STEP"),
+        ("abc", "'abc' is not a number", "one above 0 Hz"),
+        ("10:abc:1", "'abc' is not a number", "START:STOP:STEP"),
         ("10:600", "2 numbers are not allowed", "START:STOP:STEP"),
         ("10:600:1:2", "4 numbers are not allowed", "START:STOP:STEP"),
         ("0:600:1", "0 is not above 0", "one above 0 Hz"),
@@ -29,7 +29,7 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
         ("inf", "'inf' is not finite", "one above 0 Hz"),
         ("10:nan:1", "'nan' is not finite", "START:STOP:STEP"),
         ("1:1e9:1e-3", "1e+12 values is too long: at most 1000000", "give a larger step"),
-        ("", "'' is no number", "one above 0 Hz"),
+        ("", "'' is not a number", "one above 0 Hz"),
     ],
 )
 def test_what_lists_no_frequency_is_refused_with_what_was_typed_why_and_a_way_out(typed, why, way):

@@ -13,7 +13,6 @@ from vibench.analysis import (
     DRAWS,
     FEWEST_DRAWS,
     AnalysisError,
-    AnalysisFailure,
     AnalysisOptions,
     CampaignResults,
     FailedStep,
@@ -285,11 +284,6 @@ def complain_about(results: CampaignResults) -> None:
     """Raise an error with a sentence for each recording without a result or a simulation."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
-        errors.print(f"{word}: {_with_recording(failure)}")
+        errors.print(f"{word}: {failure.with_recording}")
     if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
         raise typer.Exit(ExitCode.FAILED)
-
-
-def _with_recording(failure: AnalysisFailure) -> str:
-    """Return the sentence of a failure, with the recording's name if it is missing."""
-    return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

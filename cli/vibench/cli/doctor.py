@@ -34,6 +34,8 @@ VARIABLES: Mapping[str, str] = MappingProxyType(
         TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
         KEY_VARIABLE: "key file for signing the seals of recordings",
         "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
+        "MALLOC_MMAP_THRESHOLD_": "size of arrays that background processes return at once on Linux [bytes]; "
+        "4 MiB if absent",
         "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
         "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
     }

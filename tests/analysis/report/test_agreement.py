@@ -52,4 +52,4 @@ def test_a_report_of_failures_alone_names_each_with_its_reason(tmp_path):
     page = Page(write_report(CampaignResults("x", (), failed), tmp_path / "x.html").read_text("utf-8"))
     assert page.findings == "Two recordings of two gave no result."
     assert "a.h5 No result: a is cut cannot tell" in page.visible
-    assert "b.h5: no analysis: b is cut" in page.visible.split("Two recordings")[0]
+    assert "No analysis: b.h5: b is cut" in page.visible.split("Two recordings")[0]

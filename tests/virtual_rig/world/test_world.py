@@ -277,7 +277,7 @@ def test_a_closed_conversion_no_longer_costs_anything():
 
 
 class Broken:
-    """A terminal whose voltage is no number from half a second on."""
+    """A terminal whose voltage is not a number from half a second on."""
 
     def render(self, start_s, interval_s, count):
         return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)

@@ -51,7 +51,7 @@ class Bounds:
     fail: float
 
     def verdict(self, deviation: float) -> Verdict:
-        """Judge a deviation; one that is no number fails."""
+        """Judge a deviation; one that is not a number fails."""
         if deviation <= self.well:
             return Verdict.OK
         return Verdict.WARN if deviation <= self.fail else Verdict.FAIL

@@ -71,7 +71,7 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 def missing_package(name: str) -> str | None:
     """Return the sentence that names our package for a name such as ``"branch_continuation"``.
 
-    Returns None if no package of ours provides that name.
+    Returns None if no package of ours provides that ``name``, a word of a plan or a hardware configuration.
     """
     folder = FOUND_IN.get(name)
     if folder is None:
@@ -135,7 +135,8 @@ def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[Ent
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     """Load a driver, with a guard if it is not ours; raises ConfigurationError as `plug_in` does.
 
-    ``promise`` is the protocol of the entry point's object.
+    ``kind`` is the group of entry points, ``name`` the name in the hardware configuration and ``promise`` the
+    protocol of the entry point's object.
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)

@@ -311,7 +311,7 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
 
 
 def check_calibrations(rig: Rig, today: date) -> None:
-    """Raise CheckFailed when a calibration of a rig has expired; the message names each."""
+    """Check all calibrations of a rig; raises CheckFailed, which names each one expired by ``today``."""
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:
         raise CheckFailed(

@@ -235,5 +235,5 @@ _TABLES: Mapping[str, str] = MappingProxyType(
 
 
 def sensor_table(role: str) -> str:
-    """Return the table of a hardware configuration that describes the sensor of a channel."""
+    """Return the table of a hardware configuration that describes the sensor of channel ``role``."""
     return _TABLES.get(role, f"sensors.{role}")

@@ -17,7 +17,7 @@ from vibench.sim.operating_system.this import replace_file
 from ..figures.style import DrawnFigure
 
 Rows = tuple[tuple[str, str], ...]
-LONGEST_CAPTION = 280
+LONGEST_CAPTION = 225
 """Characters of title and caption together: three lines in the column of a figure."""
 MOST_OPEN_CARDS = 12
 """Most cards that are shown unfolded, which keeps the page short."""

@@ -415,7 +415,7 @@ def write_report(
         title=results.name,
         about=_about(results),
         warnings=(
-            *(f"{each.name}: no {each.what}: {each.sentence}" for each in results.failures),
+            *(f"No {each.what}: {each.with_recording}" for each in results.failures),
             *check_warnings(results, CHANGE_A_CONCLUSION),
         ),
         findings=summary(results, [each.agreement for each in cards]),
@@ -437,8 +437,10 @@ def write_report(
 
 
 def _about(results: CampaignResults) -> str:
-    count, origins = len(results.facts), {each.is_simulated for each in results.facts}
-    which = "Some of these recordings come" if len(origins) > 1 else "These recordings come"
+    origins = {each.is_simulated for each in results.facts}
+    unread = sum(each.what is FailedStep.ANALYSIS for each in results.failures)
+    count = len(results.facts) + unread
+    which = "Some of these recordings come" if len(origins) > 1 or unread else "These recordings come"
     said = "This recording comes" if count == 1 else which
     where = f" {said} from {'simulated instruments' if True in origins else 'a real bench'}."
     return f"Report of {count} recording{'' if count == 1 else 's'}.{where if origins else ''}"

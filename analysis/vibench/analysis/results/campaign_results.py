@@ -123,6 +123,11 @@ class AnalysisFailure:
     what: FailedStep
     sentence: str
 
+    @property
+    def with_recording(self) -> str:
+        """The sentence, with the recording's name if it is missing."""
+        return self.sentence if self.name in self.sentence else f"{self.name}: {self.sentence}"
+
 
 @dataclass(frozen=True, eq=False)
 class CampaignResults:

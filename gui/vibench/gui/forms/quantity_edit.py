@@ -63,7 +63,7 @@ def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> 
     """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
     A plain number is in the unit ``shown``; without one, in the unit of an empty field.
-    Raises ConfigurationError when the text is no number or has another unit.
+    Raises ConfigurationError when the text is not a number or has another unit.
     """
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
     if match is None:

@@ -221,7 +221,7 @@ class ScenePrediction:
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON: None where there is no number."""
+        """Plain values for JSON: None where there is not a number."""
         return _fields_of(self)
 
 

@@ -20,7 +20,7 @@ def number_of(text: str, *units: str) -> float:
     found = _NUMBER.fullmatch(text)
     if found is None or found[2] not in ("", *units):
         allowed = f", alone or with {' or '.join(units)}" if units else ""
-        raise ValueError(f"{text!r} is no number{allowed}")
+        raise ValueError(f"{text!r} is not a number{allowed}")
     return float(found[1]) * _SCALES[found[2]]
 
 

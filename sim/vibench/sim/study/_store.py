@@ -242,4 +242,4 @@ def _number(cell: np.generic) -> float | int | None:
         case int():
             return value if value >= 0 else None
         case _:
-            raise TypeError(f"{value!r} is no number")
+            raise TypeError(f"{value!r} is not a number")

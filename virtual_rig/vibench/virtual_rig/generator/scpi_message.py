@@ -288,7 +288,7 @@ def text(parameter: bytes) -> str:
 def number(parameter: bytes, units: Mapping[str, float]) -> float:
     """Return the value of ``1.5kHz`` or ``INF`` in the base unit.
 
-    Raises ScpiError: -131 for a wrong unit, -104 for text that is no number.
+    Raises ScpiError: -131 for a wrong unit, -104 for text that is not a number.
     """
     if mnemonic_matches(text(parameter), "INFinity"):
         return INFINITE
