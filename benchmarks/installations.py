@@ -139,7 +139,7 @@ def table(installations: list[Installation]) -> str:
 
 
 def main() -> None:
-    """Examine every combination that was asked for, and print the table after each."""
+    """Examine every combination that was requested, and print the table after each."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--python", nargs="+", default=[sys.executable], metavar="PROGRAM")
     parser.add_argument("--form", nargs="+", default=["wheel", "editable"], choices=["wheel", "editable"])

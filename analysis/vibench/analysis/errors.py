@@ -10,7 +10,7 @@ class InvalidRequest(AnalysisError, ValueError):
 
 
 class NotEnoughData(AnalysisError, ValueError):
-    """The recording is too short, or too much of it is invalid, for the result that was asked for."""
+    """The recording is too short, or too much of it is invalid, for the result that was requested."""
 
 
 class UnusableData(AnalysisError, ValueError):

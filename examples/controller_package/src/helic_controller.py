@@ -114,7 +114,7 @@ class HelicController:
         """Go over to a program."""
         if len(program.reference_v) > self._harmonics:
             raise InstrumentError(
-                f"{len(program.reference_v)} harmonics were asked for, and the board at {self._link.where} "
+                f"{len(program.reference_v)} harmonics were requested, and the board at {self._link.where} "
                 f"plays {self._harmonics}. Nothing was changed; ask for fewer"
             )
         gains = pd_gains(program.feedback, 1 / self._facts.rate_hz)

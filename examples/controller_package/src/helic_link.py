@@ -55,7 +55,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Packet:
-    """Samples of the sources that were asked for."""
+    """Samples of the sources that were requested."""
 
     number: int
     first: int

@@ -69,7 +69,7 @@ def pd_gains(feedback: LoopFeedback | None, step_s: float) -> tuple[float, float
     largest = np.abs(answers).max()
     if np.any(base) or not 0.0 <= kept < 1.0 or np.abs(m0[1:] - expected).max() > _SAME * largest:
         raise InstrumentError(
-            f"a law that remembers {len(feedback.output)} numbers was asked for, and HELIC-DAQ's PID takes "
+            f"a law that remembers {len(feedback.output)} numbers was requested, and HELIC-DAQ's PID takes "
             "proportional and derivative ones of m0's velocity alone. Nothing was changed; write "
             'pd_of = "m0_velocity" into [controller], and one is designed'
         )

@@ -174,7 +174,7 @@ class PlainScpiGenerator:
         lowest, highest = self.amplitude_range_vpp
         if not (lowest <= amplitude_vpp <= highest and 0 < frequency_hz <= HIGHEST_HZ):
             raise LimitExceeded(
-                f"{amplitude_vpp:g} Vpp at {frequency_hz:g} Hz was asked for; {lowest:g} to {highest:g} Vpp "
+                f"{amplitude_vpp:g} Vpp at {frequency_hz:g} Hz was requested; {lowest:g} to {highest:g} Vpp "
                 f"up to {HIGHEST_HZ:g} Hz are allowed. Nothing was sent"
             )
 

@@ -70,7 +70,7 @@ def test_further_points_stand_behind_the_one_that_asked(journal):
 
 
 def test_a_further_point_of_a_name_that_exists_is_refused_and_nothing_is_changed(journal):
-    with pytest.raises(RecordingError, match="give every further measurement a name of its own"):
+    with pytest.raises(RecordingError, match="give every further measurement its own name"):
         journal.follow_up("one", (Point("new", dwell("new")), Point("Three", dwell("Three"))))
     assert [point.name for point in journal.points()] == ["one", "two", "three"]
     assert not journal.points()[0].is_followed_up

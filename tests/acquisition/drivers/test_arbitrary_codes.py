@@ -1,4 +1,4 @@
-"""The mapping from values to codes: what the terminal plays is what was asked for, within one step."""
+"""The mapping from values to codes: what the terminal plays is what was requested, within one step."""
 
 import numpy as np
 import pytest

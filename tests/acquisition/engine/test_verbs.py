@@ -170,7 +170,7 @@ def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
         VERBS["stop"], {"level": StopLevel.RAMP, "reason": "smoke"}
     )
     request = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.WAIVED)
-    with pytest.raises(EngineError, match="a stop was asked for while the campaign was being armed"):
+    with pytest.raises(EngineError, match="a stop was requested while the campaign was being armed"):
         handler.carry_out(VERBS["arm"], {"campaign_request": request})
     assert engine.published.state is EngineState.READY
     engine.close()

@@ -208,7 +208,7 @@ def check_time(stop, fault, error, state, took_s):
     if error is not None and fault.ends_the_run:
         assert took_s <= SILENT_AFTER_FAULT_S + 1e-3
     elif stop.silent_within_s is not None and fault.is_reachable:
-        # A ramp down that was under way is finished first, unless something harder was asked for.
+        # A ramp down that was under way is finished first, unless something harder was requested.
         under_way_s = RAMP_S if state is RunState.RAMPING_DOWN else 0.0
         assert took_s <= stop.silent_within_s + under_way_s + 1e-3
 

@@ -155,7 +155,7 @@ def test_where_nothing_was_played_there_are_no_densities(tmp_path):
 
 
 def test_a_format_without_a_place_for_spectra_states_which_has_one(known, tmp_path):
-    with pytest.raises(InvalidRequest, match=r"spectra were asked for as csv.*ask for uff"):
+    with pytest.raises(InvalidRequest, match=r"spectra were requested as csv.*ask for uff"):
         export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())
 

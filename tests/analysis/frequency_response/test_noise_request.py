@@ -141,7 +141,7 @@ def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
             "a resolution and a number of averages were given; give one",
         ),
         ({"resolution_hz": 0.0}, "must be finite and more than 0"),
-        ({"segment_s": np.inf}, "a segment length of inf was asked for; it must be finite"),
+        ({"segment_s": np.inf}, "a segment length of inf was requested; it must be finite"),
         ({"averages": 1.0}, "needs more than 1"),
         ({"estimator": Estimator.HV}, "without a noise ratio"),
         ({"noise_ratio": 1.0}, "only hv"),

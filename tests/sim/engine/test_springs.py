@@ -1,4 +1,4 @@
-"""Stops that are springs: flown exactly, whatever the accuracy that was asked for."""
+"""Stops that are springs: flown exactly, whatever the accuracy that was requested."""
 
 import numpy as np
 import pytest

@@ -502,8 +502,8 @@ class Journal(ClosedOnLeaving):
         except sqlite3.IntegrityError as error:
             names = ", ".join(repr(each.name) for each in points)
             raise RecordingError(
-                f"{added_after!r} asks for {names}, and such a point stands in the campaign already. "
-                "Nothing was recorded over it; give every further measurement a name of its own"
+                f"{added_after!r} asks for {names}, which is already in the campaign. "
+                "Nothing was recorded over it; give every further measurement its own name"
             ) from error
 
     @contextmanager

@@ -55,7 +55,7 @@ MEANINGS: dict[Code, Meaning] = {
         "check that the sample clock runs and the device is connected, then start the run again",
     ),
     Code.SAMPLES_WILL_NEVER_BE_AVAILABLE: Meaning(
-        InstrumentError, "samples were asked for past the end of the acquisition", "start the run again"
+        InstrumentError, "samples were requested past the end of the acquisition", "start the run again"
     ),
     Code.PAL_RESOURCE_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),
     Code.RESOURCE_ALREADY_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),

@@ -112,7 +112,7 @@ class FilePlayer:
             self._is_running = False
             raise InstrumentLost(
                 f"{self._recording.path.name} ends after {self._recording.samples} samples, and sample "
-                f"{last} was asked for; play it back under the plan that it was made with"
+                f"{last} was requested; play it back under the plan that it was made with"
             )
         volts = np.stack([self._volts(role, first, last) for role in self.roles])
         if np.isnan(volts).any():

@@ -96,7 +96,7 @@ class GeneratorModel:
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
             most = f"up to {self.longest_sweep_s:g} s" if self.longest_sweep_s else "not at all"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was asked for; the {self.name} sweeps by "
+                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} sweeps by "
                 f"itself {most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
@@ -139,7 +139,7 @@ def _require(value: float, allowed: tuple[float, float], unit: str, reason: str)
     lowest, highest = allowed
     if not lowest <= value <= highest:  # so that a NaN is refused
         raise LimitExceeded(
-            f"{value:g} {unit} was asked for; {lowest:g} to {highest:g} {unit} are allowed ({reason}). "
+            f"{value:g} {unit} was requested; {lowest:g} to {highest:g} {unit} are allowed ({reason}). "
             "Nothing was sent; choose a value in that range"
         )
 
@@ -267,4 +267,4 @@ class NoGenerator:
 
 
 NO_GENERATOR = NoGenerator("no function generator")
-FILE_GENERATOR = NoGenerator("a recording", "what was played stands in the recording that is played back")
+FILE_GENERATOR = NoGenerator("a recording", "the recording contains what was played")

@@ -156,7 +156,7 @@ class SoundCardDigitizer:
             card.stream.close()
             raise InstrumentError(
                 f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second "
-                f"where {card.rate_hz:g} were asked for; give daq.sample_rate_hz a rate that it has"
+                f"where {card.rate_hz:g} were requested; give daq.sample_rate_hz a rate that it has"
             )
         return cls(card, rig, channels)
 
@@ -357,7 +357,7 @@ def _input(channel: Channel, rig: Rig) -> int:
         raise ConfigurationError(
             f"{channel.role.value}: a sound card's input is coupled to AC, feeds no sensor, and reaches "
             f"{full_scale_v:g} V here; {channel.coupling}, {1e3 * channel.iepe_current_a:g} mA and "
-            f'{channel.range_v:g} V were asked for. Give coupling = "AC", a range within it, and an IEPE '
+            f'{channel.range_v:g} V were requested. Give coupling = "AC", a range within it, and an IEPE '
             "supply in front"
         )
     return _number(name, "in")

@@ -214,7 +214,7 @@ class RequestHandler:
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
         if stops != self._stops:
             raise EngineError(
-                "a stop was asked for while the campaign was being armed. Nothing was armed; arm it again"
+                "a stop was requested while the campaign was being armed. Nothing was armed; arm it again"
             )
         self._attendance, self._patience_s = plan.attendance, plan.patience_s
         self._request = campaign_request

@@ -330,7 +330,7 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
     if block.volts.ndim != 2 or block.volts.shape[0] != rows or block.volts.shape[1] == 0:
         raise InstrumentError(
             f"the converter handed over a block of shape {block.volts.shape} where {samples} samples of "
-            f"{rows} channels were asked for; its driver must wait until they are there, or raise "
+            f"{rows} channels were requested; its driver must wait until they are there, or raise "
             "InstrumentLost"
         )
     if not np.isfinite(block.volts).all():

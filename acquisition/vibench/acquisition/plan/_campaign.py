@@ -91,7 +91,7 @@ class Campaign(FrozenModel):
         if twice:
             raise ValueError(
                 f"two measurements would be recorded as {twice[0]!r}; give every measurement and sweep "
-                "a name of its own, and every axis different values (capital letters do not count)"
+                "its own name, and every axis different values (capital letters do not count)"
             )
         return self
 

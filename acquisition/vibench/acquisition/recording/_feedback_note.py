@@ -252,7 +252,7 @@ class BranchEnd(StrEnum):
     """Reason for the end of a branch."""
 
     RANGE = "its frequency left the range"
-    POINTS = "it has as many points as were asked for"
+    POINTS = "it has as many points as were requested"
     LOST = "no further point was found, however short the step"
 
 
@@ -300,7 +300,7 @@ class BranchStabilityNote(AbstractNote):
     multiplier_u: SixFigures | None
     """Standard uncertainty; bounds of 95 % are 2.1 times that away."""
     perturbation: SixFigures
-    """Rms change of base and m0 that was asked for: fundamentals over themselves, the larger of both."""
+    """Rms change of base and m0 that was requested: fundamentals over themselves, the larger of both."""
     moved: SixFigures
     """How far the fundamental of m0 was afterwards from what it was before, over itself."""
 

@@ -279,7 +279,7 @@ class Recording(RecordingDescription):
     ) -> Iterator[RecordedBlock]:
         """Yield a range in blocks of ``samples`` (the last may be shorter)."""
         if samples < 1:
-            raise RecordingError(f"Blocks of {samples} samples were asked for; allowed are 1 and more.")
+            raise RecordingError(f"Blocks of {samples} samples were requested; allowed are 1 and more.")
         begin, end = self._range(start, stop)
         for first in range(begin, end, samples):
             last = min(first + samples, end)
@@ -399,7 +399,7 @@ class Recording(RecordingDescription):
         end = self.samples if stop is None else stop
         if not 0 <= start <= end <= self.samples:
             raise RecordingError(
-                f"Samples {start} to {end} were asked for; {self.path} has samples 0 to {self.samples}."
+                f"Samples {start} to {end} were requested; {self.path} has samples 0 to {self.samples}."
             )
         return start, end
 

@@ -88,7 +88,7 @@ def excerpt(
     """
     wanted = tuple(roles) or recording.roles
     if len(set(wanted)) != len(wanted):
-        raise InvalidRequest(f"the channels {', '.join(wanted)} were asked for; name each channel once")
+        raise InvalidRequest(f"the channels {', '.join(wanted)} were requested; name each channel once")
     if recording.samples == 0:
         raise NotEnoughData(
             f"{recording.path.name} holds no samples ({recording.state.value}): none to export"
@@ -98,7 +98,7 @@ def excerpt(
     stop = recording.samples if to_s is None else _sample(to_s * rate)
     if not 0 <= start < stop <= recording.samples:
         raise InvalidRequest(
-            f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was asked for; "
+            f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was requested; "
             f"{recording.path.name} goes from 0 to {recording.duration_s:.9g} s; give a stretch inside"
         )
     return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)

@@ -227,7 +227,7 @@ def export_functions(
     if write is None:
         able = " and ".join(each.value for each, row in EXPORTERS.items() if row.write_functions is not None)
         raise InvalidRequest(
-            f"spectra were asked for as {to.value}, which is written for samples; ask for {able}, or take "
+            f"spectra were requested as {to.value}, which is written for samples; ask for {able}, or take "
             "the tables that vibench analyse writes"
         )
     facts = facts_path(path)

@@ -140,7 +140,5 @@ class ImportMapping(FrozenModel):
         roles = [each.role for each in self.channels]
         twice = sorted({role for role in roles if roles.count(role) > 1})
         if twice:
-            raise ValueError(
-                f"{', '.join(twice)} is given more than once; each channel needs a role of its own"
-            )
+            raise ValueError(f"{', '.join(twice)} is given more than once; each channel needs its own role")
         return self

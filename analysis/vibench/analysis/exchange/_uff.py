@@ -217,7 +217,7 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     if is_binary:
         order, numbers, length = (_whole(kind[a:b]) for a, b in ((7, 13), (13, 19), (31, 43)))
         if order not in BYTE_ORDERS:
-            raise ValueError(f"its byte order is {order}, and only 1 (little end first) and 2 are known")
+            raise ValueError(f"its byte order is {order}, and only 1 (little-endian) and 2 are known")
         if numbers != IEEE:
             raise ValueError(f"its binary numbers are of kind {numbers}, and only {IEEE} (IEEE) is known")
         file.seek(offset + (count * SIZES[ordinate] if ordinate in SIZES else length))

@@ -59,7 +59,7 @@ def comparison_figure(
         Curve and reference; their difference is drawn below.
     """
     if not curves:
-        raise InvalidRequest("a figure of no curves was asked for; choose one or more")
+        raise InvalidRequest("a figure of no curves was requested; choose one or more")
     difference = None if pair is None else curve_difference(*pair)
     with styled():
         rows = 1 if difference is None else 2

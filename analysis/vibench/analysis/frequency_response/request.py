@@ -154,12 +154,12 @@ class FrequencyResponseRequest:
             raise InvalidRequest(f"{' and '.join(given)} were given; give one, the others follow from it")
         for name, value in given.items():
             if not (np.isfinite(value) and value > 0):
-                raise InvalidRequest(f"{name} of {value:g} was asked for; it must be finite and more than 0")
+                raise InvalidRequest(f"{name} of {value:g} was requested; it must be finite and more than 0")
         if self.averages is not None and self.averages <= 1:
-            raise InvalidRequest(f"{self.averages:g} averages were asked for; a coherence needs more than 1")
+            raise InvalidRequest(f"{self.averages:g} averages were requested; a coherence needs more than 1")
         if self.estimator is Estimator.HV and self.noise_ratio is None:
             raise InvalidRequest(
-                "hv was asked for without a noise ratio; give the noise density of the response over that of "
+                "hv was requested without a noise ratio; give the noise density of the response over that of "
                 "the base, or use the drive-referenced estimator"
             )
         if self.estimator is not Estimator.HV and self.noise_ratio is not None:
@@ -170,7 +170,7 @@ class FrequencyResponseRequest:
             )
         if not 0 < self.confidence < 1:
             raise InvalidRequest(
-                f"a confidence of {self.confidence:g} was asked for; it lies between 0 and 1"
+                f"a confidence of {self.confidence:g} was requested; it lies between 0 and 1"
             )
         hop_samples(_PROXY_SAMPLES, self.overlap)
 

@@ -318,7 +318,7 @@ def _check(settings: FrequencyResponseSettings) -> None:
     if settings.estimator is Estimator.HV:
         if ratio is None:
             raise InvalidRequest(
-                "hv was asked for without a noise ratio; give noise_ratio = noise density of the response "
+                "hv was requested without a noise ratio; give noise_ratio = noise density of the response "
                 "over that of the drive, or use the drive-referenced estimator"
             )
         if not (ratio >= 0 and np.isfinite(ratio)):

@@ -55,7 +55,7 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     columns``, see `column_starts`.
     """
     if columns < 1:
-        raise InvalidRequest(f"{columns} columns were asked for; a picture has 1 or more")
+        raise InvalidRequest(f"{columns} columns were requested; a picture has 1 or more")
     count = samples.shape[-1]
     if count <= columns:
         return samples, samples
@@ -249,7 +249,7 @@ class RecordingOverview:
         begin, end = max(0, start), min(stop, self.recording.samples)
         if not (begin < end and columns >= 1 and roles):
             raise InvalidRequest(
-                f"samples {start} to {stop} of {len(roles)} channels in {columns} columns were asked for; "
+                f"samples {start} to {stop} of {len(roles)} channels in {columns} columns were requested; "
                 f"{self.recording.path.name} has samples 0 to {self.recording.samples}"
             )
         wanted = (end - begin) / columns

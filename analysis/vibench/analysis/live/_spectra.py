@@ -44,7 +44,7 @@ class SpectrumSettings:
     def __post_init__(self) -> None:
         if self.segment_samples < 2 or self.averages < _LEAST_SEGMENTS:
             raise InvalidRequest(
-                f"{self.averages} segments of {self.segment_samples} samples were asked for; "
+                f"{self.averages} segments of {self.segment_samples} samples were requested; "
                 "give 2 or more of both"
             )
         hop_samples(self.segment_samples, self.overlap)

@@ -60,7 +60,7 @@ class SimilarityCurve:
         low, high = self.frequency_hz[0], self.frequency_hz[-1]
         if frequency_hz[0] < low or frequency_hz[-1] > high:
             raise InvalidRequest(
-                f"the curve holds {low:g} to {high:g} Hz and was asked for {frequency_hz[0]:g} to "
+                f"the curve holds {low:g} to {high:g} Hz and was requested {frequency_hz[0]:g} to "
                 f"{frequency_hz[-1]:g}; compare within it"
             )
         between = np.interp(np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.response))
@@ -134,7 +134,7 @@ def similarity(
     """
     if not np.array_equal(reference.frequency_hz, model.frequency_hz):
         raise InvalidRequest(
-            "the two curves stand at different frequencies; bring one to the other's with Curve.at"
+            "the two curves have different frequencies; bring one to the other's with Curve.at"
         )
     if not threshold > 0.0:
         raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")

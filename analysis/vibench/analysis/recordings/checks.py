@@ -204,7 +204,7 @@ def _ranges(facts: RecordingFacts) -> Iterator[Check]:
 def _rates(facts: RecordingFacts) -> Check:
     actual, wanted = facts.sample_rate_hz, facts.requested_sample_rate_hz
     same = abs(actual - wanted) <= _SAME_RATE * wanted
-    text = f"{actual:.6g} samples/s" + ("" if same else f", where {wanted:.6g} were asked for")
+    text = f"{actual:.6g} samples/s" + ("" if same else f", where {wanted:.6g} were requested")
     return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
 
 

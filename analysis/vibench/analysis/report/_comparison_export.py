@@ -76,7 +76,7 @@ def write_comparison(
 
 def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     if not recordings:
-        raise InvalidRequest("a report of no recordings was asked for; add a recording to the comparison")
+        raise InvalidRequest("a report of no recordings was requested; add a recording to the comparison")
     kept = [kept_result(each) for each in recordings]
     failures = tuple(failure for _, failed in kept for failure in failed)
     write_report(CampaignResults(target.stem, tuple(result for result, _ in kept), failures), target)
@@ -85,7 +85,7 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
 def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
     """Return all curves in one table; headings name curve and unit."""
     if not curves:
-        raise InvalidRequest("numbers of no curves were asked for; choose one or more")
+        raise InvalidRequest("numbers of no curves were requested; choose one or more")
     columns: list[tuple[str, tuple[float | str, ...]]] = []
     for each in curves:
         columns += [

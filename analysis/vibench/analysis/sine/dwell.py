@@ -397,7 +397,7 @@ def _window(displacement: ConvertedSignal, window_s: float) -> slice:
     if stop - length < displacement.edge_samples:
         have_s = displacement.settled.size / displacement.sample_rate_hz
         raise NotEnoughData(
-            f"a window of {window_s:g} s was asked for, but without the ends that integration disturbs "
+            f"a window of {window_s:g} s was requested, but without the ends that integration disturbs "
             f"{have_s:.3g} s are left; ask for less or record longer"
         )
     return slice(stop - length, stop)

@@ -289,7 +289,7 @@ def amplitude_spectrum(
     """
     count = samples.size
     if count < 2:
-        raise InvalidRequest(f"a spectrum of {count} samples was asked for; it needs at least 2")
+        raise InvalidRequest(f"a spectrum of {count} samples was requested; it needs at least 2")
     chosen = window_by_name(window)
     values = taper(chosen, count)
     spectrum = fft.rfft((samples - np.mean(samples)) * values)
@@ -353,7 +353,7 @@ class SpectrogramSums:
         self._length = round(segment_s * sample_rate_hz)
         if not (0 < highest_hz <= sample_rate_hz / 2 and self._length >= 2):
             raise InvalidRequest(
-                f"rows up to {highest_hz:g} Hz by segments of {segment_s:g} s were asked for at "
+                f"rows up to {highest_hz:g} Hz by segments of {segment_s:g} s were requested at "
                 f"{sample_rate_hz:g} samples a second; give a frequency up to half of that, and two samples"
             )
         if samples < self._length:

@@ -159,7 +159,7 @@ class ChainTrajectory:
     """Motion, impacts and outcome of a run of a chain."""
 
     time_s: Floats
-    """Shape (n,); empty when no sample rate was asked for."""
+    """Shape (n,); empty when no sample rate was requested."""
     states: Floats
     """Shape (n, cells, 6): x, y, z, vx, vy, vz of every cell [m, m/s], absolute."""
     final_state: Floats

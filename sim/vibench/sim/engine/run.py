@@ -289,7 +289,7 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
     beyond = max(p - upper, -p - lower)
     if beyond > INSIDE * (min(lower, upper) + float(np.abs(motion[:3]).sum())):
         msg = (
-            f"A start at y - z = {p} m is not allowed: rigid stops stand at {-lower} and {upper} m; "
+            f"A start at y - z = {p} m is not allowed: rigid stops are at {-lower} and {upper} m; "
             "start between them."
         )
         raise ValueError(msg)

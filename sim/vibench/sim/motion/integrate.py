@@ -97,7 +97,7 @@ class Trajectory:
     """States, impacts and outcome of a run."""
 
     time_s: Floats
-    """Shape (n,); empty when no sample rate was asked for."""
+    """Shape (n,); empty when no sample rate was requested."""
     states: Floats
     """Shape (n, 6): x, y, z, vx, vy, vz [m, m/s], absolute."""
     final_state: Floats

@@ -41,7 +41,7 @@ def open_for_all(path: Path) -> int:
     found = os.fstat(descriptor)
     if not stat.S_ISREG(found.st_mode) or found.st_nlink != 1:
         os.close(descriptor)
-        raise OSError(errno.EINVAL, "it is no file of its own", str(path))
+        raise OSError(errno.EINVAL, "it is not a separate regular file", str(path))
     return descriptor
 
 

@@ -19,7 +19,7 @@ PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 BUDGET_S = 1.0
 """Default budget of a scene in addition to its own run."""
 CLEAR, FEWEST, MOST = 8, 16, 64
-"""Starts that are followed, that which was asked for among them: the first where all of them settled on one
+"""Starts that are followed, that which was requested among them: the first where all of them settled on one
 motion, or chaos certainly lasts; the last where they came to more than one motion, and the budget allows."""
 
 

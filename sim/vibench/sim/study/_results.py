@@ -45,7 +45,7 @@ class Session:
 
 
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
-    """Read what was asked for; raises StudyError when the file is none of a plan of this ``kind``."""
+    """Read what was requested; raises StudyError when the file is none of a plan of this ``kind``."""
     with _open_store(path, kind) as file:
         return _plan(path, file, kind)
 

@@ -109,7 +109,7 @@ def test_an_option_that_is_not_allowed_is_refused_in_words(page):
     form = page.panel.form.form
     form.show_content({"estimator": "hv"})
     assert page.panel.options() is None
-    assert "hv was asked for without a noise ratio" in page.panel.form.complaint
+    assert "hv was requested without a noise ratio" in page.panel.form.complaint
     assert not page.panel._again.isEnabled()
     form.show_content({"estimator": "hv", "noise_ratio": 2.0})
     assert page.panel.options().request.noise_ratio == 2.0
