@@ -51,8 +51,8 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
     Returns
     -------
-    Smallest and largest value of each column, shape (..., columns). Column c starts at sample ``c * n //
-    columns``, see `column_starts`.
+    Smallest and largest value of each column, shape (..., columns). Column c starts at sample
+    ``c * n // columns``, see `column_starts`.
     """
     if columns < 1:
         raise InvalidRequest(f"{columns} columns were requested; a picture has 1 or more")
