@@ -111,5 +111,5 @@ def test_an_interval_without_length_and_ends_outside_of_one_are_refused():
     run = CubicRun(gong2025(), 1e-5, np.zeros(6), 1e-7)
     with pytest.raises(ValueError, match="their ends must lie within them"):
         run.advance(np.zeros((3, 4)), RunRecord(10), last_to_s=2e-5)
-    with pytest.raises(ValueError, match="rigid stops stand at"):
+    with pytest.raises(ValueError, match="rigid stops are at"):
         CubicRun(gong2025(contact="rigid:0.5"), 1e-5, [0.0, 1e-3, 0.0, 0.0, 0.0, 0.0], 1e-7)

@@ -410,7 +410,7 @@ def test_a_run_in_two_parts_ends_where_the_whole_does_even_cut_while_held(first_
 
 @pytest.mark.parametrize("p", [45.1e-6, -46e-6])
 def test_a_start_inside_a_rigid_stop_is_refused(p):
-    with pytest.raises(ValueError, match=r"A start at y - z = .* is not allowed: rigid stops stand at"):
+    with pytest.raises(ValueError, match=r"A start at y - z = .* is not allowed: rigid stops are at"):
         integrate(rigid(0.5), STILL, 0.1, initial_state=[0.0, p, 0.0, 0.0, 0.0, 0.0])
 
 
