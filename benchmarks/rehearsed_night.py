@@ -98,7 +98,7 @@ class Account:
             print(f"{len(self._last):4} points  {held}  {self.wall_s:6.0f} s", flush=True)
 
     def happened(self, event: CampaignEvent) -> None:
-        """Say what happens, where that was requested."""
+        """Print what happens, if the caller wants it."""
         if "--say" in sys.argv:
             print(f"{self.wall_s:7.1f} s {event.kind}: {event.text}"[:200], flush=True)
 

@@ -502,7 +502,7 @@ class Journal(ClosedOnLeaving):
         except sqlite3.IntegrityError as error:
             names = ", ".join(repr(each.name) for each in points)
             raise RecordingError(
-                f"{added_after!r} asks for {names}, which is already in the campaign. "
+                f"{added_after!r} adds {names}, but a point of that name is already in the campaign. "
                 "Nothing was recorded over it; give every further measurement its own name"
             ) from error
 

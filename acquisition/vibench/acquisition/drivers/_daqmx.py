@@ -347,7 +347,7 @@ class DaqmxDigitizer:
         self.sample_rate_hz = float(task.timing.samp_clk_rate)
         if not rate_hz * (1 - 1e-6) <= self.sample_rate_hz < _MOST_COERCED * rate_hz:
             raise SettingRefused(
-                f"{self._config.device} was requested {rate_hz:g} samples a second and takes "
+                f"{self._config.device} was set to {rate_hz:g} samples a second and takes "
                 f"{self.sample_rate_hz:g}; the next higher rate of the device was expected. It is released; "
                 "set daq.sample_rate_hz to a rate that it has"
             )

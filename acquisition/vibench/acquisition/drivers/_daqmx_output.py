@@ -157,7 +157,7 @@ class DaqmxOutput:
             rate_hz = float(task.timing.samp_clk_rate)
             if not abs(rate_hz - config.sample_rate_hz) <= _SAME_RATE * config.sample_rate_hz:
                 raise SettingRefused(
-                    f"{physical} was requested {config.sample_rate_hz:g} samples a second and takes "
+                    f"{physical} was set to {config.sample_rate_hz:g} samples a second and takes "
                     f"{rate_hz:g}: every frequency would be off. It was released; set "
                     "daq.output.sample_rate_hz to a rate that it has"
                 )

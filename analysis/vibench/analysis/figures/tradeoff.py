@@ -23,7 +23,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
 
     """
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
-    # Markers of their own distinguish methods beyond the number of colours.
+    # Methods beyond the number of colours differ by their markers.
     looks = {
         method: (LEVELS[place % len(LEVELS)], LEVEL_STYLES[place % len(LEVELS)], place // len(LEVELS))
         for place, method in enumerate(methods)

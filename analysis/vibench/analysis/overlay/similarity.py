@@ -60,8 +60,8 @@ class SimilarityCurve:
         low, high = self.frequency_hz[0], self.frequency_hz[-1]
         if frequency_hz[0] < low or frequency_hz[-1] > high:
             raise InvalidRequest(
-                f"the curve holds {low:g} to {high:g} Hz and was requested {frequency_hz[0]:g} to "
-                f"{frequency_hz[-1]:g}; compare within it"
+                f"{frequency_hz[0]:g} to {frequency_hz[-1]:g} Hz was requested, but the curve holds only "
+                f"{low:g} to {high:g} Hz; compare within it"
             )
         between = np.interp(np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.response))
         return SimilarityCurve(frequency_hz, np.exp(between), self.amplitude_m)

@@ -192,7 +192,7 @@ def _branch_switches(
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # A branch that joins a simpler one has no event of its own there.
+        # Where a branch joins a simpler one, the event belongs to the simpler one.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue

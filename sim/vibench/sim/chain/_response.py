@@ -201,8 +201,8 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
     """Energy of every cell: of its masses, its springs with the link to the cell before, and its stops.
 
-    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest their sum stays as
-    it is. The energy that a Hunt and Crossley contact stores is that of its Hertz spring.
+    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest their sum is
+    constant. A Hunt-Crossley contact stores the energy of its Hertz spring.
 
     Parameters
     ----------
