@@ -14,10 +14,12 @@ import sys
 import tempfile
 import time
 import traceback
+from dataclasses import asdict, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Self
 
-from .limits import HANGS_S, MOST_BYTES, Case, Ending
+from .limits import MOST_BYTES, Case, Ending
 
 ROOT = Path(__file__).resolve().parents[2]
 GRACE_S = 2.0
@@ -44,12 +46,12 @@ class CommandRunner:
         """Run a case in a new folder, which is removed afterwards."""
         with tempfile.TemporaryDirectory(prefix="vibench_attack_") as name:
             case.lay(Path(name))
-            return self.run_in(Path(name), case.arguments)
+            return self.run_in(Path(name), case)
 
-    def run_in(self, folder: Path, arguments: tuple[str, ...]) -> Ending:
-        """Run ``vibench`` with arguments in a folder that is there."""
+    def run_in(self, folder: Path, case: Case) -> Ending:
+        """Run ``vibench`` as a case says in a folder that is there."""
         before = _files(folder)
-        asked = json.dumps({"folder": str(folder), "arguments": arguments})
+        asked = json.dumps({"folder": str(folder), **asdict(replace(case, files={}))})
         self._server.stdin.write(asked + "\n")
         self._server.stdin.flush()
         answer = self._server.stdout.readline()
@@ -90,17 +92,18 @@ def serve() -> None:
 
     for line in sys.stdin:
         asked = json.loads(line)
-        print(json.dumps(ended(Path(asked["folder"]), asked["arguments"])), flush=True)
+        folder, case = Path(asked.pop("folder")), Case(**asked)
+        print(json.dumps(ended(folder, case)), flush=True)
 
 
-def ended(folder: Path, arguments: list[str]) -> dict[str, object]:
+def ended(folder: Path, case: Case) -> dict[str, object]:
     """Run one command to its end, or to the end of its time."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         began = time.monotonic()
         number = os.fork()
         if number == 0:
-            _become_command(folder, arguments, out.fileno(), err.fileno())
-        status, usage = _waited(number)
+            _become_command(folder, case, out.fileno(), err.fileno())
+        status, usage = _waited(number, case.hangs_s)
         return {
             "code": os.waitstatus_to_exitcode(status),
             "took_s": usage.ru_utime + usage.ru_stime,
@@ -111,11 +114,11 @@ def ended(folder: Path, arguments: list[str]) -> dict[str, object]:
         }
 
 
-def _waited(number: int) -> tuple[int, resource.struct_rusage]:
+def _waited(number: int, hangs_s: float) -> tuple[int, resource.struct_rusage]:
     """Wait for a process to end, or end it with everything that it started."""
     descriptor = os.pidfd_open(number)
     try:
-        ready, _, _ = select.select([descriptor], [], [], HANGS_S + GRACE_S)
+        ready, _, _ = select.select([descriptor], [], [], hangs_s + GRACE_S)
     finally:
         os.close(descriptor)
     if not ready:
@@ -129,7 +132,7 @@ def _text(file: object) -> str:
     return file.read().decode(errors="replace")
 
 
-def _become_command(folder: Path, arguments: list[str], out: int, err: int) -> None:
+def _become_command(folder: Path, case: Case, out: int, err: int) -> None:
     """Never returns."""
     os.setpgid(0, 0)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -139,9 +142,11 @@ def _become_command(folder: Path, arguments: list[str], out: int, err: int) -> N
     room = _addresses_bytes() + ADDRESS_ROOM_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (room, room))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    sys.argv = ["vibench", *arguments]
-    code = 1
+    sys.argv = ["vibench", *case.arguments]
+    code, after = 1, None
     try:
+        if case.prepare:
+            after = import_module(case.prepare[0]).prepare(*case.prepare[1:])
         from vibench.cli.__main__ import main
 
         main()
@@ -151,6 +156,8 @@ def _become_command(folder: Path, arguments: list[str], out: int, err: int) -> N
     except BaseException:
         traceback.print_exc()
     finally:
+        if after is not None:
+            after()
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

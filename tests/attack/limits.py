@@ -22,6 +22,10 @@ class Case:
 
     arguments: tuple[str, ...]
     files: Mapping[str, bytes] = field(default_factory=dict)
+    prepare: tuple[str, ...] = ()
+    """A module and words for its `prepare`, called before the command in its process; it returns what is
+    called after it."""
+    hangs_s: float = HANGS_S
 
     def lay(self, folder: Path) -> None:
         """Write the files."""

@@ -13,28 +13,82 @@ from unittest.mock import patch
 
 import numpy as np
 
+from vibench.acquisition.rig import OutputConfig
 from vibench.virtual_rig.world.wiring import Coupling, Input
 
 FRAMES = 512
+CARD = "Simulated card"
+RATE_HZ = 48_000.0
+CALIBRATION = {
+    "calibrated": "2026-02-10",
+    "input_full_scale_v": 2.0,
+    "output_full_scale_v": 1.5,
+    "low_cut_hz": 0.5,
+}
+WIRES = ("drive_voltage", 2.0), ("amplifier_voltage", 10.0), ("base_acceleration", 1.0), ("m0_velocity", 1.0)
+
+
+class Silent:
+    """The generator's terminal, where there is no generator."""
+
+    def render(self, start_s, interval_s, count):
+        return np.zeros(count)
+
+
+def card_rig(rig, **options):
+    """Give the virtual rig with a sound card in the place of its converter and generator."""
+    by_role = {channel.role.value: channel for channel in rig.daq.channels}
+    channels = tuple(
+        by_role[role].model_copy(
+            update={
+                "physical": f"in{number}", "range_v": 2.0, "coupling": "AC",
+                "iepe_current_a": 0.0, "attenuation": attenuation,
+            }
+        )
+        for number, (role, attenuation) in enumerate(WIRES)
+    )  # fmt: skip
+    output = OutputConfig(
+        physical="ao0", plays="tones_and_streams", limit_v=1.5, sample_rate_hz=RATE_HZ, source="test"
+    )
+    given = {key: value for key, value in {**CALIBRATION, **options}.items() if value is not None}
+    daq = {
+        "driver": "soundcard", "device": CARD, "product": "sound card", "sample_rate_hz": RATE_HZ,
+        "channels": channels, "output": output, "options": given,
+    }  # fmt: skip
+    return rig.model_copy(
+        update={
+            "generator": rig.generator.model_copy(update={"driver": "none", "resource": ""}),
+            "accelerometer": rig.accelerometer.model_copy(update={"iepe": "no"}),
+            "daq": rig.daq.model_copy(update=daq),
+        }
+    )
 
 
 class PortAudio:
-    """The calls of PortAudio 19 that sounddevice makes of one card; time passes while samples are wanted."""
+    """The calls of PortAudio 19 that sounddevice makes of one card; time passes while samples are wanted.
 
-    def __init__(self, ffi, name="Simulated card"):
+    A test may change `codes` (what opening, starting and aborting return), `reported_hz`, `most_inputs`,
+    `name`, `text`, and `heard`, which gets each block of samples and gives it with its flags, or None.
+    """
+
+    def __init__(self, ffi, name=CARD):
         self.ffi = ffi
         self.constants = ffi.dlopen(None)
         self.name = ffi.new("char[]", name.encode())
         self.text = ffi.new("char[]", b"simulated")
         self.kept = {}
+        self.codes = {"open": 0, "start": 0, "abort": 0}
+        self.reported_hz = None
+        self.most_inputs = 8
+        self.heard = lambda block, flags: (block, flags)
         self.plugged = True
         self.thread = None
 
-    def wire(self, world, inputs, output, full_scale_v, wanted):
-        """Plug the jacks in: names of the world's inputs in the order of the card's, and of its output."""
-        self.world, self.inputs, self.output = world, inputs, output
-        self.in_v, self.out_v = full_scale_v
-        self.wanted = wanted
+    def wire(self, world, wanted):
+        """Plug the jacks of `card_rig` into a world; samples pass while ``wanted`` says so."""
+        self.world, self.wanted = world, wanted
+        self.inputs, self.output = [f"{CARD}/in{number}" for number in range(len(WIRES))], f"{CARD}/ao0"
+        self.in_v, self.out_v = CALIBRATION["input_full_scale_v"], CALIBRATION["output_full_scale_v"]
 
     def __getattr__(self, name):
         return getattr(self.constants, name)
@@ -70,7 +124,7 @@ class PortAudio:
 
     def Pa_GetDeviceInfo(self, index):
         fields = {
-            "structVersion": 2, "name": self.name, "hostApi": 0, "maxInputChannels": 8,
+            "structVersion": 2, "name": self.name, "hostApi": 0, "maxInputChannels": self.most_inputs,
             "maxOutputChannels": 2, "defaultHighInputLatency": 0.01, "defaultHighOutputLatency": 0.01,
             "defaultSampleRate": 48000.0,
         }  # fmt: skip
@@ -83,13 +137,18 @@ class PortAudio:
         self.rate_hz, self.callback, self.user = rate_hz, callback, user
         self.channels = heard.channelCount, played.channelCount if played else 0
         stream[0] = self.ffi.cast("void*", 1)
-        return 0
+        return self.codes["open"]
 
     def Pa_GetStreamInfo(self, stream):
-        fields = {"structVersion": 1, "sampleRate": self.rate_hz}
+        fields = {
+            "structVersion": 1,
+            "sampleRate": self.rate_hz if self.reported_hz is None else self.reported_hz,
+        }
         return self.kept.setdefault("stream", self.ffi.new("PaStreamInfo*", fields))
 
     def Pa_StartStream(self, stream):
+        if self.codes["start"]:
+            return self.codes["start"]
         self.ends = threading.Event()
         self.thread = threading.Thread(target=self.turn, daemon=True)
         self.thread.start()
@@ -101,7 +160,7 @@ class PortAudio:
             self.thread.join()
             self.thread = None
             self.world.silence(self.output)
-        return 0
+        return self.codes["abort"]
 
     Pa_StopStream = Pa_CloseStream = Pa_AbortStream
 
@@ -112,13 +171,17 @@ class PortAudio:
         heard = np.zeros((FRAMES, self.channels[0]), dtype=np.float32)
         played = np.zeros((FRAMES, max(1, self.channels[1])), dtype=np.float32)
         time = self.ffi.new("PaStreamCallbackTimeInfo*")
-        pointers = [self.ffi.cast("void*", each.ctypes.data) for each in (heard, played)]
         while not self.ends.is_set():
             if not self.wanted():
                 self.ends.wait(1e-4)
                 continue
             heard[:, : len(taken)] = sampler.read(FRAMES).T / self.in_v
-            self.callback(*pointers, FRAMES, time, 0, self.user)
+            given = self.heard(heard, 0)
+            if given is None:
+                continue
+            block, flags = given
+            pointers = [self.ffi.cast("void*", each.ctypes.data) for each in (block, played)]
+            self.callback(*pointers, len(block), time, flags, self.user)
             if self.channels[1]:
                 self.world.play(self.output, played[:, 0].astype(float) * self.out_v, self.rate_hz)
         sampler.close()

@@ -7,12 +7,13 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from vibench.acquisition import Block, InstrumentError
+from vibench.acquisition import Block, InstrumentError, open_bench
 from vibench.acquisition.drivers import AFG1022X
 from vibench.acquisition.drivers._daqmx import linear_step_v
 from vibench.acquisition.drivers._scpi import ScpiInstrument
 from vibench.acquisition.drivers._visa_link import open_link
 from vibench.acquisition.instruments import Overload, read_block
+from vibench.virtual_rig.daqmx.data_calls import DATA_CALLS
 from vibench.virtual_rig.generator.scpi_instrument import Reply
 
 from .conftest import Logged
@@ -109,6 +110,30 @@ def test_a_reply_without_end_is_an_error():
                 instrument.query("*IDN?")
         finally:
             instrument.disconnect()
+
+
+COUNTS = {
+    "none": lambda counts: [],
+    "fewer": lambda counts: counts[:-1],
+    "more": lambda counts: counts * 2,
+}
+
+
+@pytest.mark.parametrize("announced", [0, -1, 1])
+@pytest.mark.parametrize("sent", COUNTS)
+def test_another_number_of_samples_than_requested_is_an_error(rig, monkeypatch, sent, announced):
+    usual = DATA_CALLS["ReadBinaryI32"]
+
+    def read(system, request):
+        fields = usual(system, request)
+        counts, announced_samples = COUNTS[sent](fields["read_array"]), fields["samps_per_chan_read"]
+        return fields | {"read_array": counts, "samps_per_chan_read": announced_samples + announced}
+
+    monkeypatch.setitem(DATA_CALLS, "ReadBinaryI32", read)
+    with open_bench(rig) as bench:
+        bench.digitizer.start()
+        with pytest.raises(InstrumentError, match=r"were requested|reply cannot be used"):
+            bench.digitizer.read(64)
 
 
 class Converter:

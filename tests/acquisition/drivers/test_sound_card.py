@@ -1,5 +1,6 @@
 """A sound card as converter and output: real sounddevice on a simulated PortAudio, and the analogue world."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,64 +12,18 @@ from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.drivers._sound_card import _Card
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, StreamedNoise, WhiteNoise
-from vibench.acquisition.rig import CalibrationRule, OutputConfig, confirm_simulated
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.analysis import analyse
 from vibench.virtual_rig.world.world import World
 
-from .portaudio import simulated
+from .portaudio import CARD, RATE_HZ, Silent, card_rig, simulated
 
 pytest.importorskip("_sounddevice", reason="pip install 'vibench[sound]'")
 
-CARD = "Simulated card"
-RATE_HZ = 48_000.0
-CALIBRATION = {
-    "calibrated": "2026-02-10",
-    "input_full_scale_v": 2.0,
-    "output_full_scale_v": 1.5,
-    "low_cut_hz": 0.5,
-}
-WIRES = ("drive_voltage", 2.0), ("amplifier_voltage", 10.0), ("base_acceleration", 1.0), ("m0_velocity", 1.0)
 
-
-class Silent:
-    """The generator's terminal, where there is no generator."""
-
-    def render(self, start_s, interval_s, count):
-        return np.zeros(count)
-
-
-@pytest.fixture
-def card_rig(rig):
-    """Give the virtual rig with a sound card in the place of its converter and generator."""
-
-    def changed(**options):
-        by_role = {channel.role.value: channel for channel in rig.daq.channels}
-        channels = tuple(
-            by_role[role].model_copy(
-                update={
-                    "physical": f"in{number}", "range_v": 2.0, "coupling": "AC",
-                    "iepe_current_a": 0.0, "attenuation": attenuation,
-                }
-            )
-            for number, (role, attenuation) in enumerate(WIRES)
-        )  # fmt: skip
-        output = OutputConfig(
-            physical="ao0", plays="tones_and_streams", limit_v=1.5, sample_rate_hz=RATE_HZ, source="test"
-        )
-        given = {key: value for key, value in {**CALIBRATION, **options}.items() if value is not None}
-        daq = {
-            "driver": "soundcard", "device": CARD, "product": "sound card", "sample_rate_hz": RATE_HZ,
-            "channels": channels, "output": output, "options": given,
-        }  # fmt: skip
-        return rig.model_copy(
-            update={
-                "generator": rig.generator.model_copy(update={"driver": "none", "resource": ""}),
-                "accelerometer": rig.accelerometer.model_copy(update={"iepe": "no"}),
-                "daq": rig.daq.model_copy(update=daq),
-            }
-        )
-
-    return changed
+@pytest.fixture(name="card_rig")
+def _card_rig(rig):
+    return partial(card_rig, rig)
 
 
 @pytest.fixture
@@ -89,10 +44,8 @@ def opened(card_rig, audio):
         world = World(simulated_rig, Silent())
         real = simulated_rig.model_copy(update={"virtual": None})
         bench = open_bench(real, confirm_simulated, CalibrationRule.WAIVED)
-        names = tuple(f"{CARD}/in{number}" for number in range(len(WIRES)))
-        scales = CALIBRATION["input_full_scale_v"], CALIBRATION["output_full_scale_v"]
         card = bench.digitizer.card
-        audio.wire(world, names, f"{CARD}/ao0", scales, lambda: card.waiting < 9600)
+        audio.wire(world, lambda: card.waiting < 9600)
         benches.append(bench)
         return bench
 

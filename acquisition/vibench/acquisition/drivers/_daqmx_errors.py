@@ -123,6 +123,8 @@ def daqmx_call(doing: str) -> Iterator[None]:
     """
     try:
         yield
+    except AcquisitionError:
+        raise
     except DaqError as error:
         raise from_code(error, doing) from error
     except RpcError as error:
@@ -131,6 +133,12 @@ def daqmx_call(doing: str) -> Iterator[None]:
         raise InstrumentError(
             f"{doing} failed: this computer has no NI-DAQmx driver ({error}). Install the driver, or set "
             "daq.server to the address of a device server"
+        ) from error
+    except (AssertionError, ArithmeticError, LookupError, TypeError, ValueError) as error:
+        # The client assumes that a reply has the requested size and known values.
+        raise InstrumentError(
+            f"{doing} failed: the driver's reply cannot be used ({type(error).__name__}: {error}). Use "
+            "versions of client, driver and device server that belong together, then open the bench again"
         ) from error
 
 
