@@ -54,6 +54,7 @@ def put_down(stop: str, reason: str) -> None:
         os.replace(coming, stop)  # noqa: PTH105 - as above
     except OSError:  # a network folder may report an error of a rename that was made
         if not os.path.exists(stop):  # noqa: PTH110 - as above
+            os.unlink(coming)  # noqa: PTH108 - as above
             raise
 
 

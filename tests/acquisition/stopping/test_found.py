@@ -161,3 +161,22 @@ def test_a_folder_with_foreign_modes_gets_its_own(of_nobody):
     os.seteuid(NOBODY)
     with stop_on_signal(StopSwitch(), "dwell"):
         assert programs_to_stop(None)[0].what == "dwell"
+
+
+ON_A_FULL_DISK = """
+import os, resource
+from vibench.acquisition import AcquisitionError, StopSwitch, stop_on_signal
+resource.setrlimit(resource.RLIMIT_FSIZE, (20, resource.RLIM_INFINITY))
+try:
+    with stop_on_signal(StopSwitch(), "a script"):
+        print("it drives")
+except AcquisitionError as error:
+    print(error)
+"""
+
+
+def test_a_full_state_folder_refuses_the_program_and_keeps_no_file_of_it(own_state):
+    script = [sys.executable, "-c", ON_A_FULL_DISK]
+    ended = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert "a script cannot be announced in the state folder" in ended.stdout, ended.stderr
+    assert [each.name for each in own_state.rglob("*") if each.is_file()] == []

@@ -396,9 +396,13 @@ def _write(program: Program) -> Path:
     coming.unlink(missing_ok=True)  # left by a killed process of this number
     # Nobody else may read a token, not even for the moment before the mode is set.
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-        file.write(program.model_dump_json())
-    rename(coming, path)  # whole, or not there
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(program.model_dump_json())
+        rename(coming, path)  # whole, or not there
+    except OSError:
+        coming.unlink(missing_ok=True)  # a full disk has room for a name
+        raise
     return path
 
 
