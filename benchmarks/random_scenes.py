@@ -4,7 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibench.sim import AutomaticDuration, Harmonic, MotionKind, Scene, gong2025, solve_scene
+from vibench.sim import (
+    AutomaticDuration,
+    BranchEvent,
+    Given,
+    Harmonic,
+    MotionKind,
+    Parameter,
+    Rest,
+    Scene,
+    gong2025,
+    periodic_branch,
+    solve_scene,
+)
+from vibench.sim.branches import MotionSearch, periodic_motions
 
 MODELS = ("hertz", "linear_gap", "power:3", "power:5", "power:7")
 EDGE = 0.004
@@ -51,6 +64,36 @@ def quasi_periodic_scene(random: np.random.Generator) -> Scene:
         found = solve_scene(replace(scene, budget_s=0.0))
         if found.motion in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}:
             return scene
+
+
+FEW = MotionSearch(places=2, starts=2)
+"""Starts of the search for a motion whose branch has a bifurcation."""
+
+
+def near_bifurcation(random: np.random.Generator) -> tuple[BranchEvent, Scene]:
+    """Draw a bifurcation and a scene beside it, from rest or from near the motion that bifurcates.
+
+    The frequency is 1e-6 to 1e-3 of it away, the start 1e-6 to 1e-1 of the size of the motion.
+    """
+    while True:
+        scene = random_scene(random)
+        drive = scene.drive
+        orbit = next(periodic_motions(scene.specimen, drive, FEW), None)
+        if orbit is None:
+            continue
+        stop_hz = drive.frequency_hz * float(random.choice([0.7, 1.3]))
+        events = periodic_branch(orbit, Parameter.FREQUENCY, stop_hz).events
+        kinds = sorted({each.kind for each in events})
+        if not kinds:
+            continue
+        kind = random.choice(kinds)
+        same = [each for each in events if each.kind == kind]
+        event = same[int(random.integers(len(same)))]
+        away = float(random.choice([-1.0, 1.0]) * 10 ** random.uniform(-6.0, -3.0))
+        size = 10 ** random.uniform(-6.0, -1.0) * np.abs(event.state)
+        state = event.state + size * random.standard_normal(6)
+        start = Rest() if random.random() < 0.3 else Given(tuple(map(float, state)))
+        return event, replace(at(scene, event.frequency_hz * (1.0 + away)), start=start)
 
 
 def at(scene: Scene, frequency_hz: float) -> Scene:

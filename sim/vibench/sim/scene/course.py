@@ -14,6 +14,7 @@ import numpy as np
 from ..engine.run import Watch
 from ..specimen.outcome import Outcome
 from ..specimen.state import Floats
+from .fixed_point import stable_motion
 from .followed_run import (
     Block,
     FollowedRun,
@@ -105,24 +106,41 @@ class FixedCourse:
 
 
 def classify(
-    run: FollowedRun, window: ObservedWindow, before: Sequence[Stretch], pace: Pace, ended: str
+    run: FollowedRun,
+    window: ObservedWindow,
+    before: Sequence[Stretch],
+    pace: Pace,
+    ended: str,
+    repeats: Repetition | None = None,
 ) -> SceneRun:
     """Return the kind of a motion from its window and the stretches before it.
 
-    Those before it that were watched are blocks as long as the window's own.
+    Those before it that were watched are blocks as long as the window's own. A motion that comes back is
+    periodic only if Newton's iteration finds a stable motion there: chaos passes by unstable ones, and
+    slowly by where two motions have just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
-    repeats = pace.repeats(stretches)
-    growth = growth_of(stretches)
-    is_lost = run.outcome is not Outcome.REACHED_END
+    repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
+    motion = kind_of(repeats, growth, pace.fading_s)
+    if run.outcome is not Outcome.REACHED_END:
+        motion, repeats, ended = MotionKind.UNDECIDED, None, run.outcome.text
+    elif repeats is not None:
+        found = stable_motion(run, repeats.period)
+        if found is None:
+            ended = f"it comes back after {repeats.period} drive period(s), but near no stable motion"
+            motion, repeats = MotionKind.UNDECIDED, None
+        else:
+            repeats = replace(repeats, distance=found.distance)
+    elif motion is MotionKind.QUASI_PERIODIC and any(map(pace.drifts, (stretches, window.stretches))):
+        motion, ended = MotionKind.UNDECIDED, f"after {run.time_s:.3g} s it still drifts"
     return SceneRun(
         window=window,
         blocks=(*blocks_of(before), *window.blocks),
         was_settled=False,
-        motion=MotionKind.UNDECIDED if is_lost else kind_of(repeats, growth, pace.fading_s),
-        repeats=None if is_lost else repeats,
+        motion=motion,
+        repeats=repeats,
         settled_s=None,
-        ended=run.outcome.text if is_lost else ended,
+        ended=ended,
         path=tuple(stretches),
         grew=growth.is_certain and repeats is None,
         wandered_until_s=run.time_s if repeats is None else stretches[0].start_s,
@@ -174,8 +192,6 @@ SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
 """A motion that does not repeat is watched for this many windows; the last of them is the one observed."""
-UNSTABLE = 1.001
-"""Floquet multiplier above which a motion that comes back will leave: chaos passes by unstable motions."""
 DRIFT_SHARE = 0.25
 """Share of the budget that a slow drift may use: finding its error repeats its path three times."""
 
@@ -294,16 +310,9 @@ class SettlingCourse:
         window = window_of(begins, last)
         kind = kind_of(None, growth_of(last), pace.fading_s)
         if kind is not MotionKind.CHAOTIC:
-            is_drifting = pace.drifts(last)
-            found = "still drifts" if is_drifting else f"is {kind}"
             before = () if growth_of(path).is_certain else path[-watched:]
-            seen = classify(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
-            return replace(
-                seen,
-                motion=MotionKind.UNDECIDED if is_drifting else seen.motion,
-                grew=growth_of(path).is_certain,
-                wandered_until_s=last[0].start_s,
-            )
+            seen = classify(run, window, before, pace, f"after {run.time_s:.3g} s it is {kind}")
+            return replace(seen, grew=growth_of(path).is_certain, wandered_until_s=last[0].start_s)
         seen = classify(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
         if run.outcome is not Outcome.REACHED_END:
             return seen
@@ -326,17 +335,11 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     end_s = settled_s + repeats.period / pace.frequency_hz
     one = follow_with_section(run, end_s, Watch.PEAKS_AND_LINES)
     window = window_of(begins, [one])
-    seen = classify(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
-    if run.outcome is not Outcome.REACHED_END:
-        return seen
-    _, by_state = begins.image(repeats.period)
-    if np.all(np.isfinite(by_state)) and np.max(np.abs(np.linalg.eigvals(by_state))) > UNSTABLE:
-        ended = f"it comes back after {repeats.period} drive period(s), but a small change of it grows"
-        return replace(seen, motion=MotionKind.UNDECIDED, repeats=None, ended=ended, path=tuple(path))
+    seen = classify(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)", repeats)
+    if seen.repeats is None:
+        return replace(seen, path=tuple(path))
     return replace(
         seen,
-        motion=MotionKind.PERIODIC,
-        repeats=repeats,
         settled_s=settled_s,
         was_settled=True,
         path=tuple(path),

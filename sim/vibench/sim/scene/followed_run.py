@@ -244,7 +244,8 @@ class FollowedRun:
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
         """Return the state `drive_periods` later, and its derivative by the state now; NaN if lost."""
         run, frequency_hz = self._run.apart(), self.drive.frequency_hz
-        until_s = (round(self.time_s * frequency_hz) + drive_periods) / frequency_hz
+        made = self.time_s * frequency_hz if self.periods is None else self.periods
+        until_s = (made + drive_periods) / frequency_hz
         run.carry(np.eye(DIRECTIONS))
         steps = self._steps_left // TANGENT_STEPS
         record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s), steps=steps)

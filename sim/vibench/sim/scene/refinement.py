@@ -18,6 +18,7 @@ from ..specimen.accuracy import Accuracy
 from ..specimen.modes import modal_form
 from ..specimen.outcome import Outcome
 from ..specimen.state import Floats
+from .fixed_point import TOLERANCE as TIGHT, stable_motion
 from .followed_run import (
     FollowedRun,
     ObservedWindow,
@@ -49,9 +50,6 @@ CLOSE = 3e-3
 """Change from one of its periods to the next, over its size, at which Newton's iteration is tried."""
 KNOWN = 0.03
 """Distance from a periodic motion that another start came to, over its size, at which that one is tried."""
-RETURNED = 1e-10
-"""A motion is periodic when it comes back this close, over its size."""
-ITERATIONS = 8
 MOST_PUSH = 1000.0
 """Drive amplitudes that stand for the gap, at most, where other starts are drawn."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
@@ -59,7 +57,7 @@ LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 looks of this length, and then after this share of its way."""
 LOOKS = 8
 """At another start before its window begins."""
-LOOSE, TIGHT, TIGHTEST = Accuracy.QUICK.tolerance, 1e-10, 1e-12
+LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME, ALIKE = 1e-3, 1e-2
 """Relative differences of states up to which a motion repeats, and of responses up to which starts count as
 one motion: some are still settling."""
@@ -326,16 +324,12 @@ class _Refinement:
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
-        try:
-            found = self._fixed_point(near, period)
-            if found is None:
-                return None
-            run, away = found
-            strict = run.apart(TIGHTEST)
-            off = (strict.image(period)[0] - strict.state) / self._scales
-            strict = strict.pushed(away @ off * self._scales)
-        except (ValueError, np.linalg.LinAlgError):
+        found = stable_motion(near, period)
+        if found is None:
             return None
+        run, away, strict = found.run, found.away, found.run.apart(TIGHTEST)
+        off = (strict.image(period)[0] - strict.state) / self._scales
+        strict = strict.pushed(away @ off * self._scales)
         windows = [self._observed(each.apart(), period) for each in (run, strict)]
         if windows[0] is None or windows[1] is None:
             return None
@@ -355,26 +349,6 @@ class _Refinement:
             known = _Orbit(period, strict, section, second, errors, windows[1].impacts)
             self._orbits.append(known)
         return known
-
-    def _fixed_point(self, near: FollowedRun, period: int) -> tuple[FollowedRun, Floats] | None:
-        """Solve for a motion that comes back; gives it, and the inverse of what the map leaves of a change.
-
-        None where there is none near, or it is unstable. Raises ValueError where a state is not allowed.
-        """
-        run, scales, gone = near.apart(TIGHT), self._scales, math.inf
-        size = float(np.abs(run.state / scales).max(initial=1e-300))
-        for _ in range(ITERATIONS):
-            image, slope = run.image(period)
-            off = (image - run.state) / scales
-            if not np.all(np.isfinite(slope)) or not np.abs(off).max() < gone:
-                return None
-            gone = float(np.abs(off).max())
-            scaled = slope * scales / scales[:, None]
-            away = np.linalg.inv(np.eye(6) - scaled)
-            if gone < RETURNED * size:
-                return (run, away) if np.abs(np.linalg.eigvals(scaled)).max() < 1.0 else None
-            run = run.pushed(away @ off * scales)
-        return None
 
     def _on_orbit(self) -> ScenePrediction:
         orbit = self._path.orbit
