@@ -10,6 +10,7 @@ from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 from scipy import fft
+from scipy.optimize import brentq
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import BridgedChannel, Recording
@@ -21,7 +22,15 @@ from ..errors import UnusableData
 from ..recordings.channels import BASE, RecordedChannels
 from ..recordings.response import VELOCITY, noise_as_read
 from ..signals.arrays import Reals, Samples
-from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
+from ..sine.dwell import silence_before
+from .driven_rig import (
+    Driven,
+    DrivenRig,
+    acceleration_per_volt,
+    carried_mass,
+    driven_rig,
+    recorded_voltage,
+)
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
 from .shaker_fit import FittedShaker
 from .simulated_channels import (
@@ -123,6 +132,8 @@ class PlayedVoltage:
         return result.ravel()[hop : hop + self._samples]
 
 
+_FEWEST_LINES = 50
+"""Lines in silence that show the level of noise to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Blocks spread over the recording, in addition to the first and last second."""
@@ -174,6 +185,67 @@ def _white(samples: Reals) -> float:
     low, high = (round(part * samples.size) for part in _BAND)
     # The mean power of a bin is the variance times the sum of the squared taper.
     return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
+
+
+_HEARD_HZ = (100.0, 2000.0)
+"""Band in which noise of the drive shows in the base; above it, a table has further resonances."""
+_MEDIAN_SD = 1.44
+"""Relative standard deviation of the median of N exponential values, times the root of N."""
+_HANN_LINES = 1.5
+"""Lines of a Hann window in an independent one."""
+UNKNOWN_NOISE = (
+    "The noise of the amplifier is unknown, because neither its voltage nor the silence of a bench check was "
+    "recorded; limits of a weak motion may be too narrow"
+)
+
+
+@dataclass(frozen=True)
+class UnseenNoise:
+    """White noise that moves the table and is missing in the drive's channel, referred to that channel."""
+
+    power: float = 0.0
+    """Variance per sample [V²]."""
+    sd: float = 0.0
+    """Its standard deviation [V²]."""
+
+    def drawn(self, rng: np.random.Generator) -> float:
+        """Return a possible rms per sample [V]."""
+        return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
+
+
+def unseen_noise(channels: RecordedChannels, rig: DrivenRig, noise: ChannelNoise) -> UnseenNoise | None:
+    """Return the noise of an amplifier whose output is not recorded; None if no silence shows it.
+
+    In silence, the base minus the motion under the recorded voltage is noise of the amplifier through the
+    table, converter noise of the voltage, and noise of the sensor. The median over lines ignores hum.
+    """
+    if rig.driven is Driven.AMPLIFIER:
+        return UnseenNoise()
+    volts, base, _ = silence_before(channels)
+    rate_hz = channels.sample_rate_hz
+    frequency_hz = np.fft.rfftfreq(max(volts.size, 1), 1 / rate_hz)
+    inside = (frequency_hz >= _HEARD_HZ[0]) & (frequency_hz <= min(_HEARD_HZ[1], _BAND[1] * rate_hz))
+    lines = int(np.sum(inside))
+    if lines < _FEWEST_LINES:
+        return None
+    taper = np.hanning(volts.size)
+    seen_v, seen = (np.fft.rfft((each - each.mean()) * taper)[inside] for each in (volts, base))
+    within_hz, table = frequency_hz[inside], rig.table
+    gain = table.amplifier.gain * table.base_sensor(within_hz)
+    gain *= acceleration_per_volt(
+        table.shaker, 2j * np.pi * within_hz, carried_mass(table.specimen, within_hz)
+    )
+    power = np.abs(seen - gain * seen_v) ** 2 / np.sum(taper**2)
+    passed, sensor = np.abs(gain) ** 2, noise.rms[BASE] ** 2
+
+    def excess(volts_power: float) -> float:
+        """Return the median of what should be exponential with mean 1, minus its median."""
+        return float(np.median(power / (passed * volts_power + sensor)) - np.log(2.0))
+
+    most = float(np.max(power / passed)) / np.log(2.0)
+    total = float(brentq(excess, 0.0, most)) if excess(0.0) > 0.0 else 0.0
+    sd = _MEDIAN_SD * np.sqrt(_HANN_LINES / lines) * (total + sensor / float(np.median(passed)))
+    return UnseenNoise(max(0.0, total - noise.rms[rig.role] ** 2), float(sd))
 
 
 DRAWS = 16
@@ -295,6 +367,9 @@ def voltage_source(
     volts = recorded_voltage(recording, rig)
     noise = channel_noise(recording, tuple(recording.roles))
     voltage = PlayedVoltage(volts, noise.converter_v * abs(recording.channel(rig.role).physical_per_volt))
+    channels = RecordedChannels(recording)
+    unseen = unseen_noise(channels, rig, noise)
+    why = ["" if fitted is None else fitted.sentence, UNKNOWN_NOISE if unseen is None else ""]
     return DrawSource(
         specimen=specimen,
         driven=rig.driven,
@@ -302,8 +377,8 @@ def voltage_source(
         base_band_hz=None,
         most=draws,
         samples=recording.samples,
-        why="" if fitted is None else fitted.sentence,
-        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, voltage, noise),
+        why=". ".join(filter(None, why)),
+        channels=partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen or UnseenNoise()),
     )
 
 
@@ -373,11 +448,16 @@ def _drawn_channels(
     fitted: FittedShaker | None,
     voltage: PlayedVoltage,
     noise: ChannelNoise,
+    unseen: UnseenNoise,
     number: int,
 ) -> SimulatedChannels:
     rng = np.random.default_rng([_SEED, number])
     table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
-    motion = _moved(replace(rig, table=table), voltage.drawn(rng), recorded.recording, noise, rng)
+    volts = voltage.drawn(rng)
+    rms_v = unseen.drawn(rng)
+    if rms_v > 0.0:
+        volts = _with_noise(volts.copy(), rig.role, rms_v, recorded.sample_rate_hz, rng)
+    motion = _moved(replace(rig, table=table), volts, recorded.recording, noise, rng)
     return SimulatedChannels(
         recorded,
         motion.m0_velocity,
@@ -402,11 +482,17 @@ def _moved(
     except MotionFailed as error:
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
     for role, seen in ((BASE, motion.base_acceleration), (rig.response, motion.m0_velocity)):
-        rate_hz, first = recording.sample_rate_hz, 0
-        for block in noise_as_read(role, rate_hz, seen.size, _BLOCK, rng):
-            seen[first : first + block.size] += np.float32(noise.rms[role]) * block
-            first += block.size
+        _with_noise(seen, role, noise.rms[role], recording.sample_rate_hz, rng)
     return motion
+
+
+def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np.random.Generator) -> Samples:
+    """Add noise of a channel as an analysis reads it, in place."""
+    first = 0
+    for block in noise_as_read(role, rate_hz, samples.size, _BLOCK, rng):
+        samples[first : first + block.size] += np.float32(rms) * block
+        first += block.size
+    return samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,14 @@ from pydantic import ValidationError
 
 from vibench.acquisition.recording import Recording, coupling_cut_hz
 from vibench.acquisition.rig import Rig, amplifier_of, shaker_of
-from vibench.sim import Specimen
+from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, sensor_gain
 from ..recordings.response import ResponseChannel
-from ..signals.arrays import Reals
+from ..signals.arrays import Complexes, Reals
 
 AMPLIFIER = "amplifier_voltage"
 """Role of the channel that shows the amplifier's output."""
@@ -85,6 +85,23 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         coupling_cut_hz(base.coupling),
     )
     return DrivenRig(table, driven, role, response)
+
+
+def carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
+    """Return the apparent mass: momentum of the masses over the base velocity, without contact [kg]."""
+    moved = base_transmissibility(specimen, frequency_hz)[:, :3]
+    return np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
+
+
+def acceleration_per_volt(shaker: Shaker, s: Complexes, carried_kg: Complexes) -> Complexes:
+    """Return the base's acceleration over the coil's voltage at s = i omega [m/s2/V]."""
+    dynamic = (
+        shaker.suspension_stiffness_n_per_m
+        + shaker.suspension_damping_ns_per_m * s
+        + (shaker.moving_mass_kg + carried_kg) * s**2
+    )
+    coupled = (shaker.coil_resistance_ohm + shaker.coil_inductance_h * s) * dynamic
+    return np.asarray(shaker.force_constant_n_per_a * s**2 / (coupled + s * shaker.force_constant_n_per_a**2))
 
 
 def described_shaker(recording: Recording) -> Shaker | None:

@@ -8,7 +8,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from vibench.acquisition.plan import StreamedNoise
 from vibench.acquisition.recording import Recording
-from vibench.sim import Specimen, base_transmissibility
+from vibench.sim import Specimen
 from vibench.sim.shaker.loaded_shaker import Shaker
 
 from ..errors import UnusableData
@@ -17,7 +17,7 @@ from ..frequency_response.results import FrequencyResponse
 from ..recordings.channels import BASE, DRIVE, RecordedChannels, coupled_gain
 from ..signals.arrays import Complexes, Flags, Reals
 from ..tables import plus_minus
-from .driven_rig import AMPLIFIER
+from .driven_rig import AMPLIFIER, acceleration_per_volt, carried_mass
 
 LARGEST_CHI2 = 3.0
 """Largest reduced chi square; more means collisions or other moving parts."""
@@ -87,14 +87,12 @@ def fit_shaker(
     frequency_hz = found.frequency_hz[known]
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
     measured = found.value[known] / s
-    # Apparent mass: total momentum of the masses over the base velocity, without contact.
-    moved = base_transmissibility(specimen, frequency_hz)[:, :3]
-    carried = np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
+    carried = carried_mass(specimen, frequency_hz)
     # The scatter is the same for both parts of ln(measured / modelled).
     sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
 
     def misfit(logarithms: Reals) -> Reals:
-        ratio = np.log(_acceleration_per_volt(logarithms, s, carried) / measured) / sd
+        ratio = np.log(acceleration_per_volt(_shaker(logarithms), s, carried) / measured) / sd
         return np.concatenate([ratio.real, ratio.imag])
 
     best = _best(misfit, described)
@@ -129,13 +127,6 @@ def _logarithms(shaker: Shaker) -> Reals:
 
 def _shaker(logarithms: Reals) -> Shaker:
     return Shaker(*np.exp(logarithms).tolist())
-
-
-def _acceleration_per_volt(logarithms: Reals, s: Complexes, carried_kg: Complexes) -> Complexes:
-    mass, stiffness, damping, force_constant, resistance, inductance = np.exp(logarithms)
-    dynamic = stiffness + damping * s + (mass + carried_kg) * s**2
-    coupled = (resistance + inductance * s) * dynamic + s * force_constant**2
-    return np.asarray(force_constant * s**2 / coupled)
 
 
 @dataclass(frozen=True, eq=False)

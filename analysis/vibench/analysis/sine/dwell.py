@@ -65,12 +65,12 @@ class Background:
 
 
 def silence_before(channels: Channels) -> Reals:
-    """Return the response during the silence of the check [m/s]; empty without a check."""
+    """Return drive, base and response during the silence of the check, as read; empty without a check."""
     for stretch in channels.stretches(SegmentLabel.CHECK):
         stop = stretch.start + round(CHECK_QUIET_S * channels.sample_rate_hz)
-        heard: Reals = channels.read(stretch.start, min(stop, stretch.stop))[-1]
-        return heard if np.isfinite(heard).all() else heard[:0]
-    return NOTHING
+        heard = channels.read(stretch.start, min(stop, stretch.stop))
+        return heard if np.isfinite(heard).all() else heard[:, :0]
+    return np.empty((3, 0))
 
 
 def background_in_silence(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:

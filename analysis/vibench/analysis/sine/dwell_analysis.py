@@ -326,7 +326,7 @@ def measured_dwell(
         towards_hz=towards_hz,
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
-        silence=silence_before(channels),
+        silence=silence_before(channels)[-1],
         bridged=channels.bridged(stretch.start, stretch.stop),
     )
 

@@ -133,7 +133,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
         window_s=min(plan.record_s, data.shape[1] / rate),
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([near_hz]))[0]),
-        silence=silence_before(channels),
+        silence=silence_before(channels)[-1],
         bridged=bridged,
     )
 
