@@ -10,7 +10,6 @@ from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 from scipy import fft
-from scipy.optimize import brentq
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import BridgedChannel, Recording
@@ -22,16 +21,9 @@ from ..errors import UnusableData
 from ..recordings.channels import BASE, RecordedChannels
 from ..recordings.response import VELOCITY, noise_as_read
 from ..signals.arrays import Reals, Samples
-from ..sine.dwell import silence_before
-from .driven_rig import (
-    Driven,
-    DrivenRig,
-    acceleration_per_volt,
-    carried_mass,
-    driven_rig,
-    recorded_voltage,
-)
+from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
+from .recorded_noise import UNKNOWN_NOISE, ChannelNoise, UnseenNoise, channel_noise, unseen_noise
 from .shaker_fit import FittedShaker
 from .simulated_channels import (
     HIGHEST_PART,
@@ -130,122 +122,6 @@ class PlayedVoltage:
             result[first:last] += whole[:, :hop]
             result[first + 1 : last + 1] += whole[:, hop:]
         return result.ravel()[hop : hop + self._samples]
-
-
-_FEWEST_LINES = 50
-"""Lines in silence that show the level of noise to 25 %."""
-_BLOCK_S = 0.05
-_BLOCKS = 200
-"""Blocks spread over the recording, in addition to the first and last second."""
-_BAND = (0.2, 0.4)
-"""Band relative to the sample rate that shows channel noise, without modes."""
-_ALIKE = 6.0
-"""Standard deviations of a block's power within which blocks have the same level."""
-
-
-@dataclass(frozen=True)
-class ChannelNoise:
-    """White noise of each channel, rms per sample in its physical unit."""
-
-    rms: dict[str, float]
-    converter_v: float
-    """Smallest of them at a converter input, which is the converter's noise [V]."""
-
-
-def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
-    """Return the noise in the quietest stretch of each channel, since recordings start in silence."""
-    rate, samples = recording.sample_rate_hz, recording.samples
-    length = max(16, round(_BLOCK_S * rate))
-    ends = np.concatenate([np.arange(0, rate, length), samples - np.arange(length, rate + length, length)])
-    starts = np.unique(np.concatenate([ends, np.linspace(0, samples - length, _BLOCKS)]).astype(int))
-    starts = starts[(starts >= 0) & (starts <= samples - length)]
-    rms = {
-        role: _quiet([_white(recording.read(role, int(at), int(at) + length)) for at in starts], length)
-        for role in roles
-    }
-    volts = [rms[role] / abs(recording.channel(role).physical_per_volt) for role in roles]
-    return ChannelNoise(rms, min(volts))
-
-
-def _quiet(rms: list[float], length: int) -> float:
-    """Return the mean level of the quiet blocks; the quietest one alone is some per cent too low."""
-    if not rms:
-        return 0.0
-    power = np.square(rms)
-    lines = (_BAND[1] - _BAND[0]) * length
-    alike = power <= power.min() * (1.0 + _ALIKE / np.sqrt(lines))
-    return float(np.sqrt(np.mean(power[alike]))) if np.isfinite(power.min()) else float(np.inf)
-
-
-def _white(samples: Reals) -> float:
-    """Return the rms of white noise from the density far above all motion; infinite across a hole."""
-    if np.isnan(samples).any():
-        return np.inf
-    power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
-    low, high = (round(part * samples.size) for part in _BAND)
-    # The mean power of a bin is the variance times the sum of the squared taper.
-    return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
-
-
-_HEARD_HZ = (100.0, 2000.0)
-"""Band in which noise of the drive shows in the base; above it, a table has further resonances."""
-_MEDIAN_SD = 1.44
-"""Relative standard deviation of the median of N exponential values, times the root of N."""
-_HANN_LINES = 1.5
-"""Lines of a Hann window in an independent one."""
-UNKNOWN_NOISE = (
-    "The noise of the amplifier is unknown, because neither its voltage nor the silence of a bench check was "
-    "recorded; limits of a weak motion may be too narrow"
-)
-
-
-@dataclass(frozen=True)
-class UnseenNoise:
-    """White noise that moves the table and is missing in the drive's channel, referred to that channel."""
-
-    power: float = 0.0
-    """Variance per sample [V²]."""
-    sd: float = 0.0
-    """Its standard deviation [V²]."""
-
-    def drawn(self, rng: np.random.Generator) -> float:
-        """Return a possible rms per sample [V]."""
-        return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
-
-
-def unseen_noise(channels: RecordedChannels, rig: DrivenRig, noise: ChannelNoise) -> UnseenNoise | None:
-    """Return the noise of an amplifier whose output is not recorded; None if no silence shows it.
-
-    In silence, the base minus the motion under the recorded voltage is noise of the amplifier through the
-    table, converter noise of the voltage, and noise of the sensor. The median over lines ignores hum.
-    """
-    if rig.driven is Driven.AMPLIFIER:
-        return UnseenNoise()
-    volts, base, _ = silence_before(channels)
-    rate_hz = channels.sample_rate_hz
-    frequency_hz = np.fft.rfftfreq(max(volts.size, 1), 1 / rate_hz)
-    inside = (frequency_hz >= _HEARD_HZ[0]) & (frequency_hz <= min(_HEARD_HZ[1], _BAND[1] * rate_hz))
-    lines = int(np.sum(inside))
-    if lines < _FEWEST_LINES:
-        return None
-    taper = np.hanning(volts.size)
-    seen_v, seen = (np.fft.rfft((each - each.mean()) * taper)[inside] for each in (volts, base))
-    within_hz, table = frequency_hz[inside], rig.table
-    gain = table.amplifier.gain * table.base_sensor(within_hz)
-    gain *= acceleration_per_volt(
-        table.shaker, 2j * np.pi * within_hz, carried_mass(table.specimen, within_hz)
-    )
-    power = np.abs(seen - gain * seen_v) ** 2 / np.sum(taper**2)
-    passed, sensor = np.abs(gain) ** 2, noise.rms[BASE] ** 2
-
-    def excess(volts_power: float) -> float:
-        """Return the median of what should be exponential with mean 1, minus its median."""
-        return float(np.median(power / (passed * volts_power + sensor)) - np.log(2.0))
-
-    most = float(np.max(power / passed)) / np.log(2.0)
-    total = float(brentq(excess, 0.0, most)) if excess(0.0) > 0.0 else 0.0
-    sd = _MEDIAN_SD * np.sqrt(_HANN_LINES / lines) * (total + sensor / float(np.median(passed)))
-    return UnseenNoise(max(0.0, total - noise.rms[rig.role] ** 2), float(sd))
 
 
 DRAWS = 16
@@ -368,8 +244,9 @@ def voltage_source(
     noise = channel_noise(recording, tuple(recording.roles))
     voltage = PlayedVoltage(volts, noise.converter_v * abs(recording.channel(rig.role).physical_per_volt))
     channels = RecordedChannels(recording)
-    unseen = unseen_noise(channels, rig, noise)
-    why = ["" if fitted is None else fitted.sentence, UNKNOWN_NOISE if unseen is None else ""]
+    known = unseen_noise(channels, rig, noise)
+    unseen, noise = known or (UnseenNoise(), noise)
+    why = ["" if fitted is None else fitted.sentence, "" if known else UNKNOWN_NOISE]
     return DrawSource(
         specimen=specimen,
         driven=rig.driven,
@@ -378,7 +255,7 @@ def voltage_source(
         most=draws,
         samples=recording.samples,
         why=". ".join(filter(None, why)),
-        channels=partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen or UnseenNoise()),
+        channels=partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen),
     )
 
 

@@ -490,7 +490,8 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
         return Agreement.OPEN, f"simulated once, under the recorded base{laid.run.why and ': '}{laid.run.why}"
     outside = [each.name for each in laid.ensemble if each.compared and not each.agrees]
     if outside:
-        return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}"
+        known = f". {laid.run.why}" if laid.run.why else ""
+        return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}{known}"
     compared, every = sum(each.compared > 0 for each in laid.ensemble), len(laid.ensemble)
     if not compared:
         return Agreement.OPEN, "too few simulated draws of the measured kind of motion"
