@@ -47,3 +47,17 @@ def test_capacitors_before_the_converter_turn_no_phase(harmonic):
 
 def test_a_base_that_shows_nothing_has_no_ratio():
     assert CHANNELS.transmissibility(np.zeros(3, complex), np.ones(3, complex), HERTZ, 3) == 0
+
+
+@pytest.mark.parametrize("derivatives", [-1, 0, 1])
+def test_acceleration_and_displacement_of_m0_give_the_same_ratio_as_its_velocity(derivatives):
+    """A sensor whose signal is differentiated so many times for a velocity."""
+    channels = replace(CHANNELS, response_derivatives=derivatives, response_delay_s=0.0)
+    orders_hz = HERTZ * np.arange(5)
+    base = np.full(8, -2e-4 * (2 * np.pi * HERTZ) ** 2)
+    moved = 3e-6 * np.exp(-1.2j) * (2j * np.pi * orders_hz[1:]) ** (1 - derivatives)
+    velocity = np.concatenate(([7.0], moved)) * channels.velocity_over_response(orders_hz)
+    assert velocity[0] == (7.0 if derivatives == 0 else 0.0)
+    for order in range(1, 5):
+        seen = channels.transmissibility(base, np.full(8, velocity[order]), HERTZ, order)
+        assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j), rel=1e-12)

@@ -272,3 +272,20 @@ def test_a_channel_that_shows_no_mass_is_no_response(tmp_path):
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force is no channel that shows the motion of a mass"):
         analyse(path, response="base_force")
+
+
+@ON_M0
+def test_feedback_tracks_the_same_resonance_with_an_accelerometer_or_a_probe(role, tmp_path):
+    """It refused rigs without a vibrometer; the closed form has the frequency."""
+    rig = rig_with(role, without=("m0_velocity",))
+    plan = {
+        "kind": "resonance_tracking", "amplitude_vpp": 0.1, "start_hz": 94.0, "low_hz": 90.0, "high_hz": 99.0,
+        "accelerations_m_per_s2": [0.05], "flank_pairs": 0,
+    }  # fmt: skip
+    with open_recording(measured(rig, tmp_path, **plan)) as recording:
+        (note,) = [json.loads(each.text) for each in recording.events if each.kind == "resonance"]
+    at_hz = np.arange(90.0, 99.0, 0.001)
+    ratio = base_transmissibility(specimen_of(rig), at_hz)[:, 0]
+    true_hz = at_hz[np.argmin(np.abs(np.angle(ratio - 1) + np.pi / 2))]
+    assert note["lock"] == "locked"
+    assert abs(note["frequency_hz"] - true_hz) < max(3 * note["frequency_u_hz"], 0.02)

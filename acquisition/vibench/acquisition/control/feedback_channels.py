@@ -9,9 +9,11 @@ from ..errors import ConfigurationError, LimitExceeded
 from ..instruments import Samples
 from ..plan import needed_vpp
 from ..recording import bridged, coupling_cut_hz, found_dropouts, undecided_from
-from ..rig import Channel, OnTable, Rig, Role
+from ..rig import RESPONSE_ROLES, Channel, OnTable, Rig, Role
 from .control_action import PhaseSamples
 from .steadiness import Phasors, Stroboscope
+
+_DERIVATIVES = {Role.M0_ACCELERATION: -1, Role.M0_DISPLACEMENT: 1}
 
 
 @dataclass(frozen=True)
@@ -27,25 +29,35 @@ class FeedbackChannels:
     base_units_per_volt: float
     """[m/s2 per V]"""
     response_units_per_volt: float
-    """[m/s per V]"""
+    """SI units of the sensor of m0 per volt."""
     response_delay_s: float
-    """Delay of the vibrometer; corrected in every phase [s]."""
+    """Delay of this sensor; corrected in every phase [s]."""
     base_cut_hz: float
     """-3 dB frequency of the channel's coupling, corrected in every phase; 0 for DC [Hz]."""
     response_cut_hz: float
     sample_rate_hz: float
+    response_derivatives: int = 0
+    """Times that the signal of m0 is differentiated for a velocity: -1 for an acceleration."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
-        """Return drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,).
+        """Return drive [V], base acceleration [m/s2] and the sensor of m0, each of shape (samples,).
 
-        Drop-outs of the vibrometer are bridged.
+        Drop-outs of a vibrometer are bridged.
         """
         response = samples.volts[self.response] * self.response_units_per_volt
+        if self.response_derivatives == 0:
+            response = bridged(response, found_dropouts(response, self.sample_rate_hz))
         return (
             samples.volts[self.drive] * self.drive_units_per_volt,
             samples.volts[self.base] * self.base_units_per_volt,
-            bridged(response, found_dropouts(response, self.sample_rate_hz)),
+            response,
         )
+
+    def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
+        """Return the velocity of m0 over its sensor's signal; 0 at 0 Hz if that is no velocity."""
+        is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
+        omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
+        return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
 
     def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
         """Return a stroboscope for a motion whose period is ``drives`` drive periods."""
@@ -73,7 +85,7 @@ class FeedbackChannels:
 def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:
     """Find the channels that feedback needs; raises ConfigurationError when one is missing."""
     drive, base, response = (
-        _row(channels, role) for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
+        _row(channels, *roles) for roles in ((Role.DRIVE_VOLTAGE,), (Role.BASE_ACCELERATION,), RESPONSE_ROLES)
     )
     return FeedbackChannels(
         drive=drive,
@@ -86,17 +98,19 @@ def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -
         base_cut_hz=coupling_cut_hz(channels[base].coupling),
         response_cut_hz=coupling_cut_hz(channels[response].coupling),
         sample_rate_hz=sample_rate_hz,
+        response_derivatives=_DERIVATIVES.get(channels[response].role, 0),
     )
 
 
-def _row(channels: tuple[Channel, ...], role: Role) -> int:
-    roles = [channel.role for channel in channels]
-    if role not in roles:
-        raise ConfigurationError(
-            f"feedback needs {role.value}, and this rig has no such channel. Nothing was played; add it "
-            "to daq.channels, or use an excitation without feedback"
-        )
-    return roles.index(role)
+def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
+    rows = [channel.role for channel in channels]
+    for role in roles:
+        if role in rows:
+            return rows.index(role)
+    raise ConfigurationError(
+        f"feedback needs {' or '.join(role.value for role in roles)}, and this rig has no such channel. "
+        "Nothing was played; add it to daq.channels, or use an excitation without feedback"
+    )
 
 
 _REMEMBERED_S = 0.1

@@ -43,6 +43,7 @@ class Equaliser:
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
         self._rate_hz = loop.channels.sample_rate_hz
+        self._to_velocity = np.abs(loop.channels.velocity_over_response(plan.lines * plan.repetition_hz)) ** 2
         self._factor = loop.rig.generator.terminal_factor()
         self.frequency_hz = plan.lines * plan.repetition_hz
         transfer = RigModel(loop.rig, OnTable.NOTHING).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)
@@ -82,7 +83,10 @@ class Equaliser:
         Raises LimitExceeded when a density is past its abort line, or the base hardly answers.
         """
         heard = MeasuredDensities(
-            self._density(drive), self._density(base), self._density(response), _kurtosis(base)
+            self._density(drive),
+            self._density(base),
+            self._density(response) * self._to_velocity,
+            _kurtosis(base),
         )
         self._require_answer(heard)
         newest = heard.base / np.maximum(heard.drive, 1e-300)

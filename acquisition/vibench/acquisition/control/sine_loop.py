@@ -18,7 +18,7 @@ from ..recording import FeedbackNote, Held, HeldResponseNote
 from ..rig import OnTable, Rig
 from .control_action import ControlAction, Controller, PhaseSamples, measured_level
 from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
-from .steadiness import Periods, Phasors, Stroboscope
+from .steadiness import ORDERS, Periods, Phasors, Stroboscope
 
 _SURE = 4.0
 """Standard uncertainties above which a trend is followed instead of averaged."""
@@ -126,8 +126,9 @@ class SineLoop:
 
     @property
     def periods(self) -> Periods:
-        """Periods since the last change."""
-        return self._scope.periods()
+        """Periods since the last change, of m0 as velocities [m/s]."""
+        found = self._scope.periods()
+        return Periods(found.base, found.response * self._to_velocity)
 
     @property
     def drive_hz(self) -> float:
@@ -141,8 +142,14 @@ class SineLoop:
 
     @property
     def noise(self) -> float:
-        """Rms noise of the response channel, in the orders at the present frequency [m/s]."""
-        return Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
+        """Largest rms noise of m0's velocity in the orders at the present frequency [m/s]."""
+        rms = Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
+        return rms * float(np.max(np.abs(self._to_velocity)))
+
+    @property
+    def _to_velocity(self) -> Phasors:
+        orders_hz = np.arange(ORDERS) * self._scope.clock.frequency_hz / self.drives
+        return self.channels.velocity_over_response(orders_hz)
 
     def listen_to_silence(self) -> Controller[None]:
         """Record silence: the response then shows noise."""
@@ -183,7 +190,9 @@ class SineLoop:
         """Continue the drive for a while, and evaluate it."""
         samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
-        first_sample, rows = self._rows.take(samples.first_sample, np.stack(self.channels.rows(samples)))
+        first_sample, rows = samples.first_sample, np.stack(self.channels.rows(samples))
+        if self.channels.response_derivatives == 0:
+            first_sample, rows = self._rows.take(first_sample, rows)
         if rows.size:
             self._scope.add(first_sample, *rows)
 
