@@ -96,8 +96,8 @@ from .specimen.drive import (
 )
 from .specimen.frozen_model import (
     FrozenModel as FrozenModel,
+    NumberWith as NumberWith,
     number_of as number_of,
-    number_with as number_with,
 )
 from .specimen.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
 from .specimen.hunt_crossley import HuntCrossley as HuntCrossley

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.sim import number_with
+from vibench.sim import NumberWith
 
 from ..host.toml_file import FrozenModel
 
@@ -16,7 +16,7 @@ LOOK_FACTOR = 2.0**0.5
 """Ratio of recorded times between one analysis and the next."""
 
 
-Wish = Annotated[float, Field(gt=0, lt=1), number_with("%")]
+Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
 """Half width of the 95 % interval over the value."""
 
 

@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 _NUMBER = re.compile(
@@ -24,12 +24,19 @@ def number_of(text: str, *units: str) -> float:
     return float(found[1]) * _SCALES[found[2]]
 
 
-def number_with(*units: str) -> BeforeValidator:
-    """Read numbers, and texts of a number, alone or with one of these `units`."""
-    return BeforeValidator(
-        lambda given: number_of(given, *units) if isinstance(given, str) else given,
-        json_schema_input_type=float | str,
-    )
+class NumberWith:
+    """Read numbers, and texts of a number, alone or with one of these `units`; limits apply to both."""
+
+    def __init__(self, *units: str) -> None:
+        self._units = units
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        number = handler(source)
+        return core_schema.no_info_before_validator_function(
+            lambda given: number_of(given, *self._units) if isinstance(given, str) else given,
+            number,
+            json_schema_input_schema=core_schema.union_schema([number, core_schema.str_schema()]),
+        )
 
 
 def _number(given: object) -> object:

@@ -21,7 +21,7 @@ from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
-from ..specimen.frozen_model import FrozenModel, number_with
+from ..specimen.frozen_model import FrozenModel, NumberWith
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
@@ -123,9 +123,9 @@ Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValida
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
-TargetError = Annotated[float, Field(gt=0.0, le=1.0), number_with("%")]
+TargetError = Annotated[float, Field(gt=0.0, le=1.0), NumberWith("%")]
 """Relative: 0.01, or "1 %"."""
-TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), number_with("ms", "s", "min", "h")]
+TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), NumberWith("ms", "s", "min", "h")]
 """In seconds, or "200 ms", "2 s", "5 min"."""
 StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""
