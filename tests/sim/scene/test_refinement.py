@@ -155,3 +155,17 @@ def test_the_error_of_a_mean_holds_in_nineteen_cases_of_twenty():
         for values in random.gumbel(1.0 - 0.05 * np.euler_gamma, 0.05, (400, 12))
     ]
     assert np.mean(held) > 0.92
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+@pytest.mark.parametrize("other", [0.3, 3.0])
+def test_the_error_of_a_mean_over_two_motions_holds_and_is_not_far_too_wide(share, other):
+    random, count = np.random.default_rng(4), 100
+    true, scatter = 1.0 + share * (other - 1.0), abs(other - 1.0) * np.sqrt(share * (1.0 - share) / count)
+    held, errors = [], []
+    for is_other in random.random((300, count)) < share:
+        values = np.where(is_other, other, 1.0)
+        errors.append(mean_error([np.full(4, each) for each in values], int(is_other.sum()))[0])
+        held.append(abs(values.mean() - true) <= errors[-1] * values.mean())
+    assert np.mean(held) > 0.92
+    assert np.median(errors) * true < 1.8 * 1.96 * scatter

@@ -632,7 +632,7 @@ def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
     Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
     most came to one motion that repeats, and ``others`` did not, more may have the share that Wilson's
-    interval leaves.
+    interval leaves: the larger of the two counts, since both are intervals of that share.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
@@ -644,7 +644,7 @@ def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
         unseen = (share.high - share.share) * max(
             OTHER_DIFFERS, float((np.ptp(responses, axis=0) / mean).max())
         )
-    return np.asarray(times * padded.std(axis=0, ddof=1) / mean + unseen + ROUNDING)
+    return np.asarray(np.maximum(times * padded.std(axis=0, ddof=1) / mean, unseen) + ROUNDING)
 
 
 def _mean_error(starts: Sequence[_Start]) -> Floats:
