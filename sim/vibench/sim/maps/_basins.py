@@ -24,42 +24,43 @@ BLOCKS = 4
 """Parts along each axis for a jackknife of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain cells at a distance to use it."""
+"""Fewest uncertain cells that make a distance usable."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of all cells: beyond, neighbours are distinguished by their shares alone."""
+"""Largest share of uncertain cells that makes a distance usable; above it, cells differ by chance."""
 SPREAD = 4.0
-"""The largest distance over the smallest, at least: a slope over less says little."""
+"""Smallest ratio of the largest to the smallest distance: a slope over less is unreliable."""
 
 
 @dataclass(frozen=True)
 class UncertaintyExponent:
-    """How the share f of uncertain starts falls with the uncertainty d of the start: f ~ d^exponent.
+    """Uncertainty exponent: the share f of uncertain starts falls with their uncertainty d as d^exponent.
 
-    1 for a smooth boundary, 0 where more accurate starts help nothing; the boundary's dimension is 2 minus it
-    (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
+    1 for a smooth boundary, 0 where more accurate starts do not help; the dimension of the boundary is 2
+    minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
     """
 
     exponent: float
     low: float
-    """The interval holds it in 19 cases of 20, as far as a grid can tell."""
+    """With its interval, valid in 19 cases of 20 within the resolution of the grid."""
     high: float
     steps: tuple[int, ...]
-    """Distances that were compared, in steps of the grid."""
+    """Compared distances in steps of the grid."""
     shares: tuple[float, ...]
-    """Share of the starts at each of them that have a neighbour which comes to another motion."""
+    """Share of starts at each distance that have a neighbour with another motion."""
 
 
 def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | None:
     """Find the uncertainty exponent of the boundary between the motions of a map over two coordinates.
 
-    A start is uncertain at a distance if one of the starts so far away along either axis comes to another
-    motion. The interval is that of a jackknife over parts of the map. None where fewer than three distances
-    have enough uncertain starts, or fewer than half of all.
+    A start is uncertain at a distance if a start that far away along an axis reaches another motion. The
+    interval is that of a jackknife over parts of the map. None where fewer than three distances have enough
+    uncertain starts, or fewer than half of all.
 
     Parameters
     ----------
     numbers
-        Of the motion that each start came to, shape (rows, columns): `MapResults.motion_numbers[:, 0]`.
+        Number of the motion that each start reached, shape (rows, columns): `MapResults.motion_numbers[:,
+        0]`.
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
     uncertain = {step: _uncertain(numbers, step, steps[-1]) for step in steps}
@@ -82,7 +83,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
 
 
 def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
-    """Whether a start so far away along either axis comes to another motion; without those at the edge."""
+    """Return whether a start one step away along an axis reaches another motion; without the edge."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step
     ]
@@ -110,9 +111,9 @@ class KickStability:
     motion: int
     """Index of the motion in `MapResults.motion_numbers`."""
     size: float
-    """Standard deviation of each displacement over the gap, and of each velocity over gap times 2 pi f."""
+    """Standard deviation of each displacement over the gap; of each velocity over gap times 2 pi f."""
     returned: Share
-    """Share of kicks after which it comes back to the same motion, within the drive periods of the map."""
+    """Share of kicks after which the motion returns, within the drive periods of the map."""
 
 
 def kick_stability(
@@ -122,7 +123,7 @@ def kick_stability(
     seed: int = 1,
     workers: int | None = None,
 ) -> tuple[KickStability, ...]:
-    """Kick each motion of a basin map and see whether it comes back: basin stability under noise.
+    """Kick each motion of a basin map and count how often it returns (basin stability).
 
     Raises InvalidStudy when more than the start varies, or there is no kick.
 
@@ -135,9 +136,9 @@ def kick_stability(
         Physics 9
         (2013) 89, draw them from a box).
     kicks
-        Of each size, at one instant of each motion: when the drive is where it was when a run ended.
+        Number of kicks of each size, all at one drive phase.
     seed, workers
-        Of the kicks; threads.
+        Seed of the kicks; number of threads.
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks are asked for; give 1 or more.")

@@ -38,7 +38,7 @@ from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 JUMP = 0.1
 """Relative difference of neighbouring responses that triggers refinement."""
 BASIN_JUMP = 2e-3
-"""Where only the start varies, responses of one motion are the same except for what has not settled."""
+"""The same where only the start varies: responses of one motion differ only by what has not settled."""
 NOTHING = -1
 NOBODY = -1
 
@@ -50,9 +50,8 @@ BUNDLE_S = 0.3
 def map_solver(plan: Map) -> Solver:
     """Return the solver of a map: SIMD batches, or point by point.
 
-    Batches follow motions of one specimen that do not wait for each other, and pay where a processor has the
-    registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one, as do
-    points with a target.
+    Batches need independent motions of one specimen and a processor with wide registers. Stops other than
+    Hertz's, accuracy *reference* and points with a target are solved one by one.
     """
     if plan.target is not None:
         return solve_scene
@@ -68,7 +67,7 @@ class MapPoints:
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Checked here, not in the plan, because files contain such maps of earlier versions.
+        # Checked here, not in the plan: files of earlier versions contain such maps.
         of_start = [each.field for each in plan.varied if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
@@ -81,17 +80,17 @@ class MapPoints:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Point that each one continues, or NOBODY, shape (points,)."""
+        """Return the point that each point continues, or NOBODY, shape (points,)."""
         return predecessors(self.grid, self.plan.chain)
 
     @cached_property
     def planned_s(self) -> Floats:
-        """Time that each point is planned to take, shape (points,)."""
+        """Return the planned time of each point, shape (points,)."""
         return planned_times(self.grid, lambda number: self._cost_s(number, expected_cost_s))
 
     @cached_property
     def longest_s(self) -> Floats:
-        """Time that each point is planned to take if its motion never repeats, shape (points,)."""
+        """Return the planned time of each point if its motion never repeats, shape (points,)."""
         return planned_times(self.grid, lambda number: self._cost_s(number, longest_cost_s))
 
     @property
@@ -176,7 +175,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return each cell a number for what the first start came to and which motions were found.
+    """Return a number for each cell, by the motion of the first start and the set of motions found.
 
     From shape (rows, starts, columns) to (rows, columns).
     """
@@ -184,7 +183,7 @@ def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     if starts == 1:
         return label[:, 0]
     found = np.sort(label, axis=1)
-    # A motion counts once, however many starts came to it.
+    # A motion counts once, however many starts reach it.
     found[:, 1:][found[:, 1:] == found[:, :-1]] = NOTHING
     cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
     flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
@@ -205,7 +204,7 @@ def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
 
 
 POINT_S = 2e-4
-"""Time that the process that asks spends on each point [s]: its scene, and its answer's way into the file."""
+"""Time that the main process spends on each point [s]: build its scene, store its result."""
 
 
 @dataclass(frozen=True)
@@ -216,17 +215,17 @@ class MapEstimate:
     coarse_points: int
     """Number of points of the first lattice: a map has at least this many."""
     work_s: float
-    """Work of all points on one core, as such points took here lately."""
+    """Work of all points on one core, from recent run times on this machine."""
     longest_work_s: float
-    """The same if no motion repeats, so that each is followed for all drive periods of the map."""
+    """The same if no motion repeats: each is followed for all drive periods of the map."""
     coarse_work_s: float
     """Work of the first lattice."""
     workers: int
     file_bytes: int
     followed: str
-    """How motions are followed, as `map_solver` chooses."""
+    """Method chosen by `map_solver`."""
     known_from: str
-    """What the times are known from."""
+    """Source of the times."""
 
     @property
     def all_s(self) -> float:
@@ -276,10 +275,10 @@ class MapEstimate:
 
 
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
-    """Return what a map will take of ``workers`` threads, by what such points took here lately.
+    """Estimate the time of a map on ``workers`` threads from recent run times on this machine.
 
-    None is run, except a pilot of about a second where points have a target. How many points refinement will
-    ask for, and how many motions repeat, is not known before: the estimate says the least and the most.
+    No point is run, except in a pilot of about a second where points have a target. The number of refined
+    points and of repeating motions is unknown beforehand: the estimate gives bounds.
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)

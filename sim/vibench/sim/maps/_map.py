@@ -52,7 +52,7 @@ KEPT = (
 )
 """Columns of a study."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
-"""Columns of a study, kept of a map with a target."""
+"""Additional columns of a map with a target."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
@@ -76,7 +76,7 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Multiple of the longest period that is searched."""
+"""Drive periods by default, as a multiple of the longest searched period."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
@@ -95,9 +95,9 @@ def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
-    """Find the most energy that a stop stored [J], from the largest penetration; None where none yields.
+    """Return the largest energy stored in a stop [J], from the penetration; None for rigid stops.
 
-    Where gaps differ, the largest abs(p) does not tell which stop was reached: None beyond the nearer.
+    Also None where gaps differ and abs(p) exceeds the smaller: either stop may have been reached.
     """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:
@@ -156,11 +156,11 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""Most points: a file of 1 GB, and as much memory."""
+"""Largest number of points: a file of 1 GB, and as much memory."""
 MOST_STEP = 16
-"""Between the first points, where a map does not say."""
+"""Default steps between the points of the first lattice."""
 FEWEST_STEPS = 8
-"""Between the first points of an axis: a picture from fewer would be drawn, not computed."""
+"""Fewest steps of the first lattice on an axis; a map from fewer would be mostly interpolated."""
 STARTS = "start"
 RANDOM = "random"
 
@@ -173,7 +173,7 @@ class Spacing(StrEnum):
 
 
 class Range(FrozenModel):
-    """Values from one number to another."""
+    """Range of values."""
 
     start: float
     stop: float
@@ -216,7 +216,7 @@ class Range(FrozenModel):
 
 
 class Refinement(StrEnum):
-    """Which points of a map over two quantities are computed."""
+    """Selection of the computed points of a map over two quantities."""
 
     ADAPTIVE = "adaptive"
     """A coarse lattice, and between its points only where neighbours differ."""
@@ -247,7 +247,7 @@ class Map(GridPlan):
     damping_time_s: NonNegativeFloat | Range | None = None
     """c_i = damping time * k_i."""
     k0_n_per_m: Positive | None = None
-    """Stiffness between base and m0; where the specimen says a damping time, its dampers go with it."""
+    """Stiffness between base and m0; dampers follow if the specimen has a damping time."""
     k1_n_per_m: Positive | None = None
     """Between m2 and m1."""
     k2_n_per_m: Positive | None = None
@@ -268,9 +268,10 @@ class Map(GridPlan):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random states."""
     observe: tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...] = (Observable.RESPONSE,)
-    """With "lyapunov" the largest exponent too, over up to 25 s at every point: tens of times the work."""
+    """Additional observables: "lyapunov" is the largest exponent, over up to 25 s at each point (tens of
+    times the work)."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of every point."""
+    """Accuracy of each point."""
     error: TargetError | None = None
     """Requested relative error of each point, 0.01 or "1 %"; sets the accuracy."""
     time_s: TargetTime | None = None
@@ -280,14 +281,14 @@ class Map(GridPlan):
     window_periods: Annotated[int, Field(ge=10)] = 200
     """Drive periods over which a motion that does not repeat is observed."""
     refinement: Refinement = Refinement.ADAPTIVE
-    """Which points of a map over two quantities are computed."""
+    """Selection of the computed points of a map over two quantities."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Steps between the points that are computed first, halved until it is 1; absent: 16, or as many as leave
-    eight such steps on each axis. What lies between points that agree is filled in."""
+    """Steps between the points that are computed first, halved until 1. Absent: 16, or fewer so that each
+    axis has eight such steps. Points between equal neighbours are filled in."""
 
     @property
     def target(self) -> Target | None:
-        """Of every point; None where neither an error nor a time was given."""
+        """Return the target of each point; None without an error and a time."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @model_validator(mode="after")
@@ -337,7 +338,7 @@ class Map(GridPlan):
 
     @property
     def varied(self) -> tuple[Quantity, ...]:
-        """The one or two varying quantities; the first is along the last axis."""
+        """Return the one or two varying quantities; the first is along the last axis."""
         return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
 
     def range_of(self, quantity: Quantity) -> Range:
@@ -348,17 +349,17 @@ class Map(GridPlan):
 
     @property
     def is_basin(self) -> bool:
-        """Whether only the start varies."""
+        """Return whether only the start varies."""
         return all(each in START for each in self.varied)
 
     @property
     def is_over_drive(self) -> bool:
-        """Whether it goes over drive frequency and amplitude, so that levels of recordings lie on it."""
+        """Return whether drive frequency and amplitude vary, so that levels of recordings can be overlaid."""
         return [each.axis for each in self.varied] == ["frequency", "amplitude"]
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether points may be left out, for two quantities without chains."""
+        """Return whether points may be filled in: two quantities, no chain."""
         may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
         return may_be and self.first_step > 1
 
@@ -373,7 +374,7 @@ class Map(GridPlan):
 
     @property
     def start_labels(self) -> tuple[str, ...]:
-        """Names of the starts of every point."""
+        """Return the names of the starts of each point."""
         own = tuple(str(each) for each in self.chain) or (
             "given" if any(getattr(self, each.field) for each in START) else "rest",
         )
@@ -381,7 +382,7 @@ class Map(GridPlan):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Dimensions of the results: the second quantity that varies if there is one, starts, the first."""
+        """Return the dimensions of the results: second varying quantity if any, starts, first one."""
         first, *second = (
             StudyAxis(each.axis, self.range_of(each).values, each.units, each.long_name)
             for each in self.varied
@@ -395,7 +396,7 @@ class Map(GridPlan):
         return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
 
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
-        """Make the scene at a place of the grid, from its own start or another.
+        """Return the scene at a place of the grid, from its own start or the given one.
 
         Raises ValueError when a scene of these numbers is not allowed.
         """
@@ -429,7 +430,7 @@ class Map(GridPlan):
     def _start(
         self, place: tuple[int, ...], said: Mapping[str, float], specimen: Specimen, drive: Harmonic
     ) -> Given | Rest:
-        """Return the start of a point that continues no other."""
+        """Return the start of a point that does not continue another."""
         if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
             x, y, z, vx, vy, vz = (float(each) for each in random_state(specimen, drive, drawn))

@@ -17,7 +17,7 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Audit: largest number and share of filled cells that are computed to find the error rate."""
+"""Largest number and share of filled cells that the audit computes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +27,11 @@ class Seen:
     is_known: Mask
     """Computed."""
     codes: Codes
-    """Cells with other numbers are other motions."""
+    """Motion of each cell."""
     sizes: Floats
-    """Natural logarithm of a response that is the same wherever the motion is; NaN where it scatters."""
+    """Natural logarithm of a response that is the same at each visit to a motion; NaN where it scatters."""
     jump: float
-    """Neighbours whose sizes differ by more are different."""
+    """Difference of sizes above which neighbours are different."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Filling:
     cells: Indices
     """Flat numbers, shape (n,)."""
     donors: Indices
-    """Computed cells whose motion they are taken to have, shape (n,)."""
+    """Computed cells that supply their motion, shape (n,)."""
     corners: Indices
     """Computed or filled cells of coarser levels with the same motion, shape (n, 4)."""
     weights: Floats
@@ -55,13 +55,13 @@ class RefinementPlan:
     missing: Indices
     """Flat numbers of the cells that are to be computed next."""
     step: int
-    """Between the points of the lattice that this is about."""
+    """Steps between the points of the current lattice."""
     fillings: tuple[Filling, ...] = ()
     """Coarse levels first."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Audited cells: computed instead of filled in."""
     audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Computed cells whose motion these had been taken to have."""
+    """Computed cells that had supplied the motion of each audited cell."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
@@ -135,16 +135,16 @@ class _Sketch:
             if missing.any():
                 return missing
             self.compute(wanted)
-            # A filled cell beside a different one may be different too: motions thinner than the lattice.
+            # A filled cell beside a different one may differ too: regions can be thinner than the lattice.
             beside = self._beside_others(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
             wanted = beside
 
     def filling(self, fine: int, step: int) -> Filling:
-        """Return how the cells of a level that were not computed in the end are filled in.
+        """Return how the remaining cells of a level are filled in.
 
-        A corner that turned out to be another motion later on does not count.
+        Corners that later proved to be another motion do not count.
         """
         is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
         cells = np.flatnonzero(is_new)
@@ -162,13 +162,13 @@ class _Sketch:
         self.sizes.reshape(-1)[cells] = (self.sizes.reshape(-1)[corners] * weights).sum(axis=1)
 
     def _differ(self, corners: Indices) -> Mask:
-        """Whether the corners of each cell are not all the same motion, shape (n,)."""
+        """Return whether the corners of each cell have different motions, shape (n,)."""
         codes, sizes = self.codes.reshape(-1)[corners], self.sizes.reshape(-1)[corners]
         spread = sizes.max(axis=1) - sizes.min(axis=1)
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
     def _beside_others(self, fine: int) -> Mask:
-        """Whether one of the eight neighbours on a lattice is another motion, shape (rows, columns)."""
+        """Return whether one of the eight neighbours has another motion, shape (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)
         differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
@@ -208,7 +208,7 @@ def lattice(shape: tuple[int, ...], step: int) -> Mask:
 
 
 def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices, Floats]:
-    """Give the corners of the coarser lattice around each cell, shape (n, 4), and their bilinear weights."""
+    """Return the corners of the coarser lattice around each cell and their bilinear weights, shape (n, 4)."""
     rows, columns = np.divmod(cells, shape[1])
     (low_row, high_row, up), (low_column, high_column, right) = (
         _between(place, _lines(length, step)) for place, length in zip((rows, columns), shape, strict=True)
@@ -224,7 +224,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
 
 
 def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
-    """Return the lines at or below and above each place, and how far it is from the one to the other."""
+    """Return the lines at or below and above each place, and its position between them (0 to 1)."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]
     low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])

@@ -18,7 +18,7 @@ from ._refinement import RefinementPlan
 
 UNKNOWN = -1
 SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
-"""Kinds of motion whose responses are the same each time."""
+"""Kinds of motion with reproducible responses."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class MapMotion:
     response_ii: float
     share: Share
     """Share of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
-    motions hold together in 19 cases of 20. Random starts are the same draws in every cell: with them each
-    start counts as one trial, however many cells there are."""
+    motions hold together in 19 cases of 20. Random starts are the same in every cell, so each counts as one
+    trial."""
 
 
 @dataclass(frozen=True)
@@ -43,27 +43,27 @@ class Audit:
     """Error rate of filled cells, from a random sample."""
 
     filled: int
-    """Cells of the map that were not computed, those that were audited among them."""
+    """Cells that were not computed, including the audited ones."""
     audited: int
     wrong: int
-    """Of these, how many came to another motion than was filled in."""
+    """Audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Of these, how many came to each motion, filled in as another; of several starts, in parts."""
+    """Wrong cells by computed motion; fractions with several starts."""
     lost: tuple[float, ...]
-    """How many had been filled in as each motion and came to another."""
+    """Wrong cells by filled-in motion."""
 
     @property
     def wrong_share(self) -> Share:
-        """Share of the filled cells that is wrong; the interval holds it in 19 cases of 20."""
+        """Return the share of filled cells that are wrong, with its interval for 19 cases of 20."""
         if not self.audited:
             return Share(0.0, 0.0, 1.0 if self.filled else 0.0)
         return wilson_share(self.wrong, self.audited)
 
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
-        """Correct shares of motions in a map of this many cells by how filling in was wrong.
+        """Correct shares of motions in a map of this many cells for errors of filling in.
 
-        Where motions are mixed finely the commonest is filled in too often. What the audit gains and loses
-        each motion is what the other filled cells would, as far as their number tells.
+        Where motions are finely mixed, the commonest is filled in too often. Gains and losses of the audited
+        cells are scaled up to all filled cells.
         """
         if not self.filled:
             return tuple(shares)
@@ -71,7 +71,7 @@ class Audit:
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            # Nothing is known of what was filled in where none of it was audited.
+            # Without audited cells, nothing is known of filled cells.
             come, gone = (
                 wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
                 for each in (gained, lost)
@@ -92,9 +92,9 @@ def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
     Parameters
     ----------
     numbers
-        Of the motion that each point came to, shape (rows, starts, columns).
+        Number of the motion that each point reached, shape (rows, starts, columns).
     found
-        The refinement's plan, with nothing missing.
+        Plan of a complete refinement.
     """
     codes = cell_codes(numbers).reshape(-1)
     starts = np.moveaxis(numbers, 1, 2).reshape(len(codes), -1)
@@ -116,12 +116,12 @@ class MapResults(GridResults[Map]):
 
     @property
     def is_complete(self) -> bool:
-        """Whether every point is computed or filled in."""
+        """Return whether every point is computed or filled in."""
         return bool(np.all(self.state != PointState.MISSING))
 
     @property
     def computed(self) -> int:
-        """Points that were computed."""
+        """Return the points that were computed."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
 
     @cached_property
@@ -135,9 +135,9 @@ class MapResults(GridResults[Map]):
     def motion_numbers(self) -> NDArray[np.int64]:
         """Index of the motion of each point over all axes; -1 if unknown.
 
-        Points have the same number if they are of one kind and period; motions without impacts have theirs.
-        Where only the start varies the responses of periodic motions are distinguished too, so that each
-        number is one attractor; the commonest is 0.
+        Points of one kind and period have the same number; motions without impacts have their own. Where only
+        the start varies, periodic motions are also distinguished by their responses, so that each number is
+        one attractor. The commonest is 0.
         """
         state = self.state.reshape(-1)
         is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
@@ -161,14 +161,14 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motions(self) -> tuple[MapMotion, ...]:
-        """The motions of the whole map, by `motion_numbers`.
+        """Return the motions of the whole map, in the order of `motion_numbers`.
 
-        Shares are of all known points; of a map of which a part is filled in, as the audit corrects them.
+        Shares are of all known points, corrected by the audit where a part is filled in.
         """
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Describe the motions that all starts of one cell came to, the commonest first."""
+        """Describe the motions that the starts of one cell reached, the commonest first."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -177,9 +177,9 @@ class MapResults(GridResults[Map]):
         return self._described(numbers, None)
 
     def shown(self, name: str, start: int = 0) -> Floats:
-        """Return one quantity over what varies, from one of the starts; NaN where it is not known.
+        """Return one quantity over the varying ones, from one of the starts; NaN where unknown.
 
-        ``motions`` is how many motions the starts of a cell came to; all others are columns.
+        ``motions`` is the number of motions reached from the starts of a cell; other names are columns.
         """
         if name == "motions":
             return self.motion_counts
@@ -187,12 +187,12 @@ class MapResults(GridResults[Map]):
         return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
 
     def example(self, number: int) -> int:
-        """Return the first computed point that came to a motion of this number."""
+        """Return the first computed point with this number of motion."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
 
     def phase_after(self, point: int) -> float:
-        """Phase of the drive at the end of a computed point [rad]: where its final state goes on from."""
+        """Return the drive phase at the end of a computed point [rad], to continue from its final state."""
         frequency_hz = self.plan.frequency_at(self.plan.grid.place(point))
         return end_phase(frequency_hz, point, dict(self.arrays))
 
@@ -204,7 +204,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def _sizes(self) -> Floats:
-        """Logarithm of Response I where that is the same each time a motion is reached, else 0."""
+        """Return the logarithm of Response I where it is reproducible, else 0."""
         response = np.maximum(self.arrays["response_i"].astype(np.float64), 1e-300)
         is_solid = (self._labels >= 0) & SOLID[self.arrays["motion"].astype(np.int64)]
         return np.where(is_solid, np.log(np.where(np.isfinite(response), response, 1.0)), 0.0)
@@ -237,7 +237,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return rows numbers by label and, where there are sizes, by size: a gap parts two motions."""
+    """Return rows numbered by label and, where there are sizes, by size: a gap separates two motions."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -256,9 +256,9 @@ def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def open_map(path: Path | str) -> MapResults:
-    """Read a map's file, finished or growing.
+    """Read the file of a map, complete or still being computed.
 
-    Raises StudyError when it is no map's file, or another version's.
+    Raises StudyError if it is not the file of a map, or of another version.
     """
     path = Path(path)
     plan = read_plan(path, Map)

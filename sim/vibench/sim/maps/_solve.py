@@ -24,7 +24,7 @@ from ._refinement import Filling
 from ._results import MapResults, open_map
 
 WHOLE = ("motion", "period", "outcome")
-"""Columns of which a filled cell takes that of a computed one."""
+"""Columns that a filled cell copies from a computed one."""
 BETWEEN = (
     "response_i",
     "response_ii",
@@ -49,27 +49,27 @@ def solve_map(
 ) -> MapResults:
     """Compute a map, or the missing part of its file.
 
-    Raises StudyError in one sentence: a file of another map, a cluster that does not answer, a full disk, ...
+    Raises StudyError, for example for a file of another map, a full disk or a cluster that does not answer.
 
     Parameters
     ----------
     plan
         The map.
     out
-        The file that keeps the answers, ``NAME.h5``; in memory alone when None.
+        File for the results, ``NAME.h5``; in memory only when None.
     existing
-        Whether a file that is there is refused or resumed.
+        Whether an existing file is refused or resumed.
     workers
-        Threads of this process; one for each processor when None.
+        Number of threads; one per processor when None.
     cluster
         Address of a Dask scheduler, whose workers compute instead.
     observer, cancelled
-        Told, and asked, in the calling thread. How many points are wanted grows with every level.
+        Called in the calling thread. The number of requested points grows with every level.
 
     Returns
     -------
     MapResults
-        Complete, or what there was when it was cancelled.
+        Complete, or partial if cancelled.
     """
     with executor_of(workers, cluster, map_solver(plan)) as executor, store_of(plan, out, existing) as store:
         compute_map(plan, executor, store, observer, cancelled)
@@ -122,7 +122,7 @@ def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
-    """Weigh the corners that have a number, shape (n, 4); NaN where none has."""
+    """Return the weighted mean of finite corners, shape (n, 4) to (n,); NaN where none is finite."""
     is_known = np.isfinite(values)
     counted = np.where(is_known, weights, 0.0)
     with np.errstate(invalid="ignore"):

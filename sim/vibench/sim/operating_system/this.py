@@ -1,4 +1,4 @@
-"""The functions of the system that runs this program."""
+"""Functions of the current operating system."""
 
 import errno
 import os
@@ -69,7 +69,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write bytes at a place; a short write is continued."""
+    """Write bytes at an offset; continue after a short write."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)
@@ -77,7 +77,7 @@ def write_all(descriptor: int, data: Buffer, offset: int) -> None:
 
 
 class OpenFile:
-    """An existing file, open to be written; its marks vanish with the process, however that ends.
+    """An existing file, open for writing; its locks end with the process, however it ends.
 
     Raises OSError when it cannot be opened.
     """
@@ -86,19 +86,19 @@ class OpenFile:
         self._descriptor = open_to_write(path)
 
     def lock_in_use(self) -> None:
-        """Mark it as used; others may read. Raises OSError where another process has it alone."""
+        """Lock it as used; others may read. Raises OSError if another process locked it exclusively."""
         lock_in_use(self._descriptor)
 
     def lock_sole_writer(self) -> None:
-        """Mark it as written by this process alone; others may read. Raises OSError where one writes it."""
+        """Lock it for writing by this process only; others may read. Raises OSError if another writes."""
         lock_sole_writer(self._descriptor)
 
     def is_locked_alone(self) -> bool:
-        """Take it for this process alone; False where another uses it."""
+        """Lock it exclusively; return False if another process uses it."""
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Put ``data`` at ``offset``, in the system's cache at least."""
+        """Write ``data`` at ``offset``, at least into the cache of the system."""
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
@@ -107,20 +107,20 @@ class OpenFile:
 
     @property
     def has_a_name(self) -> bool:
-        """Whether it stands in a folder: what was removed can never be found again."""
+        """Return whether it still has a name in a folder; a removed file cannot be found again."""
         return os.fstat(self._descriptor).st_nlink > 0
 
     def reserve(self, offset: int, size: int) -> None:
-        """Allocate blocks where the system can; elsewhere the check of free space must do."""
+        """Allocate blocks where the system can; elsewhere only the check of free space protects."""
         allocate(self._descriptor, offset, size)
 
     def close(self) -> None:
-        """Release the file and its marks."""
+        """Close the file and release its locks."""
         os.close(self._descriptor)
 
 
 def sync_file(path: Path) -> None:
-    """Push a closed file, and its name, to the disk."""
+    """Flush a closed file and its name to the disk."""
     descriptor = open_to_write(path)
     try:
         os.fsync(descriptor)
@@ -131,15 +131,15 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a name to write to; the file then replaces an older one, which stays if there is an error."""
-    target = path.resolve()  # a link stays one
+    """Yield a path to write to; the new file then replaces the old one, which stays after an error."""
+    target = path.resolve()  # follow a link, do not replace it
     if target.exists():
-        target.open("r+b").close()  # raises OSError where it is write-protected
+        target.open("r+b").close()  # raises OSError if write-protected
     coming = target.with_name(f"{target.name}.{os.getpid()}.coming")
     try:
         yield coming
         rename(coming, target)
-    except OSError as error:  # one of a write has no name, and nobody knows the other name
+    except OSError as error:  # an exception of a write names no file or the temporary one
         error.filename = str(path) if error.filename in (None, str(coming)) else error.filename
         raise
     finally:
@@ -148,7 +148,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def rename(unfinished: Path, final: Path) -> None:
-    """Rename a file, replacing `final`; ignore an error of a rename that was made, as on network folders."""
+    """Rename a file, replacing `final`; ignore an error if the file was renamed, as on network folders."""
     made = unfinished.stat()
     try:
         os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
@@ -158,11 +158,11 @@ def rename(unfinished: Path, final: Path) -> None:
 
 
 UNKNOWN = ""
-"""The start of a process that lives, where the system does not tell it."""
+"""Start of a living process whose start the system does not report."""
 
 
 class Place(Enum):
-    """Where a process was started, as its start says it; numbers of processes are known `HERE` only."""
+    """Place where a process was started; process numbers are only valid `HERE`."""
 
     HERE = auto()
     CONTAINER = auto()
@@ -172,7 +172,7 @@ class Place(Enum):
 
 
 def place_of(start: str) -> Place:
-    """Return where a process was started; `Place.HERE` where the system does not say."""
+    """Return where a process was started; `Place.HERE` if the system does not report it."""
     own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
     if len(own) != len(other) or own[:-1] == other[:-1]:
         return Place.HERE
@@ -180,7 +180,7 @@ def place_of(start: str) -> Place:
 
 
 def is_process(pid: int, start: str) -> bool:
-    """Whether the process that began then still lives; with `UNKNOWN`, whether any of that number does."""
+    """Return whether the process with this start still lives; with `UNKNOWN`, any of that number."""
     now = process_start(pid)
     return now is not None and (UNKNOWN in (now, start) or now == start)
 
@@ -190,17 +190,17 @@ LOCK_VARIABLE = "VIBENCH_LOCK_DIR"
 
 
 def state_place() -> Path:
-    """Return where the user's own folder is, or would be; ``VIBENCH_STATE_DIR`` names another place."""
+    """Return the path of the user's state folder; ``VIBENCH_STATE_DIR`` overrides it."""
     given = os.environ.get(VARIABLE)
     return Path(given) if given else usual_state_folder()
 
 
 def state_folder() -> Path:
-    """Return the user's own folder, made if need be; raises PermissionError where none can be made."""
+    """Return the user's state folder, created if missing; raises PermissionError if it cannot be created."""
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:  # a file in the way, a disk that makes no folders
+    except OSError as error:  # a file of that name, a disk without folders
         refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
         refused.add_note(f"{VARIABLE} names another folder for locks, bench checks and learnt costs")
         raise refused from error
@@ -208,5 +208,5 @@ def state_folder() -> Path:
 
 
 def shared_folder() -> Path:
-    """Return the folder where every user may make files; ``VIBENCH_LOCK_DIR`` names another."""
+    """Return the folder where every user may create files; ``VIBENCH_LOCK_DIR`` overrides it."""
     return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

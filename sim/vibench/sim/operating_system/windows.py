@@ -1,4 +1,4 @@
-"""Windows: it locks bytes of a file rather than files, and pushes names in a folder to the disk itself."""
+"""Windows: locks apply to bytes of a file, and the system flushes the names in a folder itself."""
 
 import ctypes
 import msvcrt
@@ -7,42 +7,42 @@ import sys
 from ctypes import wintypes
 from pathlib import Path
 
-assert sys.platform == "win32"  # told to a type checker
+assert sys.platform == "win32"  # for the type checker
 
 LOCK_BYTE = 2**62
-"""Locked byte, beyond the end of every file."""
+"""Offset of the locked byte, beyond the end of every file."""
 _QUERY_LIMITED_INFORMATION = 0x1000
 _BELOW_NORMAL = 0x4000
 _STILL_ACTIVE = 259
 
 
 def open_to_write(path: Path) -> int:
-    """Open an existing file; the descriptor comes back."""
+    """Open an existing file for writing; return its descriptor."""
     return os.open(path, os.O_RDWR | os.O_BINARY)
 
 
 def open_for_all(path: Path) -> int:
-    """Open a file that programs of all users lock, made if need be; the descriptor comes back."""
+    """Open a lock file shared by all users, created if missing; return its descriptor."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
-    except PermissionError:  # another user's: what may be read can be locked
+    except PermissionError:  # the file of another user: a readable file can be locked
         return os.open(path, os.O_RDONLY | os.O_BINARY)
 
 
 def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
-    """Write bytes at a place; tells how many were written."""
+    """Write bytes at an offset; return how many were written."""
     os.lseek(descriptor, offset, os.SEEK_SET)
     return os.write(descriptor, data)
 
 
 def read_at(descriptor: int, size: int, offset: int) -> bytes:
-    """Read bytes at a place; fewer at the end of the file."""
+    """Read bytes at an offset; fewer at the end of the file."""
     os.lseek(descriptor, offset, os.SEEK_SET)
     return os.read(descriptor, size)
 
 
 def sync_data(descriptor: int) -> None:
-    """Push what was written, and what is needed to find it, to the disk."""
+    """Flush written data, and the metadata needed to read them, to the disk."""
     os.fsync(descriptor)
 
 
@@ -51,22 +51,22 @@ def sync_folder(folder: Path) -> None:
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
-    """Do nothing: NTFS has allocated the file when its length was set."""
+    """Do nothing: NTFS allocates a file when its length is set."""
 
 
 def lock_in_use(descriptor: int) -> None:
-    """Mark a file as used for as long as it is open; others may read. Raises OSError where one has it."""
+    """Lock a file as used while it is open; others may read. Raises OSError if one locked it exclusively."""
     os.lseek(descriptor, LOCK_BYTE, os.SEEK_SET)
     msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
 
 
 def lock_sole_writer(descriptor: int) -> None:
-    """Mark a file as written by this process alone; others may read. Raises OSError where one writes it."""
+    """Lock a file for writing by this process only; others may read. Raises OSError if another writes."""
     lock_in_use(descriptor)
 
 
 def is_locked_alone(descriptor: int) -> bool:
-    """Take a file for this process alone, for as long as it is open; False where another uses it."""
+    """Lock a file exclusively while it is open; return False if another process uses it."""
     try:
         lock_in_use(descriptor)
     except OSError:
@@ -75,27 +75,27 @@ def is_locked_alone(descriptor: int) -> bool:
 
 
 def lower_priority(by: int) -> None:  # noqa: ARG001 - there are classes of priority, and no numbers
-    """Let other processes have the processor first."""
+    """Lower the priority of this process."""
     kernel = ctypes.windll.kernel32
     kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Do nothing: only a job object could, and a process cannot leave one."""
+    """Do nothing: only a job object could, and a process cannot leave a job."""
 
 
 def usual_state_folder() -> Path:
-    """Return the place for what a user's programs leave behind."""
+    """Return the system's folder for the state of a user's programs."""
     return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "vibench"
 
 
 def usual_shared_folder() -> Path:
-    """Return a place where every user may make files and nobody removes those of others."""
+    """Return a folder where every user may create files but not remove those of others."""
     return Path(os.environ.get("PROGRAMDATA", "C:\\ProgramData"))
 
 
 def process_start(pid: int) -> str | None:
-    """Return when a process began, in a form of the system's own; None when there is no such process."""
+    """Return when a process started, as the system writes it; None without such a process."""
     kernel = ctypes.windll.kernel32
     handle = kernel.OpenProcess(_QUERY_LIMITED_INFORMATION, 0, pid)
     if not handle:

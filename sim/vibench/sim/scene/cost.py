@@ -1,4 +1,4 @@
-"""Expected run times on this machine: learnt from previous runs, or from a pilot where a scene has a target.
+"""Expected run times on this machine, from previous runs or, for scenes with a target, from a pilot.
 
 A ledger keeps mean and scatter of actual over planned time for every kind of run.
 """
@@ -28,17 +28,17 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Number of runs after which the weight of a run falls to a third."""
+"""Number of later runs after which the weight of a run has fallen to a third."""
 SURPRISE = math.log(2.5)
-"""Limit of the deviation of one run, because the reached motion may be random."""
+"""Largest deviation that is learnt from one run: the reached motion may be random."""
 FEWEST = 3
 """Fewest runs of a kind for an estimate of its scatter."""
 UNKNOWN_FACTOR = 10.0
 """Factor of uncertainty on an unknown machine."""
 LEAST_FACTOR = 1.5
 SURE, FEW = 2.0, 1.6
-"""Standard deviations within which 19 of 20 runs are, and what is added where they are known from few
-runs: Student's t is about SURE (1 + FEW / (runs - 1))."""
+"""Standard deviations that include 19 of 20 runs, and the addition for few runs: Student's t is about SURE (1
++ FEW / (runs - 1))."""
 SAVED_EVERY_S = 5.0
 
 
@@ -99,18 +99,18 @@ class CostLedger:
         """Recent deviation of all kinds, because a slower machine affects all."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
-        """Return how long planned work of a kind will take here; a new kind as what its name begins with."""
+        """Return the expected time of planned work of a kind; a new kind uses the longest known prefix."""
         with self._lock:
             known, drift = self._known(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
-            # The mean itself is as uncertain as the scatter over the root of the runs.
+            # The uncertainty of the mean is the scatter over the square root of the number of runs.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
         return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Record the time of a run in a process prepared for its kind."""
+        """Record the time of a run, without the time for loading modules."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
@@ -175,7 +175,7 @@ def _read(path: Path) -> dict[str, _Kind]:
 
 @cache
 def cost_ledger() -> CostLedger:
-    """Return the ledger of this machine, these versions and sources; it is saved when the process ends."""
+    """Return the ledger for this machine and these versions and sources; it is saved at exit."""
     about = (
         platform.node(),
         platform.machine(),
@@ -183,7 +183,7 @@ def cost_ledger() -> CostLedger:
         physics_digest(),
     )
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
-    with contextlib.suppress(OSError):  # nothing is learnt then
+    with contextlib.suppress(OSError):  # then nothing is saved
         state_folder()
     ledger = CostLedger(state_place() / "costs" / f"{name}.json")
     atexit.register(ledger.save)
@@ -191,27 +191,27 @@ def cost_ledger() -> CostLedger:
 
 
 PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
-"""Scenes with a target that are tried at most, their time together [s], and the share of the rest of it that
-the next one may use."""
+"""Pilot of scenes with a target: most scenes, total time [s], and share of the remaining time for the next
+scene."""
 UNDECIDED = 3.0
-"""Time of a scene over that in which nothing was found out about it, at least."""
+"""Assumed ratio of the time of a scene to the time of a pilot that did not determine it."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
     InBatches(Question.MOTION): "settled in lanes",
     InBatches(Question.ANSWER): "in lanes",
 }
-"""Solvers other than `solve_scene`, and what their runs are learnt as."""
+"""Solvers other than `solve_scene`, and their kinds in the ledger."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Note the processor time of a scene; modules and tables were loaded before."""
+    """Record the processor time of a scene, without the time for loading modules and tables."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
 
 def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Return how long a solver will take for a scene, by what such runs took lately [s].
+    """Return the expected time of a solver for a scene, from recent runs [s].
 
     Raises ValueError when the specimen cannot be followed in time.
     """
@@ -220,7 +220,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
 
 
 def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Return how long a solver will take for a scene whose motion never repeats, by what such runs took [s].
+    """Return the expected time of a solver for a scene whose motion never repeats, from recent runs [s].
 
     Raises ValueError when the specimen cannot be followed in time.
     """
@@ -237,8 +237,8 @@ def _expected_cost(plan: ScenePlan, solver: Solver, planned_s: float) -> Expecte
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
     """Return the mean time of ``count`` scenes with a target, from a pilot of some of them [s].
 
-    Whether a motion forgets its start decides the time, and no plan knows that. Scenes that are not allowed
-    cost nothing.
+    The time depends on whether the motion depends sensitively on its start, which is unknown beforehand.
+    Invalid scenes cost nothing.
     """
     ends_s, costs = time.monotonic() + PILOT_S, list[float]()
     for number in np.random.default_rng(count).permutation(count)[:PILOTS]:
@@ -253,7 +253,7 @@ def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
 
 
 def _target_cost_s(scene: Scene, most_s: float) -> float:
-    """Try one scene for a moment, and say how long it takes as far as it can be known [s]."""
+    """Solve one scene for at most ``most_s``; return the estimated time of the complete solution [s]."""
     assert scene.target is not None
     limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
     tried_s, began_s = min(most_s, limit_s), time.monotonic()
@@ -264,7 +264,7 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
         return taken_s
     if report.needed_s is not None:
         return min(limit_s, report.needed_s[0])
-    # Without a requested error all that the time allows is done.
+    # Without a requested error, all the time is used.
     return limit_s if scene.target.error is None else min(limit_s, UNDECIDED * taken_s)
 
 

@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
-Both have three steps, so that many scenes can run side by side: `way` is followed first, `watch` then
-classifies and returns any further motion to follow, and `seen` observes the end. In
-between, `StatesAlone.follow` follows one motion, `in_batches` those of many scenes. SI units.
+Both have three steps, so that many scenes can be batched: `way` is followed first; `watch` classifies and
+returns any further motion to follow; `seen` observes the end. Between the steps, `StatesAlone.follow` follows
+one motion, and `in_batches` the motions of many scenes. SI units.
 """
 
 import math
@@ -40,7 +40,7 @@ class SceneRun:
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
-    """Blocks of the motion that was watched, those of the window last."""
+    """Blocks of the watched motion; the last ones form the window."""
     was_settled: bool
     """The motion repeated before the window began."""
     motion: MotionKind
@@ -50,22 +50,22 @@ class SceneRun:
     ended: str
     """Reason for its end."""
     path: tuple[Stretch, ...]
-    """From its beginning until it had settled, or until a small change had certainly grown without end."""
+    """Stretch from the start until the motion settled or was certainly chaotic."""
     grew: bool
-    """A small change that was carried along has certainly grown without end."""
+    """A propagated small change has grown enough to prove chaos."""
     wandered_until_s: float
-    """When it was last seen to change from period to period."""
+    """Last time at which it changed from period to period."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
-    """What the responses, relatively, would be off by if the lines were taken over all of the window, shape
-    (4,); zero unless the motion was found to repeat in the window only."""
+    """Relative change of the responses if the lines used the whole window, shape (4,); zero unless the motion
+    was only found to repeat in the window."""
 
 
 class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
-    It is looked at once a drive period. Where it has not started to repeat by the time that it should have
-    forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
-    never repeats is known only by its growth and its statistics.
+    It is checked once per drive period. If it does not repeat after the transient should have decayed, a
+    small change is propagated and extremes are kept by block: only growth and statistics describe a motion
+    that never repeats.
     """
 
     def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
@@ -74,11 +74,11 @@ class FixedCourse:
 
     @property
     def way(self) -> StatesAlone | None:
-        """Motion until it should have settled; None if followed without checks."""
+        """Return the motion until it should have settled; None if followed without checks."""
         return self._lead.states
 
     def watch(self) -> None:
-        """Return nothing more to follow."""
+        """Return None: nothing more is followed."""
 
     def seen(self) -> SceneRun:
         """Observe its end."""
@@ -93,7 +93,7 @@ class FixedCourse:
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # Its period was found only now, so the window is repeated for lines without leakage.
+            # The period is known only now: observe the window again for lines without leakage.
             begins = window.begins.apart()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
@@ -115,7 +115,7 @@ def classify(
 ) -> SceneRun:
     """Return the kind of a motion from its window and the stretches before it.
 
-    Those before it that were watched are blocks as long as the window's own. A motion that comes back is
+    Watched stretches before it are blocks as long as those of the window. A motion that comes back is
     periodic only if Newton's iteration finds a stable motion there: chaos passes by unstable ones, and
     slowly by where two motions have just vanished in a fold.
     """
@@ -148,18 +148,18 @@ def classify(
 
 
 MOST_LOOKS = 4096
-"""States that are kept of a long lead at most: enough to see other starts part from it."""
+"""Most states kept of a long lead: enough to detect that other starts diverge."""
 LOOKS = 16
-"""Least number of checks on a long lead whether the motion repeats."""
+"""Fewest checks for repetition on a long lead."""
 LONGEST_SLICE = 1 << 16
-"""Drive periods between two looks, at most: their states are held."""
+"""Most drive periods between two checks: their states are kept in memory."""
 
 
 class Lead:
     """A motion advanced to an instant, with some of its states.
 
-    What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
-    steps follow one another without a break nothing repeats so nearly.
+    Once it repeats to rounding, the remaining whole cycles are skipped. Motions integrated step by step never
+    repeat so closely.
     """
 
     def __init__(self, run: FollowedRun, until_s: float, pace: Pace) -> None:
@@ -167,7 +167,7 @@ class Lead:
         periods = whole_periods(self._until_s, pace.frequency_hz)
         self._every = every = max(1, math.ceil(periods / MOST_LOOKS))
         self.states: StatesAlone | None = None
-        """To be followed; None where the motion is advanced without looking."""
+        """Motion to follow; None if it is advanced without checks."""
         if pace.sharpness.noise < EXACTLY:
             exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
             slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
@@ -176,7 +176,7 @@ class Lead:
             self.states = states.aim(self._until_s)
 
     def end(self) -> tuple[Stretch, ...]:
-        """Bring a motion whose states were followed to the instant; returns its path."""
+        """Advance the followed motion to the instant; return its path."""
         run, states = self._run, self.states
         if states is None:
             rate_hz = self._frequency_hz / self._every
@@ -189,32 +189,31 @@ class Lead:
 
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Between two looks pass this long and this many drive periods, if the window is not shorter."""
+"""Time and drive periods between two checks; less for shorter windows."""
 WINDOWS = 2
-"""A motion that does not repeat is watched for this many windows; the last of them is the one observed."""
+"""Number of windows for which a motion that does not repeat is watched; the last one is observed."""
 DRIFT_SHARE = 0.25
-"""Share of the budget that a slow drift may use: finding its error repeats its path three times."""
+"""Share of the budget for a slow drift: estimating its error repeats its path three times."""
 
 
 class SettlingCourse:
-    """Run of a motion until it repeats or certainly never will, and is then observed.
+    """Run of a motion until it repeats or certainly never will; then it is observed.
 
-    A motion that repeats is observed over one of its own periods, which holds all there is to see. One that
-    does not is observed over a window once it is certain that it never will. Because chaos can die out, it
-    is followed on by its states alone for as long as a budget allows.
+    A repeating motion is observed over one of its periods, any other over a window. Because chaos can die
+    out, its states alone are followed further, as far as a budget allows.
 
     Parameters
     ----------
     run, pace
         The motion, and what decides how long is long.
     window_s
-        Observed of a motion that does not repeat; rounded to equal parts of whole drive periods.
+        Observed time of a motion that does not repeat; rounded to equal parts of whole drive periods.
     longest_s
-        It is followed no longer, and called undecided if need be; for a window at least.
+        Longest time to follow, at least a window; after it the motion may be undecided.
     alone_s
-        Nominal cost of following chaos on by its states alone; zero does not follow it on.
+        Nominal cost for following chaos further by its states alone; zero disables this.
     by_itself_s
-        Until then it is not followed in a batch; see `StatesAlone`.
+        Time before which it is not followed in a batch; see `StatesAlone`.
     """
 
     def __init__(
@@ -243,7 +242,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Follow it until it repeats or certainly never will; return chaos or a drift to follow further."""
+        """Follow it until it repeats or certainly never will; return the motion to follow further, if any."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -279,7 +278,7 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Let it be followed until it ends or a budget is used up; the last ``watched`` were observed."""
+        """Return it for following until its end or a budget; the last ``watched`` stretches were observed."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
@@ -287,7 +286,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Return what was seen; of a motion that was followed on, after a last window."""
+        """Return the findings; if the motion was followed further, after a last window."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None
@@ -298,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have settled on a torus, which does not repeat either; only growth distinguishes them.
+        # Chaos may have settled on a torus, which does not repeat either: only growth distinguishes the two.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [
@@ -321,14 +320,14 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Drive periods of a slice, and slices of a window."""
+    """Return the drive periods of a slice and the slices of a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))
 
 
 def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretch], pace: Pace) -> SceneRun:
-    """Observe one period of a repeating motion, and find since when it is settled."""
+    """Observe one period of a repeating motion and find when it settled."""
     settled_s, begins = run.time_s, run.apart()
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
@@ -356,7 +355,7 @@ def _observe_last(
     pace: Pace,
     ended: str,
 ) -> SceneRun:
-    """Take the last stretches for the window."""
+    """Return the run with the last stretches as its window."""
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
     window = window_of(begins, last)

@@ -1,4 +1,4 @@
-"""A motion under a harmonic drive, followed in stretches with different observations. SI units."""
+"""Motion under a harmonic drive, followed in stretches with different observations. SI units."""
 
 import math
 import sys
@@ -29,28 +29,27 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 
-# Nominal cost of following a motion, on the machine of docs/accuracy.md, as the measure of budgets. SI units.
-#
-# It is not measured at run time, so that a scene with a budget has the same answer everywhere.
+# Nominal cost of following a motion on the machine of docs/accuracy.md, the measure of budgets. SI units.
+# It is not measured at run time, so that a scene with a budget has the same result everywhere.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
-"""Seconds for a second between contacts, and for one under a force at every p."""
+"""Cost of one second of motion between contacts, and under a force at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
-"""Seconds for an impact: whole, by Gauss points, and step by step."""
+"""Cost of an impact: in closed form, by Gauss points, and step by step [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""With a small change carried along; a collision is then resolved step by step."""
+"""The same with a propagated small change; a collision is then resolved step by step."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Below this tolerance contacts cost this many times more."""
+"""Tolerance below which contacts cost more, and the factor."""
 STEP = 1e-9
-"""Seconds for a step of flight, at least: what counts where a mode is far faster than those of the paper."""
+"""Smallest cost of a step of flight [s]: dominates where a mode is far faster than those of the paper."""
 TANGENT_STEPS = 4
-"""Steps that one with small changes counts as where they are limited: it takes as long."""
+"""Number of steps that one step with a small change counts as, where steps are limited."""
 
 
 def nominal_cost_s(
     contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Return the processor time for a stretch of motion with this many impacts, small changes and steps."""
+    """Return the nominal cost of a stretch with this many impacts, small changes and steps [s]."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -90,9 +89,9 @@ class Stretch:
     samples: Samples
     """Which states were kept."""
     states: Floats
-    """They themselves, shape (n, 6)."""
+    """Kept states, shape (n, 6)."""
     growth: float
-    """Natural logarithm of how much a small change grew; NaN where no tangent was carried."""
+    """Natural logarithm of the growth of a small change; NaN without a tangent."""
 
     @property
     def length_s(self) -> float:
@@ -100,7 +99,7 @@ class Stretch:
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Return the same with every n-th state only."""
+        """Return the stretch with only every n-th state."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
@@ -109,7 +108,7 @@ class Stretch:
 class FollowedRun:
     """A running motion of a specimen, advanced in place.
 
-    Raises ValueError when the specimen cannot be followed in time, or cannot begin so.
+    Raises ValueError when the specimen cannot be followed in time, or not from this start.
     """
 
     def __init__(
@@ -118,7 +117,7 @@ class FollowedRun:
         self.specimen = specimen
         self.drive = drive
         self.outcome = Outcome.REACHED_END
-        """Of all stretches so far."""
+        """Number of impacts in all stretches so far."""
         self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
@@ -148,22 +147,22 @@ class FollowedRun:
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
-        """Let this many drive periods pass in which the motion comes back to its state."""
+        """Skip this many drive periods, after which a repeating motion has the same state."""
         self._run.pass_over(drive_periods / self.drive.frequency_hz)
 
     @property
     def periods(self) -> int | None:
-        """Whole drive periods up to now; None between two."""
+        """Return the whole drive periods so far; None between two."""
         whole = round(self.time_s * self.drive.frequency_hz)
         return whole if whole / self.drive.frequency_hz == self.time_s else None
 
     @property
     def is_in_flight(self) -> bool:
-        """No stop is touched now."""
+        """Return whether no stop is touched now."""
         return self._run.is_in_flight
 
     def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
-        """Return the stretch from an instant until now, which was followed in a batch."""
+        """Return the stretch from an instant until now, followed in a batch."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         return Stretch(
@@ -189,7 +188,7 @@ class FollowedRun:
         self._run.carry(np.empty((0, DIRECTIONS)))
 
     def pushed(self, push: Floats) -> Self:
-        """Return another motion, which begins now and a small change of the state, shape (6,), away."""
+        """Return another motion that starts now, displaced by a small change of the state, shape (6,)."""
         twin, run = self.apart(), self._run.apart()
         run.place(start_motion(self.state + push))
         twin.__dict__.update(_run=run)
@@ -201,7 +200,7 @@ class FollowedRun:
         observe: Watch = Watch.NOTHING,
         samples: Samples | None = None,
     ) -> Stretch:
-        """Advance to an instant; a run that has failed stays where it is."""
+        """Advance to an instant; a failed run does not move."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
         counts_as = TANGENT_STEPS if len(self._run.growth) else 1
@@ -236,7 +235,7 @@ class FollowedRun:
             area_x=record.area_x,
             area_p=record.area_p,
             samples=kept,
-            # Samples that rounding puts a hair beyond the end.
+            # Rounding may put samples just beyond the end.
             states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
@@ -256,15 +255,15 @@ class FollowedRun:
         return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
 
     def _size(self) -> float:
-        """Natural logarithm of the small change, by its energy without stops; NaN where there is none.
+        """Return the natural logarithm of the small change; NaN without one.
 
-        Only a stop can add to it: however fast a mode is over the drive, a change that it turns from
-        displacement to velocity has not grown.
+        Its size is its energy without stops, which only a stop can increase: the exchange of displacement and
+        velocity in a fast mode does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan
         change = self._run.changes[0]
-        # Strong damping may shrink it below the smallest number.
+        # Strong damping may shrink it below the smallest float.
         energy = max(change @ self._metric @ change, sys.float_info.min)
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
@@ -272,7 +271,7 @@ class FollowedRun:
 def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
     """Follow motions of one specimen in a batch, each for whole drive periods, by their states alone.
 
-    None for one that was lost, which is where it was.
+    The result is None for a motion that was lost; it stays where it was.
     """
     starts_s = [run.time_s for run in runs]
     found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
@@ -283,10 +282,10 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
 
 
 BLOCKS = 10
-"""Parts of a window that are kept apart: what the scatter of the whole is found from."""
+"""Number of parts of a window, from which its scatter is estimated."""
 FIRST, LAST = 2, 3
-"""Parts at the ends of a window that tell of lasting chaos that it lasted: half of what it grew in is late,
-whether or not a stretch precedes the first."""
+"""Parts at both ends of a window in which growth proves lasting chaos: half of them are late, with or without
+a stretch before the window."""
 
 
 @dataclass(frozen=True)
@@ -306,14 +305,14 @@ class ObservedWindow:
     """Observations in a window. SI units."""
 
     begins: FollowedRun
-    """The run as it was where the window begins."""
+    """Run at the start of the window."""
     stretches: tuple[Stretch, ...]
-    """The parts it was followed in."""
+    """Followed parts."""
     blocks: tuple[Block, ...]
-    """Equal parts, except for a drive period."""
+    """Blocks, equal to within a drive period."""
     line_periods: int
-    """The lines, over this many whole drive periods before the end: the most that the window holds, of the
-    motion's own periods where it has one."""
+    """Whole drive periods before the end over which lines are taken: as many as the window contains, a
+    multiple of the motion's own period."""
     line_x_m: complex
     """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
     line_p_m: complex
@@ -335,7 +334,7 @@ class ObservedWindow:
 
     @property
     def responses_m(self) -> Floats:
-        """Largest abs(x), line of x, largest abs(p), line of p, shape (4,); not over the drive."""
+        """Return largest abs(x), line of x, largest abs(p) and line of p, absolute, shape (4,)."""
         return np.array([self.largest_x_m, abs(self.line_x_m), self.largest_p_m, abs(self.line_p_m)])
 
     @property
@@ -350,13 +349,13 @@ def whole_periods(duration_s: float, frequency_hz: float) -> int:
 
 
 def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
-    """States after ``start_s`` and up to ``end_s``, at whole numbers of 1 / ``rate_hz`` from time zero."""
+    """Return samples after ``start_s`` up to ``end_s``, at multiples of 1 / ``rate_hz`` from time zero."""
     first, last = (math.floor(time_s * rate_hz * (1.0 + WHOLE) + WHOLE) for time_s in (start_s, end_s))
     return Samples((first + 1) / rate_hz, rate_hz, max(0, last - first))
 
 
 def follow_with_section(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
-    """Follow a motion to an instant, and keep its states once a drive period."""
+    """Follow a motion to an instant; keep its states once per drive period."""
     end_s = max(until_s, run.time_s)
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
@@ -367,11 +366,11 @@ def observe_window(
     cycle: int = 1,
     is_chaos: Callable[[Sequence[Stretch]], bool] | None = None,
 ) -> ObservedWindow:
-    """Follow a motion through a window that begins now and holds a drive period or more, and observe it.
+    """Observe a motion through a window that begins now and contains at least one drive period.
 
-    A motion that repeats after ``cycle`` drive periods has its lines taken over a whole multiple of them, as
-    far as the window holds one: over other lengths its other lines leak in. Where ``is_chaos`` is
-    certain of the first parts, a small change is not carried through the middle, only at the end again.
+    Lines of a motion that repeats after ``cycle`` drive periods are taken over a whole multiple of them, if
+    the window contains one: over other lengths, its other lines leak in. If ``is_chaos`` of the first parts,
+    a small change is only propagated at both ends of the window.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -393,7 +392,7 @@ def observe_window(
 
 
 def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
-    """Make a window of parts that hold whole drive periods, after a head of which only peaks are taken."""
+    """Return a window of parts with whole drive periods, after a head that only contributes peaks."""
     frequency = begins.drive.frequency_hz
     periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
@@ -408,7 +407,7 @@ def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stre
 
 
 def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
-    """Take each watched part as a block; a line is the mean of twice the motion against the drive."""
+    """Return each watched part as a block; a line is twice the mean of motion times drive phasor."""
     return tuple(
         Block(
             part.peak_x_m,
@@ -422,19 +421,19 @@ def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
 
 
 def states_of(stretches: Sequence[Stretch]) -> Floats:
-    """All states kept, shape (n, 6)."""
+    """Return all kept states, shape (n, 6)."""
     return np.concatenate([np.empty((0, 6)), *(stretch.states for stretch in stretches)])
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Samples a second, at least: contacts are ten times slower than that, and m0 hardly feels them."""
+"""Lowest sample rate [1/s]: contacts are ten times slower, and m0 hardly responds to them."""
 HIGHEST = 0.25
-"""Highest frequency kept, over the sample rate: what is folded back there has passed m0 twice."""
+"""Highest kept frequency over the sample rate: aliases there are attenuated by m0 twice."""
 
 
 @dataclass(frozen=True, eq=False)
 class LineSpectrum:
-    """Amplitudes of x, unweighted, so that the drive's line and its multiples are exact."""
+    """Amplitudes of x with a rectangular window, so that the drive's line and its multiples are exact."""
 
     frequency_hz: Floats
     """Shape (lines,)."""
@@ -443,9 +442,9 @@ class LineSpectrum:
 
 
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:
-    """Follow a window once more, stretch by stretch as before, and take the spectrum of its whole periods.
+    """Follow a window again with samples, and return the spectrum of its whole periods.
 
-    Samples change nothing: it is the same motion to the last digit, even in chaos.
+    Sampling changes nothing: it is the same motion to the last digit, even in chaos.
     """
     run, periods = window.begins.apart(), window.line_periods
     frequency = run.drive.frequency_hz

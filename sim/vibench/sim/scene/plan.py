@@ -34,7 +34,7 @@ class LinearMotion:
     rates: Complex
     """Rates of the modes, shape (n,) [1/s]."""
     modes: Complex
-    """What each mode adds to x, y, z, vx, vy, vz at time zero, shape (n, 6)."""
+    """Contribution of each mode to x, y, z, vx, vy, vz at time zero, shape (n, 6)."""
     steady: Complex
     """Phasors of the steady part, shape (6,), for exp(i (omega t + phase))."""
 
@@ -50,17 +50,17 @@ class LinearMotion:
 
     @property
     def largest_p_m(self) -> float:
-        """No abs(p) is ever larger."""
+        """Return a bound on abs(p) at all times."""
         return abs(self.steady_p) + float(np.abs(self.modes[:, Y] - self.modes[:, Z]).sum())
 
     @property
     def slowest_rate(self) -> float:
-        """Largest real part of a mode's rate [1/s]: how slowly the start is forgotten; zero is never."""
+        """Return the largest real part of a mode's rate [1/s], the decay of the transient; zero: no decay."""
         return float(self.rates.real.max())
 
     def state(self, time_s: float) -> Floats:
-        """X, y, z, vx, vy, vz at an instant, shape (6,)."""
-        # Whole turns are dropped exactly: at late times their rounding would be a phase.
+        """Return x, y, z, vx, vy, vz at an instant, shape (6,)."""
+        # Whole turns are subtracted exactly; otherwise their rounding shifts the phase at late times.
         part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
         turn = 2.0 * math.pi * part + self.drive.phase_rad
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
@@ -74,7 +74,7 @@ class LinearMotion:
         )
 
     def died_away_s(self, share: float) -> float:
-        """Return when the transient is below this share of the steady part; infinite if never."""
+        """Return the time when the transient is below this share of the steady part; infinite if never."""
         latest = 0.0
         for part, whole in self._parts:
             size = np.abs(part) * len(part) / (share * abs(whole))
@@ -90,9 +90,9 @@ class LinearMotion:
 
 
 def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> LinearMotion:
-    """Find the motion that begins in a state, shape (6,), as long as nothing is touched.
+    """Return the motion from a start, shape (6,), until a stop is touched.
 
-    Raises ValueError when two modes coincide (critical damping), or numbers grow beyond all bounds.
+    Raises ValueError when two modes coincide (critical damping) or numbers overflow.
     """
     with np.errstate(all="ignore"):
         form = modal_form(specimen)
@@ -121,11 +121,11 @@ def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:
 
 
 DECAYED_SHARE = 1e-9
-"""Share of the response that the start may still have where the steady motion stands for it."""
+"""Largest transient, relative to the steady motion, that a closed form neglects."""
 
 CLOSED_FORM_S = 5e-4
-"""Time for a closed form [s]; this and the next three as a plan counts it. What a machine makes of it, and of
-all that a plan cannot know, is learnt from what runs took (`vibench.sim.costs`)."""
+"""Planned time for a closed form [s], as the next three. The actual times of a machine are learnt from runs
+(`vibench.sim.scene.cost`)."""
 FLIGHT_S, PERIOD_S, IMPACT_S = 5e-5, 1e-7, 1e-6
 """Time for a second of flight, for a drive period of it, and for an impact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
@@ -133,15 +133,15 @@ STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
 TANGENT = 1.5
 """Time with a tangent vector over the time without."""
 SETTLING_S = 10.0
-"""Duration that an automatic one is planned as [s]."""
+"""Planned length of an automatic duration [s]."""
 TOUCHING = 0.6
-"""Steady p without stops, over the gap, from which most motions forget their start: 84 of 93 random scenes,
-and 3 of 49 below (`benchmarks/planned_costs.py`)."""
+"""Steady p without stops, over the gap, above which most motions depend sensitively on the start: 84 of 93
+random scenes above, 3 of 49 below (`benchmarks/planned_costs.py`)."""
 SLOW = 0.9
 """Drive frequency over the lowest natural one, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Offset at which p just reaches a stop; grows as the cube root of the excess of p."""
+"""Offset at which p just reaches a stop; it grows with the cube root of the excess of p."""
 MICROMETRES = 1e6
 
 
@@ -151,7 +151,7 @@ class ScenePlan:
 
     method: Method
     sentences: tuple[str, ...]
-    """Sentences on what is modelled and computed, what is not, and why."""
+    """Sentences on what is computed, what is not, and why."""
     planned_s: float
     """Estimated work [s] on a nominal reference machine."""
     longest_planned_s: float
@@ -230,7 +230,7 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
 
 
 def transient_decay_s(motion: LinearMotion) -> float:
-    """Return when the transient of a motion without contact has decayed; infinite if never."""
+    """Return the time when the transient of a motion without contact has decayed; infinite if never."""
     return motion.died_away_s(DECAYED_SHARE)
 
 
@@ -337,14 +337,14 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     return "/".join(
         (
             *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
-            # Where the start is forgotten other starts take as long as they may.
+            # With sensitive dependence on the start, other starts use the whole budget.
             f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
         )
     )
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
-    """Plan the work in a second of motion [s]."""
+    """Return the planned time for a second of motion [s]."""
     share, frequency_hz = _share(scene, motion), scene.drive.frequency_hz
     per_period = IMPACTS_PER_PERIOD * math.cbrt(share) if share > TOUCHING else 0.0
     per_s = FLIGHT_S + (PERIOD_S + IMPACT_S * per_period) * frequency_hz
@@ -357,13 +357,13 @@ def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
 
 
 def _share(scene: Scene, motion: LinearMotion) -> float:
-    """Steady p without stops, over the narrower gap."""
+    """Return steady p without stops over the narrower gap."""
     size_m = abs(motion.steady_p)
     return size_m / max(min(scene.specimen.gaps_m), size_m / MOST_SHARE) if size_m > 0.0 else 0.0
 
 
 def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
-    """Plan the work for other starts, where the start is probably forgotten [s]."""
+    """Return the planned time for other starts, where sensitive dependence is probable [s]."""
     is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
     return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
 

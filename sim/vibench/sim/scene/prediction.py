@@ -1,4 +1,4 @@
-"""Result of a scene: one flat, frozen value for tables, files and JSON. SI units."""
+"""Result of a scene: a flat, frozen value for tables, files and JSON. SI units."""
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -25,18 +25,18 @@ class MotionKind(StrEnum):
     UNDECIDED = "undecided"
     """Undecided: it was not followed for long enough."""
     CHAOTIC_SO_FAR = "chaotic so far"
-    """Chaotic for as long as it was followed, which does not tell whether it stays so: the chaos of other
-    starts died out, or all were followed for too short a time. `Ensemble.escape` says how long it lasts."""
+    """Chaotic as long as it was followed; it may not last: chaos from other starts died out, or all were
+    followed too briefly. `Ensemble.escape` contains its lifetime."""
 
 
 class StartMemory(StrEnum):
     """Whether the start determines which motion is reached."""
 
     KEPT = "kept"
-    """A start a millionth of a gap away came the same way."""
+    """A start a millionth of a gap away follows the same motion."""
     LOST = "lost"
-    """On the way a small change grew until nothing of the start was left: another run of the same scene, on
-    another machine or at another accuracy, may reach another motion."""
+    """A small change of the start grew to the size of the motion: a repeated run, on another machine or at
+    another accuracy, may reach another motion."""
     UNKNOWN = "unknown"
     """Not determined, because there was no budget."""
 
@@ -45,26 +45,26 @@ class StartMemory(StrEnum):
 class FoundMotion:
     """One of the motions reached from indistinguishable starts.
 
-    Motions are the same when kind and period are and all responses agree to a thousandth, or within the
-    scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
+    Motions are the same if their kind and period are equal and all responses agree to a thousandth, or within
+    the scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
     """
 
     motion: MotionKind
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude; of the first start that repeats, or the mean over its starts
-    if none does; as the next three."""
+    """Largest abs(x) over the drive amplitude, of the first repeating start, else the mean over starts; so
+    are the next three."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
     error_estimate: float | None
-    """Relative; of Response I of one more run that reaches this motion."""
+    """Relative error of Response I of one more run that reaches this motion."""
     starts: int
-    """How many reached it."""
+    """Number of starts that reached it."""
     share: Share
-    """Share of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
-    starts that were chaotic so far, undecided, or on one of several chaotic motions may come to any other."""
+    """Share of all starts. The intervals of all motions hold together in 19 cases of 20, also for longer
+    runs: starts that were chaotic, undecided, or on one of several chaotic motions may reach any other."""
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ class Ensemble:
     asked: int
     """Index of the motion from the requested start."""
     unseen_share: float
-    """A motion that was not found has less than this share, in 39 cases of 40: also in the end, as starts
-    that were chaotic so far, or undecided, may come to it."""
+    """Upper bound on the share of a motion that was not found, in 39 cases of 40; also for longer runs, in
+    which chaotic or undecided starts may reach it."""
     escape: EscapeRate | None
-    """How often chaos died out; None where there was none to speak of."""
+    """Rate at which chaos died out; None without chaos."""
     scatter: float | None
     """Standard deviation of Response I over all starts, over its mean."""
     followed_s: float
-    """Time that all starts together were followed."""
+    """Total time that all starts were followed."""
 
 
 @dataclass(frozen=True)
@@ -93,25 +93,25 @@ class TargetReport:
     """Requested and reached error and time."""
 
     wanted_error: float | None
-    """Relative; None where none was requested, as the next."""
+    """Requested relative error; None if not requested. The same for the next."""
     wanted_time_s: float | None
     error: float | None
-    """The largest of the four stated errors."""
+    """Largest of the four stated errors."""
     time_s: float
-    """Since the request."""
+    """Time since the request."""
     starts: int
-    """Number of starts that are averaged; 1 where the start is not forgotten."""
+    """Number of starts in the average; 1 without sensitive dependence on the start."""
     windows: int
-    """Number of windows of each start, one after the other, that are averaged."""
+    """Number of consecutive windows of each start in the average."""
     is_met: bool
-    """The error is what was requested, or less."""
+    """The error is at most the requested one."""
     needed_s: tuple[float, float, float] | None
-    """Time for the requested error: estimate, and the ends of an interval. None where more time does not
-    reduce the error, or where it is not known."""
+    """Time for the requested error: estimate and both ends of its interval. None if unknown, or if more time
+    does not reduce the error."""
 
     @property
     def text(self) -> str:
-        """The same in a sentence."""
+        """Return the report as a sentence."""
         if self.error is None:
             return f"no error is known after {_seconds(self.time_s)}"
         reached = _percent(self.error)
@@ -134,7 +134,7 @@ def _seconds(time_s: float) -> str:
 
 
 def _short(value: float) -> str:
-    """Two digits, without an exponent where the number is as short without."""
+    """Return two digits, without an exponent if the number is no longer without."""
     return f"{float(f'{value:.2g}'):g}"
 
 
@@ -142,18 +142,18 @@ class Method(StrEnum):
     """Method of solving a scene."""
 
     CLOSED_FORM = "closed form"
-    """No stop is ever touched, by a bound: the linear specimen's exact answer."""
+    """A bound proves that no stop is ever touched: exact solution of the linear specimen."""
     EVENT_DRIVEN = "event driven"
     """Exact flight from contact to contact; contacts resolved to the tolerance."""
     POLYNOMIAL = "polynomial"
-    """A force at every p: one adaptive method of order 8 from end to end."""
+    """For a force at every p: one adaptive method of order 8 throughout."""
 
 
 @dataclass(frozen=True, eq=False)
 class ScenePrediction:
-    """Responses of one scene with errors and facts. None if not requested or not found.
+    """Responses of one scene, with errors and details. None if not requested or not found.
 
-    Responses are over the drive amplitude, those called relative are of p = y - z.
+    Responses are divided by the drive amplitude; relative ones are of p = y - z.
     """
 
     frequency_hz: float
@@ -174,17 +174,17 @@ class ScenePrediction:
     period: int | None
     """Period of a periodic motion, in drive periods."""
     duration_s: float
-    """How long the specimen was followed."""
+    """Time for which the specimen was followed."""
     window_s: float
-    """The last part of it, over which the largest values were taken."""
+    """Last part of that time, over which largest values were taken."""
     settled_s: float | None
-    """When the motion was found to be settled; None where the duration was given."""
+    """Time when the motion was found to be settled; None if the duration was given."""
     ended: str
-    """Why it was followed no longer."""
+    """Reason for its end."""
     integration_error: float | None
-    """The part of it that a stricter accuracy would lessen."""
+    """Part of the error that a stricter accuracy would reduce."""
     scatter: float | None
-    """Relative standard deviation of Response I between windows, where the motion never repeats."""
+    """Relative standard deviation of Response I between windows, if the motion never repeats."""
     lyapunov_per_s: float | None
     """Largest Lyapunov exponent [1/s]."""
     lyapunov_error_per_s: float | None
@@ -196,7 +196,7 @@ class ScenePrediction:
     method: Method
     accuracy: str
     response_i_error: float | None = None
-    """Relative, as the next three; see `vibench.sim.scene.solve.solve_scene`."""
+    """Relative error, as the next three; see `vibench.sim.scene.solve.solve_scene`."""
     response_ii_error: float | None = None
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
@@ -209,19 +209,19 @@ class ScenePrediction:
     spectrum: Floats | None = None
     """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
-    """Whether the start decided which motion was reached."""
+    """Whether the start determined which motion was reached."""
     ensemble: Ensemble | None = None
-    """Motions from other starts if it did not; None if it did, or without a budget."""
+    """Motions from other starts; None if the start determined the motion, or without a budget."""
     target: TargetReport | None = None
-    """What was requested and reached; None where neither an error nor a time was requested."""
+    """Requested and reached error and time; None if neither was requested."""
 
     @property
     def is_one_of_several(self) -> bool:
-        """Whether other starts reached other motions."""
+        """Return whether other starts reached other motions."""
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON: None where there is not a number."""
+        """Return plain values for JSON, None for NaN."""
         return _fields_of(self)
 
 

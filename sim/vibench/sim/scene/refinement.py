@@ -1,9 +1,8 @@
 """Solve a scene to a requested error or within a requested time. SI units.
 
-Each result has an error; better ones follow until the target is met. In order of cost: a closed
-form; a periodic motion, found by Newton's iteration as soon as the motion from the start is seen to approach
-it; the motion in a named window, checked by a stricter run; the mean over starts in a named window, where the
-start is forgotten.
+Each result has an error; better ones follow until the target is met. In order of cost: a closed form; a
+periodic motion, found by Newton's iteration once the motion approaches it; the motion in a stated window,
+checked by a stricter run; with sensitive dependence on the start, the mean over starts in a stated window.
 """
 
 import math
@@ -41,33 +40,34 @@ from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
 LONGEST_S = 60.0
 """Default time limit of refinement [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""When the first answer is due, and the nominal cost that it may take in any case [s]."""
+"""Time of the first result, and the nominal cost that it may always use [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
-"""Nominal cost, and the most processor time, of what is followed between two looks at the clock [s]."""
+"""Nominal cost and largest processor time between two checks of the clock [s]."""
 FIRST_CYCLES = 1e4
-"""Cycles of the fastest mode that are followed before the first look, at most."""
+"""Most cycles of the fastest mode before the first check."""
 CLOSE = 3e-3
-"""Change from one of its periods to the next, over its size, at which Newton's iteration is tried."""
+"""Relative change from one period to the next below which Newton's iteration is tried."""
 KNOWN = 0.03
-"""Distance from a periodic motion that another start came to, over its size, at which that one is tried."""
+"""Relative distance from a known periodic motion below which that motion is tried."""
 MOST_PUSH = 1000.0
-"""Drive amplitudes that stand for the gap, at most, where other starts are drawn."""
+"""Largest gap, in drive amplitudes, for drawing other starts."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""The motion from the start is looked at after this many drive periods, whenever its time has doubled up to
-looks of this length, and then after this share of its way."""
+"""Drive periods before the first check of the motion; then each time its time has doubled, up to this
+interval; then after this share of its time."""
 LOOKS = 8
-"""At another start before its window begins."""
+"""The same for another start before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME, ALIKE = 1e-3, 1e-2
-"""Relative differences of states up to which a motion repeats, and of responses up to which starts count as
-one motion: some are still settling."""
+"""Relative tolerances: of states, for a motion that repeats; of responses, for starts on one motion (some are
+still settling)."""
 OTHER_DIFFERS = 1.0
-"""Relative difference of a motion that no start has come to yet: chaos beside a motion without impacts."""
+"""Assumed relative difference of a motion not yet found, such as chaos beside a motion without impacts."""
 FIRST_STARTS, FEWEST_STARTS, MOST_STARTS = 6, 16, 1_000_000
 MOST_FREEDOM = 200
-"""Degrees of freedom beyond which Student's quantile hardly changes."""
+"""Degrees of freedom above which Student's quantile hardly changes."""
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
-"""Cost of Newton's iteration over that of following the period once, and the share of the time it may use."""
+"""Cost of Newton's iteration over that of following the period once, and the share of the time that it may
+use."""
 
 
 class _Clock:
@@ -98,7 +98,7 @@ class _Orbit:
     responses_m: Floats
     """Shape (4,)."""
     errors: Floats
-    """Of them, relative."""
+    """Relative errors of the responses."""
     impacts: int
 
 
@@ -111,9 +111,9 @@ class _Path:
     """States once a drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
     distance: float = math.inf
-    """From that motion at the last look, over the size of the motion."""
+    """Relative distance from that motion at the last check."""
     closest: float = CLOSE
-    """Change over one of its periods below which Newton's iteration is tried next."""
+    """Relative change per period below which Newton's iteration is tried next."""
 
 
 @dataclass(eq=False)
@@ -122,11 +122,11 @@ class _Start:
 
     run: FollowedRun
     windows: list[Floats]
-    """Responses, shape (4,) each; a periodic motion has one for all."""
+    """Responses of each window, shape (4,); a single one for a periodic motion."""
     repeats: Repetition | None
-    """Of a motion that is periodic, or nearly: its windows are alike."""
+    """Period if the motion is nearly periodic: all its windows are alike."""
     impacts: int
-    """In the first window, as the next."""
+    """Impacts in the first window, as the next."""
     section: Floats
     """States once a drive period, shape (n, 6)."""
 
@@ -181,18 +181,18 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
-        """Where both motions were last seen."""
+        """Time of the last check of both motions."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
-        """All that were found."""
+        """All periodic motions found."""
         self._size_m = self._spent_s = 0.0
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """States that a path keeps."""
+        """Number of states that a path keeps."""
 
     def answers(self) -> Iterator[ScenePrediction]:
-        """Follow the motion from its start, and continue according to its kind."""
+        """Follow the motion from its start, then continue according to its kind."""
         for found in self._all():
             self._has_answered = True
             yield found
@@ -231,7 +231,7 @@ class _Refinement:
         return (made + math.ceil(look)) / self._frequency_hz
 
     def _drawn(self, count: int) -> Floats:
-        """Draw small changes of the start, shape (count, 6), far below a motion that is itself small."""
+        """Draw small changes of the start, shape (count, 6), far smaller than the motion."""
         drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
         gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
         return np.asarray(drawn * (most_m / gap_m if most_m < gap_m < math.inf else 1.0))
@@ -263,7 +263,7 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # Parts go by the nominal cost, the same on every machine, unless that is far too low.
+            # The nominal cost, equal on every machine, sets the parts unless it is far too low.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
@@ -283,7 +283,7 @@ class _Refinement:
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
     def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
-        """Whether a motion, of which more was seen, approaches a stable periodic motion, which is kept."""
+        """Return whether a motion, with newly seen states, approaches a stable periodic motion; store it."""
         path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False
@@ -309,7 +309,7 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion, over a size; infinite without one."""
+        """Return the distance of a state from a periodic motion over a size; infinite without one."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
@@ -320,7 +320,7 @@ class _Refinement:
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Find the stable motion of this many drive periods, or of fewer, near where a motion is now."""
+        """Find a stable motion of this many drive periods, or a divisor, near the present state."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
@@ -339,7 +339,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # Effect of rounding of the state at the end of a period, through the inverse of the map.
+        # Effect of rounding the state at the end of a period, through the inverse of the map.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -371,7 +371,7 @@ class _Refinement:
         return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
-        """Answer for a window that begins where both motions were last seen."""
+        """Return the result for a window from the last check of both motions."""
         self._spent_s = 0.0
         run, twin = (each.apart() for each in self._pair)
         periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))
@@ -393,7 +393,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """Return the remaining distance of the motion over its size, from its change in a forgetting time."""
+        """Return the relative remaining distance of the motion, from its change in a forgetting time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -408,7 +408,7 @@ class _Refinement:
         other: ObservedWindow,
         run: FollowedRun,
     ) -> ScenePrediction:
-        """Answer for the motion of one start in a named window, by that of a stricter run."""
+        """Return the result for the motion of one start in a stated window, checked by a stricter run."""
         answer = window.responses_m
         off = np.abs(answer - other.responses_m) / answer
         is_parted = not float(off.max()) < PARTED
@@ -426,7 +426,7 @@ class _Refinement:
         return _reported(found, self._target, self._clock, 1, None)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
-        """Answer for a motion that keeps its start but does not repeat, in a named window."""
+        """Return the result in a stated window for a motion that does not repeat but depends on its start."""
         main, twin, periods = self._main, self._twin, self._window_periods
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:
@@ -451,7 +451,7 @@ class _Refinement:
                 return
 
     def _many_starts(self) -> Iterator[ScenePrediction]:
-        """Return the mean over indistinguishable starts in a named window."""
+        """Return the mean over indistinguishable starts in a stated window."""
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
@@ -478,7 +478,7 @@ class _Refinement:
                 wanted, windows = self._next_size(starts, begins_s)
 
     def _goes_on(self, starts: list[_Start], wanted: int, windows: int, begins_s: float) -> bool:
-        """Observe one more window of a start, or a new start; False where time has run out."""
+        """Observe one more window of a start, or a new start; return False if time has run out."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:
                 window = self._observed(each.run, self._window_periods)
@@ -512,7 +512,7 @@ class _Refinement:
         return window is not None
 
     def _next_size(self, starts: Sequence[_Start], begins_s: float) -> tuple[int, int]:
-        """Return the next numbers of starts and windows: at most twice as much motion as so far."""
+        """Return the next numbers of starts and windows, at most doubling the motion followed so far."""
         windows = _windows_of(starts)
         if len(starts) < FEWEST_STARTS:
             return FEWEST_STARTS, windows
@@ -522,9 +522,9 @@ class _Refinement:
         return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
 
     def _windows_help(self, starts: Sequence[_Start], begins_s: float) -> bool:
-        """Whether further windows of the same starts reduce the error at a lower cost than further starts.
+        """Return whether more windows of the same starts reduce the error more cheaply than more starts.
 
-        Further starts find rare motions too: windows are preferred only where they cost half as much or less.
+        More starts also find rare motions, so windows must cost half as much or less.
         """
         windows = _windows_of(starts)
         is_soon = begins_s * self._frequency_hz < self._window_periods
@@ -544,7 +544,7 @@ class _Refinement:
         return 1.05 * math.pow(float(_mean_error(starts).max()) / self._target.error, power)
 
     def _mean(self, starts: Sequence[_Start], begins_s: float) -> ScenePrediction:
-        """Answer with the mean over the starts and windows so far."""
+        """Return the mean over the starts and windows so far."""
         windows, window_s = _windows_of(starts), self._window_periods / self._frequency_hz
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
@@ -572,7 +572,7 @@ class _Refinement:
             part_s = len(starts) * windows * window_s
             if not self._windows_help(starts, begins_s):
                 part_s = sum(each.run.time_s for each in starts)
-            # The deviation of n draws is itself known to 1 / sqrt(2 n).
+            # The deviation of n draws has a relative uncertainty of 1 / sqrt(2 n).
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
             about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
@@ -588,7 +588,7 @@ class _Refinement:
     def _prediction(
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
     ) -> ScenePrediction:
-        """Write down responses and their relative errors; what else is known replaces the rest."""
+        """Return a prediction with responses and relative errors; callers replace the other fields."""
         amplitude_m = self._scene.drive.amplitude_m
         response_i, response_ii, relative_i, relative_ii = (
             None if math.isnan(each) else float(each) / amplitude_m for each in responses_m
@@ -629,10 +629,10 @@ class _Refinement:
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     """Return the relative error of the mean over starts, shape (4,).
 
-    Student's interval, for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
-    Coull, Am. Stat. 52 (1998) 119): a rare motion is then not left out as long as one start came to it. Where
-    most came to one motion that repeats, and ``others`` did not, more may have the share that Wilson's
-    interval leaves: the larger of the two counts, since both are intervals of that share.
+    Student's interval for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
+    Coull, Am. Stat. 52 (1998) 119), so that a rare motion counts once a start reaches it. If most starts
+    reached one repeating motion and ``others`` did not, their share may be up to the upper end of Wilson's
+    interval: the larger of the two errors counts, since both are intervals of that share.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
@@ -653,7 +653,7 @@ def _mean_error(starts: Sequence[_Start]) -> Floats:
 
 
 def _windows_of(starts: Sequence[_Start]) -> int:
-    """Count the windows that all starts have; those of a periodic motion are alike."""
+    """Return the number of windows that all starts have; those of a periodic motion are alike."""
     return min((len(each.windows) for each in starts if each.repeats is None), default=1)
 
 

@@ -1,8 +1,8 @@
 """Classify a motion from its states once per drive period and the growth of a small change.
 
-Whether it repeats is read from the states alone. A motion that does not repeat is chaotic when a small change
-grows without end, quasi-periodic when it does neither grow nor die (Lichtenberg and Lieberman, Regular and
-Chaotic Dynamics (1992), section 5.3; growth is counted in natural logarithms).
+The states alone show whether it repeats. A motion that does not repeat is chaotic if a small change keeps
+growing, quasi-periodic if it neither grows nor decays (Lichtenberg and Lieberman, Regular and Chaotic
+Dynamics (1992), section 5.3; growth is counted in natural logarithms).
 """
 
 from collections.abc import Sequence
@@ -21,24 +21,25 @@ from .prediction import MotionKind
 MOST_PERIODS = 32
 """Longest period to search, in drive periods."""
 FEWEST_BETWEEN = 8
-"""States that are compared lie at least this many drive periods apart."""
+"""Fewest drive periods between compared states."""
 SLOWEST_RATIO = 0.99
-"""A change that shrinks less than this between two comparisons is taken to shrink by this."""
+"""Smallest assumed shrinkage of a change between two comparisons."""
 NEARLY = 0.01
-"""Change over the size of a motion, from one of its periods to the next, up to which it may be settling."""
+"""Largest relative change of a settling motion from one of its periods to the next."""
 TINY = 1e-300
-"""Size of a motion that has none."""
+"""Size used for a motion at rest."""
 DISTINCT = 20.0
-"""A motion of several periods differs from one of fewer by this many tolerances; one that differs by less may
-be settling down to it still."""
+"""Difference, in tolerances, between a motion of several periods and one of fewer; with a smaller difference
+it may still be settling."""
 CERTAIN_GROWTH = 12.0
-"""A small change has grown by e^12 = 160 000: more than shear makes of it."""
+"""Growth of a small change by e^12 = 160 000: more than shear causes."""
 NEUTRAL = 0.1
-"""Growth per forgetting time that counts as none: the specimen's own damping has -1."""
+"""Growth per forgetting time that counts as none; the specimen's damping alone gives -1."""
 DRIFT_PARTS = 6
-"""A motion drifts whose changes grow or shrink over this many parts in turn: by chance in 2 cases of 720."""
+"""Number of consecutive parts over which the changes of a drift grow or shrink: by chance in 2 cases of
+720."""
 FEWEST_NEUTRAL = 8.0
-"""Forgetting times that a motion must neither grow nor die to be called quasi-periodic."""
+"""Forgetting times without growth or decay that make a motion quasi-periodic."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Repetition:
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """How a small change has grown over stretches of a motion, one after the other."""
+    """Growth of a small change over consecutive stretches of a motion."""
 
     logarithms: Floats
     """Natural logarithm of the growth over each stretch, shape (stretches,)."""
@@ -61,17 +62,17 @@ class Growth:
 
     @property
     def total(self) -> float:
-        """Over all stretches."""
+        """Return the growth over all stretches."""
         return float(self.logarithms.sum())
 
     @property
     def is_certain(self) -> bool:
-        """A small change has certainly grown."""
+        """Return whether a small change has certainly grown."""
         return self.total > CERTAIN_GROWTH
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Over the earlier and the later stretches."""
+        """Return the growth over the earlier and the later stretches."""
         middle = len(self.logarithms) // 2
         return float(self.logarithms[:middle].sum()), float(self.logarithms[middle:].sum())
 
@@ -81,9 +82,9 @@ class Sharpness:
     """Tolerances relative to the size of a motion."""
 
     tolerance: float
-    """Distance still to go that counts as there."""
+    """Remaining distance that counts as settled."""
     noise: float
-    """Changes from one period to the next that come from the steps of the integration alone."""
+    """Changes from one period to the next due to integration steps alone."""
 
 
 def repetition(
@@ -91,19 +92,19 @@ def repetition(
 ) -> Repetition | None:
     """Find the fewest drive periods after which the end of a section repeats; None if it does not.
 
-    States a forgetting time apart are compared, twice over: a small change from one period to the next may
-    be a slow drift that goes far. What is still to go follows from how the change shrinks.
+    States one forgetting time apart are compared twice: a small change per period may be a slow drift that
+    goes far. The shrinkage of the change gives the remaining distance.
 
     Parameters
     ----------
     section
         States once a drive period, shape (n, 6); longer ones find longer periods.
     omega
-        Of the drive [rad/s]: measures velocities against displacements.
+        Angular frequency of the drive [rad/s], which scales velocities to displacements.
     forgetting_periods
         Drive periods in which the slowest mode without contact fades by e.
     sharpness
-        What counts as the same.
+        Tolerances.
     """
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
@@ -124,13 +125,13 @@ def repetition(
 
 
 def _returns_nowhere(points: Floats, tolerance: float) -> bool:
-    """Return whether the last state alone excludes repetition, which saves time in chaos."""
+    """Return whether the last state alone excludes repetition (a fast test for chaos)."""
     changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
     return bool(np.all(changes >= tolerance))
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Return the number of states before the end during which a section nearly repeats after a period."""
+    """Return the number of last states for which a section nearly repeats after a period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
@@ -141,8 +142,8 @@ def wandered_until(section: Floats, omega: float, period: int) -> int:
 def is_drifting(section: Floats, omega: float) -> bool:
     """Return whether the changes of a motion from period to period shrink or grow steadily.
 
-    Near a bifurcation a motion settles so slowly that a small change neither grows nor fades in the time
-    that was watched, as on a torus. On a torus the changes keep their size.
+    Near a bifurcation a motion settles so slowly that a small change neither grows nor decays in the watched
+    time, as on a torus. But on a torus the changes keep their size.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
 
 
 def longest_section(forgetting_periods: float) -> int:
-    """Return the number of states needed to find every period up to the longest."""
+    """Return the number of states that are needed to find every period up to the longest."""
     return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
 
 
@@ -195,22 +196,23 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
+"""Forgetting times after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""The longest run holds this many forgetting times; slower modes, and undamped ones, count as so slow."""
+"""Forgetting times in the longest run; slower and undamped modes count as this slow."""
 MOST_STATES = 2_000_000
-"""A window holds no more drive periods. Their states, two windows of them and a copy, take 300 MB."""
+"""Most drive periods in a window: the states of two windows and a copy take 300 MB."""
 FEWEST_PERIODS = 32
-"""Drive periods after which a motion that does not repeat is taken to be on its attractor, at least."""
+"""Fewest drive periods after which a non-repeating motion counts as on its attractor."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
-"""Distance from the motion that it repeats, over its size, at which it counts as settled."""
+"""Relative distance from the repeating motion at which a motion counts as settled."""
 ROUNDING = 1e-10
-"""Noise of exact flight and of contacts that begin and end as they did a period before."""
+"""Noise of exact flight, and of contacts with the same start and end as a period before."""
 EXACTLY = 1e-9
-"""Distance at which a motion is passed over: what is left of the way is less than any level promises."""
+"""Distance at which the rest of a settling motion is skipped: smaller than the error of any accuracy
+level."""
 STEPPING = 100.0
-"""Noise over the tolerance where steps follow one another without a break: they fall elsewhere in each
-period. Measured: 70 at most (p^7 at 130 Hz and 20 um)."""
+"""Noise over the tolerance for integration in steps, which fall differently in each period. Measured: at most
+70 (p^7 at 130 Hz and 20 um)."""
 
 
 @dataclass(frozen=True)
@@ -219,35 +221,35 @@ class Pace:
 
     frequency_hz: float
     forgetting_s: float
-    """Time in which the slowest mode without contact fades by e, or as slowly as is waited for."""
+    """Time in which the slowest mode without contact decays by e, at most the longest waiting time."""
     fading_s: float
-    """The same where it is longer than can be waited for; of undamped modes, what is waited for."""
+    """The same without that limit; for undamped modes, the limit."""
     sharpness: Sharpness
     nearly: Sharpness
-    """That of the least accurate level."""
+    """Sharpness of the least accurate level."""
 
     @property
     def forgetting_periods(self) -> float:
-        """The forgetting time in drive periods."""
+        """Return the forgetting time in drive periods."""
         return self.forgetting_s * self.frequency_hz
 
     @property
     def attractor_s(self) -> float:
-        """Time after which a non-repeating motion counts as on its attractor."""
+        """Return the time after which a non-repeating motion counts as on its attractor."""
         return max(FORGETTING * self.forgetting_s, FEWEST_PERIODS / self.frequency_hz)
 
     @property
     def section_s(self) -> float:
-        """Length of the section that lets every period be found."""
+        """Return the length of a section that shows every period."""
         return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
     def settling_s(self) -> float:
-        """Time needed to detect that a motion repeats."""
+        """Return the time needed to detect that a motion repeats."""
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
-        """Return whether the motion of these stretches, one after the other, repeats at their end."""
+        """Return the repetition at the end of these consecutive stretches, if any."""
         return self.repeats_in(states_of(stretches))
 
     def drifts(self, stretches: Sequence[Stretch]) -> bool:
@@ -257,19 +259,19 @@ class Pace:
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Return the drive periods over which lines are taken: the motion's own, if it has nearly settled.
 
-        What counts as nearly is the same at every level, so that a line is the same question at each.
+        The limit for nearly is equal at every accuracy level, so that lines are comparable.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether a small change has grown in each half of these stretches as only chaos makes it."""
+        """Return whether a small change grew in each half of these stretches as only in chaos."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
 
     def repeats_in(self, section: Floats) -> Repetition | None:
-        """Say whether a motion with these states once a drive period, shape (n, 6), repeats at their end."""
+        """Return the repetition at the end of these states once per drive period, shape (n, 6), if any."""
         omega = 2.0 * np.pi * self.frequency_hz
         return repetition(section, omega, self.forgetting_periods, self.sharpness)
 
@@ -277,7 +279,7 @@ class Pace:
 def pace_of(
     specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
 ) -> Pace:
-    """Choose the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
+    """Return the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
     slowest_s = min(longest_s / FEWEST_TIMES, MOST_STATES / FEWEST_TIMES / frequency_hz)
     fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))

@@ -1,7 +1,7 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
-It is the largest value of a window, one draw from an extreme-value distribution: in chaos it scatters by a
-few per cent whatever the accuracy. The scatter follows from the extremes of blocks of one run, or directly
+Response I is the largest value of a window, a draw from an extreme-value distribution: in chaos it scatters
+by a few per cent at any accuracy. The scatter follows from the extremes of blocks of one run, or directly
 from many runs with slightly different starts.
 """
 
@@ -29,13 +29,13 @@ class WindowScatter:
     relative: float
     """Standard deviation over the mean."""
     blocks: int
-    """Extremes that it was found from."""
+    """Number of extremes used."""
 
     @property
     def between_runs(self) -> float:
-        """Two runs differ by less in 19 cases of 20, if the extremes were normal: sqrt(2) deviations of
-        Student's t for this many blocks. Measured in seven chaotic regimes of five laws at three durations,
-        40 runs each: 85 to 99.7 % of the pairs.
+        """Return the relative difference that two runs stay below in 19 cases of 20. It assumes normal
+        extremes: sqrt(2) deviations of Student's t for this many blocks. Measured for 40 runs each in seven
+        chaotic regimes of five laws at three durations: 85 to 99.7 % of the pairs.
         """
         return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 
@@ -43,9 +43,9 @@ class WindowScatter:
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
     """Find the scatter of the largest of ``blocks_in_window`` blocks; None for too few blocks.
 
-    It is the geometric mean of two: the blocks' own deviation, which is too large, because extremes of
-    longer windows deviate less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001),
-    section 3.1), and the bootstrap's, too small, because it never draws more than the largest seen.
+    It is the geometric mean of two deviations. That of the blocks is too large, because extremes of longer
+    windows deviate less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001), section
+    3.1). That of the bootstrap is too small, because it never exceeds the largest observed value.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:
@@ -55,7 +55,7 @@ def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatt
 
 
 def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
-    """Mean and standard deviation of the largest of ``drawn`` values, taken with replacement.
+    """Return mean and standard deviation of the largest of ``drawn`` values, drawn with replacement.
 
     Of N values, the k-th smallest is the largest drawn with the probability (k/N)^n - ((k-1)/N)^n.
     """
@@ -68,7 +68,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
     """Return the relative difference of the responses of two windows in 19 cases of 20, shape (4,).
 
-    ``blocks`` are those of one window, the last of them, and others before it. None for too few.
+    ``blocks`` are those before one window and, last, its own. None for too few.
     """
     lines = blocks[-blocks_in_window:]
     along = [window_scatter([block.peak_x_m for block in blocks], blocks_in_window)]
@@ -88,9 +88,9 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 def _lines_apart(parts: Complex) -> float:
     """Return the relative difference of the amplitudes of two lines in 19 cases of 20.
 
-    A line is the mean of its parts. Parts that follow one another may be alike: the error of the mean is the
-    larger of that from all of them and that from the means of two (Flyvbjerg and Petersen, J. Chem. Phys.
-    91 (1989) 461). Across the mean only the square of a deviation counts, over the line's size.
+    A line is the mean of its parts. Consecutive parts may be correlated: the error of the mean is the larger
+    one of all parts and of means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A deviation
+    perpendicular to the mean changes the amplitude only by its square over twice the amplitude.
     """
     line = complex(parts.mean())
     found = []
@@ -108,7 +108,7 @@ def _lines_apart(parts: Complex) -> float:
 def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
     """Return the relative difference of the responses of two starts in 19 cases of 20.
 
-    ``answer`` is one of them, ``others`` are more, each of shape (4,). NaN where one was lost.
+    ``answer`` is one start and ``others`` are more, each of shape (4,). NaN if one was lost.
     """
     found = np.array([answer, *others])
     times = math.sqrt(2.0) * student_quantile(len(found) - 1, COVERED)

@@ -19,8 +19,8 @@ PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 BUDGET_S = 1.0
 """Default budget of a scene in addition to its own run."""
 CLEAR, FEWEST, MOST = 8, 16, 64
-"""Starts that are followed, that which was requested among them: the first where all of them settled on one
-motion, or chaos certainly lasts; the last where they came to more than one motion, and the budget allows."""
+"""Number of starts, including the requested one: the first value if all settle on one motion or chaos
+certainly lasts; the last if they reach several motions and the budget allows."""
 
 
 class Observable(StrEnum):
@@ -29,22 +29,22 @@ class Observable(StrEnum):
     RESPONSE = "response"
     """Responses I and II of m0 and of p."""
     LYAPUNOV = "lyapunov"
-    """The largest exponent; a tangent vector is carried."""
+    """Largest Lyapunov exponent; a tangent vector is propagated."""
     SPECTRUM = "spectrum"
     """Amplitudes of m0 over frequency; samples are stored."""
     POINCARE = "poincare"
-    """States once a drive period."""
+    """States once per drive period."""
     SCATTER = "scatter"
     """Scatter of Response I between nearly equal starts; takes several more runs."""
 
 
 MOST_PERIODS = 1e12
-"""After this many drive periods a double tells times apart to a ten-thousandth of one."""
+"""Drive periods after which a double resolves time to a ten-thousandth of a period."""
 
 
 @dataclass(frozen=True)
 class FixedDuration:
-    """Follow the motion for this long, and observe the end of it."""
+    """Follow the motion for a given time and observe its end."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -54,7 +54,7 @@ class FixedDuration:
 
     @property
     def longest_s(self) -> float:
-        """Longest time for which the motion is followed."""
+        """Return the longest time for which the motion is followed."""
         return self.duration_s
 
     def __post_init__(self) -> None:
@@ -77,7 +77,7 @@ class AutomaticDuration:
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
-    """The motion is observed after this long at the latest."""
+    """Time after which the motion is observed at the latest."""
     kind: Literal["automatic"] = "automatic"
 
     def __post_init__(self) -> None:
@@ -94,9 +94,9 @@ class Target:
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
     error: float | None = None
-    """Relative, of each response; absent: as small as the time allows."""
+    """Relative error of each response; absent: as small as the time allows."""
     time_s: float | None = None
-    """From the request to the last answer [s]; absent: a minute at most."""
+    """Time from the request to the last result [s]; absent: at most a minute."""
 
     def __post_init__(self) -> None:
         if self.error is None and self.time_s is None:
@@ -160,11 +160,11 @@ class Scene:
     duration: FixedDuration | AutomaticDuration = FixedDuration()
     start: Rest | Given = Rest()
     budget_s: float = BUDGET_S
-    """Processor time for what one run cannot tell: whether chaos lasts, and what other starts come to where
-    the start is forgotten. Counted as on the machine of docs/accuracy.md, so that the answer is the same on
-    every other. Zero looks for neither."""
+    """Processor time to find whether chaos lasts and, with sensitive dependence on the start, which motions
+    other starts reach. Counted as on the machine of docs/accuracy.md, so that results are the same on every
+    machine. Zero skips both."""
     target: Target | None = None
-    """Error and time of the answer; accuracy, duration and budget follow from it, and are not given then."""
+    """Requested error and time; accuracy, duration and budget follow from it and must not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:
@@ -195,7 +195,7 @@ class Scene:
             raise ValueError(msg)
 
     def _follow_target(self) -> None:
-        """Leave the duration to the target; refuse what would contradict it."""
+        """Set the duration from the target; refuse contradictions."""
         if self.duration == FixedDuration():
             window_s = max(PAPER_WINDOW_S, 1.0 / self.drive.frequency_hz)
             object.__setattr__(self, "duration", AutomaticDuration(window_s))

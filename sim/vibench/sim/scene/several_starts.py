@@ -1,8 +1,8 @@
 """Motions of a scene from indistinguishable starts. SI units.
 
-After transient chaos it is chance which motion is reached, and when: starts a millionth of a gap apart are
-draws of it. They are followed round by round until all have settled, until it is known that chaos lasts, or
-until the budget is used up.
+After transient chaos, chance determines which motion is reached, and when: starts a millionth of a gap apart
+are random draws. They are followed in rounds until all have settled, chaos is known to last, or the budget is
+used up.
 """
 
 import math
@@ -31,18 +31,18 @@ PUSH = 1e-6
 """Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
 SEED = 2025
 PARTED = 0.01
-"""Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
-began: that is ten thousand times as far as they were."""
+"""Relative distance of displacements at which two starts have diverged: ten thousand times their first
+distance."""
 TOUCHING = 0.999
-"""Part of a gap beyond which m1 may be in contact."""
+"""Share of the gap above which m1 may be in contact."""
 LEAST_SIZE = 1e-3
-"""Part of a gap: what a motion counts for at least, when starts are said to have parted."""
+"""Share of the gap: smallest size of a motion in the test for divergence."""
 LEAST_S = 1e-3
-"""Following and observing a start costs this at least."""
+"""Smallest cost of following and observing a start."""
 TOO_FEW = 4
-"""Fewer starts say nothing."""
+"""Fewest useful starts."""
 LASTING_S = 300.0
-"""Chaos counts as lasting when its mean lifetime is certainly longer: ten times the paper's run."""
+"""Mean lifetime above which chaos counts as lasting: ten times the paper's run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,13 @@ class ReachedMotion:
     scatter: WindowScatter | None
     """Scatter of the largest x, where nothing repeats."""
     wandered_until_s: float
-    """When it was last seen to change from period to period."""
+    """Last time at which it changed from period to period."""
     growth: Growth
-    """Growth of a small change, as long as one was carried along: over no time, where it repeats."""
+    """Growth of a propagated small change; over no time if the motion repeats."""
 
 
 def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:
-    """Draw small changes of a start, shape (count, 6); over the amplitude where the gap is no length."""
+    """Draw small changes of a start, shape (count, 6); relative to the drive amplitude without a gap."""
     gap_m = min(specimen.gaps_m)
     length_m = gap_m if 0.0 < gap_m < math.inf else drive.amplitude_m
     scale = PUSH * length_m * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
@@ -79,7 +79,7 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     begin
         The motion where it began.
     path
-        What was seen of it, from there until it had settled.
+        Stretch from there until it had settled.
     """
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
@@ -95,7 +95,7 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Return for each state, shape (n, 6), whether m1 is at a stop, where batches return the next flight."""
+    """Return for each state, shape (n, 6), whether m1 is at a stop (batches return the next flight there)."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -106,9 +106,9 @@ class Draw:
     """Number and cost of starts."""
 
     clear: int = CLEAR
-    """Number of starts, including the requested one, for clear cases."""
+    """Number of starts, including the requested one, in clear cases."""
     fewest: int = FEWEST
-    """Elsewhere."""
+    """Number in other cases."""
     most: int = MOST
     """Number if those reached more than one motion."""
     seed: int = SEED
@@ -118,7 +118,7 @@ class Draw:
 
 NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
-"""Starts that are followed on are followed for longer than they need, by this together."""
+"""Total excess time of all starts that are followed further."""
 
 
 class SeveralStarts:
@@ -138,11 +138,11 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Additional time with a small change for non-repeating motions, to classify them.
+        # Additional time with a propagated small change, to classify non-repeating motions.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
-        # In the first round; in each one after it, twice as far.
+        # Length of the first round; each later round is twice as long.
         self._first_s = min(first_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]
@@ -151,21 +151,21 @@ class SeveralStarts:
 
     @property
     def reached(self) -> tuple[ReachedMotion, ...]:
-        """Motions of the starts, the requested one first."""
+        """Return the motions of the starts, the requested one first."""
         return tuple(self._reached)
 
     @property
     def followed_s(self) -> float:
-        """Time that all starts together were followed."""
+        """Return the total time that all starts were followed."""
         return sum(each.run.time_s for each in self.reached)
 
     @property
     def escape(self) -> EscapeRate | None:
-        """Rate at which chaos dies out; None if no motion was irregular for long enough.
+        """Return the rate at which chaos dies out; None if no motion was irregular for long enough.
 
-        A motion that wanders when it should have been on its attractor is taken to be chaotic from there on:
-        until it is known to have settled, or as long as a small change certainly grows. Any other may have
-        left chaos already, as long ago as it takes to be seen to repeat.
+        A motion that is irregular when it should be on its attractor counts as chaotic from then on, until it
+        has settled or a small change stops growing. Any other may have left chaos already, before its
+        repetition could be detected.
         """
         known = [
             (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
@@ -183,7 +183,7 @@ class SeveralStarts:
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
     def follow(self) -> None:
-        """Follow as many starts as the budget allows, as far as needed, and observe them."""
+        """Follow as many starts as the budget allows, as long as needed, and observe them."""
         asked, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = asked.cost_s * min(1.0, self._first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
@@ -193,7 +193,7 @@ class SeveralStarts:
             more = self._draw.fewest - self._draw.clear
             spent_s += self._follow_some(more, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
-            # The cost of a start determines how many more the budget allows.
+            # The cost of one start determines how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
             more = self._draw.most - self._draw.fewest
             self._follow_some(more, budget_s - spent_s, each_s)
@@ -221,7 +221,7 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """Return whether no start has settled for so long that chaos certainly lasts."""
+        """Return whether chaos certainly lasts, because no start has settled for long enough."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
@@ -241,7 +241,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # With the unused budget of the others.
+                continue  # Including the unused budget of other starts.
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
@@ -275,11 +275,11 @@ class SeveralStarts:
 SAME = 1e-3
 """Relative difference of responses up to which two motions are the same."""
 APART = 2.0
-"""Two windows of chaos belong to two motions if they differ by this multiple of what 19 in 20 do."""
+"""Windows of chaos belong to two motions if they differ by this multiple of the limit for 19 cases of 20."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""A motion is shown by the start that shows it best, in this order."""
+"""Kinds of motion, best first: the best start represents a motion."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
@@ -298,8 +298,8 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
 def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
     """Return the kind of a motion reached from several starts.
 
-    Chaos that is weak, or comes in bursts, leaves most starts calm for as long as they are watched: where a
-    small change has certainly grown from one of them, the growth from all together tells.
+    In weak or bursting chaos, most starts stay calm while they are watched. If a small change has certainly
+    grown from one start, the total growth of all starts decides.
     """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
     if group[0].period is None and any(each.growth.is_certain for each in group):
@@ -315,11 +315,10 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     """Return whether two starts reached the same motion or its symmetric partner.
 
-    Motions are known by their period and all four responses, and by these alone where one start has come to
-    it too late to be seen to repeat, or to be told from chaos. Of motions that do not repeat only the largest
-    value is compared, within what windows scatter by: two chaotic motions that differ by less count as one.
-    Weak chaos is called undecided or quasi-periodic by some starts; what tells that it is one motion is that
-    all of them scatter alike, so that of two kinds the smaller scatter counts.
+    Motions are compared by period and all four responses; by responses alone if one start arrived too late to
+    be classified. For motions that do not repeat, only the largest value is compared, within the scatter of
+    windows: two chaotic motions that differ by less count as one. Some starts on weak chaos appear undecided
+    or quasi-periodic, but scatter equally: of two kinds, the smaller scatter counts.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
@@ -340,7 +339,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Kinds of motions that may still change to another."""
 FEWEST_DRAWS = 3
-"""Draws of one motion from which its scatter is estimated."""
+"""Fewest draws of a motion from which its scatter is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion."""
@@ -354,13 +353,13 @@ def ensemble_of(
     Parameters
     ----------
     several
-        Followed as far as they are to be.
+        Starts that were followed to their end.
     amplitude_m
-        Of the drive.
+        Drive amplitude.
     forgetting_s
-        Time in which the slowest mode without contact fades by e.
+        Time in which the slowest mode without contact decays by e.
     error_of
-        Asked once for each motion.
+        Called once for each motion.
     """
     reached, escape = several.reached, several.escape
     groups = motions_among(reached)
@@ -394,8 +393,8 @@ def ensemble_of(
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
     """Count the starts of each motion, and mark those that may still change to another.
 
-    Chaos that does not die out may: one chaotic motion becomes another as suddenly as a periodic one, and
-    only what becomes periodic is seen as an escape.
+    Lasting chaos may: one chaotic motion can become another as suddenly as a periodic one, and only periodic
+    motions count as an escape.
     """
     is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
     return [
@@ -405,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return chaotic only if none of it died out and it certainly lasts."""
+    """Return chaotic only if no chaos died out and it certainly lasts."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
@@ -422,11 +421,11 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the difference of another draw from the mean of these in 19 cases of 20."""
+    """Return the relative difference of another draw from the mean of these in 19 cases of 20."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
-        # A calm start of bursting chaos does not show the bursts.
+        # Calm starts of bursting chaos do not contain the bursts.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
@@ -434,12 +433,12 @@ def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
 
 
 def _deviation(values: Sequence[float]) -> float | None:
-    """Divide the standard deviation by the mean; None of a single value."""
+    """Return the standard deviation over the mean; None for a single value."""
     return float(np.std(values, ddof=1) / np.mean(values)) if len(values) > 1 else None
 
 
 ALONE = 0.5
-"""Share of a budget that is spent on following chaos on; other starts have the rest."""
+"""Share of a budget for following chaos further; other starts use the rest."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
@@ -452,9 +451,9 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
     begin
         The motion where it began.
     seen
-        What it came to.
+        Its end and findings.
     motion
-        It without stops.
+        Motion without stops.
     """
     if never_touches(scene.specimen, motion):
         return StartMemory.KEPT

@@ -5,8 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 # Quantiles of Student's, the normal and Poisson's distribution, in closed form.
-#
-# They are those of scipy.special, which takes a fifth of a second to import: more than most predictions.
+# They equal those of scipy.special, whose import (0.2 s) takes longer than most predictions.
 
 
 def student_quantile(freedom: int, probability: float) -> float:
@@ -33,7 +32,7 @@ def normal_quantile(tail: float) -> float:
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson count that stays below ``fewer_than`` with this probability."""
+    """Return the mean of a Poisson count that is below ``fewer_than`` with this probability."""
 
     def below(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -43,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Find where a function takes a value between 0 and ``high``, to the last digit, by bisection."""
+    """Find where a function takes a value, between 0 and ``high``, to the last digit by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)
@@ -51,7 +50,7 @@ def _root(decreasing: Callable[[float], float], value: float, high: float) -> fl
 
 
 UNSURE = 0.05
-"""An interval misses what it is of once in twenty times."""
+"""Probability that an interval misses its value."""
 
 
 @dataclass(frozen=True)
@@ -66,16 +65,14 @@ class Share:
 def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     """Return the share for ``count`` of ``trials`` with Wilson's interval.
 
-    It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
-    Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError when there are no trials, more
-    counted than tried, or no such probability.
-
-    Raises ValueError when there are no trials, more counted than tried, or no such probability.
+    It is valid for few trials, also if none or all count (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
+    Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101). Raises ValueError for no trials, a count above the
+    trials, or an invalid probability.
 
     Parameters
     ----------
     count, trials
-        How many of how many.
+        Number of successes, and of trials.
     unsure
         Probability that the interval misses the share.
     """
@@ -89,7 +86,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
     half = math.sqrt(weight * (share * (1.0 - share) + 0.25 * weight)) / (1.0 + weight)
-    # At the ends the interval reaches them exactly; rounding does not.
+    # At 0 and 1 the interval is exact; rounding would miss them.
     return Share(
         share=share,
         low=0.0 if count == 0 else middle - half,
@@ -102,17 +99,17 @@ class Count:
     """Trials with one outcome."""
 
     trials: float
-    """No whole number where trials hang together and count for fewer."""
+    """Not a whole number if dependent trials count for fewer."""
     is_final: bool
-    """Otherwise they were not followed to their end, and may come to any outcome."""
+    """False if the trials were not followed to their end and may have any outcome."""
 
 
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
-    """Find the shares of several outcomes, whose intervals hold all together in 19 cases of 20.
+    """Return the shares of several outcomes, whose intervals all hold together in 19 cases of 20.
 
-    Of two outcomes one share is the rest of the other. Of more, each interval is made so much wider that
-    together they fail as seldom as one would (Goodman, Technometrics 7 (1965) 247). Intervals hold both now
-    and in the end, whatever becomes of trials that are not final.
+    For two outcomes one interval is enough. For more, each interval is widened so that together they fail as
+    rarely as a single one (Goodman, Technometrics 7 (1965) 247). Intervals also hold for the final outcomes
+    of trials that are not final.
     """
     trials = sum(each.trials for each in counts)
     pending = sum(each.trials for each in counts if not each.is_final)
@@ -128,36 +125,36 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """Rate at which chaos dies out, one over its mean lifetime, from several starts."""
+    """Rate at which chaos dies out (one over its mean lifetime), from several starts."""
 
     rate_per_s: float
-    """Escapes over the time in chaos [1/s]."""
+    """Number of escapes over the total time in chaos [1/s]."""
     low_per_s: float
-    """The true rate is not below this, in 39 cases of 40; zero where nothing escaped."""
+    """Lower bound on the rate, in 39 cases of 40; zero without escapes."""
     high_per_s: float
-    """Nor above this, in 39 cases of 40; where nothing escaped, in 19 of 20."""
+    """Upper bound on the rate, in 39 cases of 40; in 19 of 20 without escapes."""
     escapes: int
-    """Starts whose chaos died out."""
+    """Number of starts whose chaos died out."""
     chaotic_s: float
-    """Time that all starts together were followed in chaos."""
+    """Total time that all starts were followed in chaos."""
 
     @property
     def lifetime_above_s(self) -> float:
-        """The mean lifetime of chaos is longer than this."""
+        """Return a lower bound on the mean lifetime of chaos."""
         return 1.0 / self.high_per_s
 
     @property
     def lifetime_below_s(self) -> float:
-        """The mean lifetime of chaos is shorter than this; infinite where nothing escaped."""
+        """Return an upper bound on the mean lifetime of chaos; infinite without escapes."""
         return 1.0 / self.low_per_s if self.low_per_s > 0.0 else math.inf
 
 
 def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
-    """Find the rate at which chaos dies out from how often it did in so long a time, all starts together.
+    """Return the rate at which chaos dies out, from the number of escapes in the total time of all starts.
 
-    Lifetimes of transient chaos are distributed exponentially (Grebogi, Ott and Yorke, Physica D 7 (1983)
-    181), and those that were not seen to the end count as far as they were followed; the interval is that of
-    a Poisson process (Garwood, Biometrika 28 (1936) 437).
+    Lifetimes of transient chaos are exponentially distributed (Grebogi, Ott and Yorke, Physica D 7 (1983)
+    181); unfinished ones count as far as they were followed. The interval is that of a Poisson process
+    (Garwood, Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
     low = 0.0 if escapes == 0 else poisson_mean(escapes, 1.0 - tail) / chaotic_s

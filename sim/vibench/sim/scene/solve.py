@@ -59,7 +59,7 @@ class Question(StrEnum):
     ANSWER = "answer"
     """Responses with errors, and motions from other starts if they depend sensitively on the start."""
     MOTION = "motion"
-    """The motion and its responses alone: for maps, whose neighbouring points tell more than errors."""
+    """Only the motion and its responses, for maps, whose neighbouring points show more than errors."""
 
 
 QuestionWord = Literal["answer", "motion"]
@@ -67,24 +67,24 @@ QuestionWord = Literal["answer", "motion"]
 
 @dataclass(frozen=True)
 class InBatches:
-    """Answer scenes as `solve_scenes` does."""
+    """Solve scenes as `solve_scenes` does."""
 
     question: Question = Question.ANSWER
 
 
 Solver = Callable[[Scene], ScenePrediction] | InBatches
-"""How scenes are answered: one by one by a function, or in batches."""
+"""Solver of scenes: a function for one scene, or batches."""
 
 
 def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
     """Solve a scene as planned, with error estimates.
 
-    Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
-    accuracy may lie; ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md): where
-    the motion has settled, twice the difference to a run with a far smaller tolerance that is taken on
-    from the end until it has forgotten it; where it has not, twice the difference to such a run from the
-    start. Where the two part, the start is forgotten and another run is another draw: the error is then what
-    two draws differ by in 19 cases of 20.
+    Each response has an error: its largest relative difference from a repeated run at a far stricter
+    accuracy. ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md). For a settled
+    motion it is twice the difference from a run with a far smaller tolerance, continued from the end until
+    the transient has decayed; otherwise, twice the difference from such a run from the start. If the two runs
+    diverge, a repeated run is another random draw: the error is then the difference of two draws in 19 cases
+    of 20.
 
     Raises ValueError when the specimen cannot be followed in time, or not from such a start.
     """
@@ -109,8 +109,8 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without errors and other starts.
 
-    It is the same motion that `solve_scene` describes, in a third of the time or less. Chaos is followed on
-    for as long as the scene's duration allows. One of an automatic duration ends after whole drive periods.
+    It is the motion that `solve_scene` describes, in a third of the time or less. Chaos is followed as long
+    as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
     Raises ValueError when the specimen cannot be followed in time, or not from such a start.
     """
@@ -118,7 +118,7 @@ def settle_scene(scene: Scene) -> ScenePrediction:
 
 
 MOST_HELD = 2e7
-"""States of scenes that are solved together, about: a gigabyte."""
+"""Approximate number of states in a batch of scenes: a gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +127,14 @@ class Solved:
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when what a
-    process pays once was part of it."""
+    """Processor time of this thread for it [s], with its share of batches. NaN if it includes loading of
+    modules."""
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
-    """Solve several scenes as `solve_scene` does one, in batches as long as states are enough.
+    """Solve several scenes like `solve_scene`, in batches where states alone are enough.
 
-    The answer to each does not depend on the others. Of chaos it is another draw than that of `solve_scene`.
-
+    The result of each does not depend on the others. In chaos it is another draw than that of `solve_scene`.
     Raises ValueError when one of them cannot be followed in time, or not from its start.
     """
     found: list[Solved] = []
@@ -181,7 +180,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]
 
 @contextmanager
 def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
-    """Add the processor time inside to that of these scenes, in equal parts."""
+    """Add the processor time of the block to these scenes, in equal parts."""
     began_s = time.thread_time()
     yield
     part_s = (time.thread_time() - began_s) / max(1, len(places))
@@ -192,28 +191,26 @@ def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]
 def solve_ensemble(
     scene: Scene, starts: int = FEWEST, seed: int = SEED, budget_s: float = math.inf
 ) -> Ensemble | None:
-    """Follow a scene from this many starts a millionth of the gap apart, whether or not its own is forgotten.
+    """Solve a scene from this many starts a millionth of the gap apart.
 
-    `solve_scene` does so by itself where the start is forgotten, with as few starts as tell the motions
-    apart; more of them give narrower intervals, and another seed another draw. Raises ValueError when fewer
-    than 4 starts are asked for, or the specimen cannot be followed in time.
-
-    Raises ValueError when fewer than 4 starts are asked for, or the specimen cannot be followed in time.
+    `solve_scene` does so itself with sensitive dependence on the start, but with few starts. More starts give
+    narrower intervals; another seed gives another draw. Raises ValueError for fewer than 4 starts, or when
+    the specimen cannot be followed in time.
 
     Parameters
     ----------
     scene
-        Asked for; its start is the first.
+        Scene whose start is the first.
     starts
-        How many, that one among them; at least 4.
+        Number of starts including that one, at least 4.
     seed
-        Of the small changes of the start.
+        Seed of the small changes of the start.
     budget_s
-        Processor time for all of them, counted as that of a scene; without an end when infinite.
+        Processor time for all of them, counted as the budget of a scene; infinite for no limit.
 
     Returns
     -------
-    What they came to. None where the motion is known in closed form, was lost, or the budget is too small.
+    Motions of all starts. None if the motion is known in closed form, was lost, or the budget is too small.
     """
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
@@ -285,21 +282,21 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     if Observable.SPECTRUM in scene.observe:
         found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
-        # As for integrated motions, the drive phase at the end equals that at the start.
+        # As in integrated motions, the drive phase at the end equals that at the start.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         found = replace(found, duration_s=duration_s, final_state=_state(motion.state(duration_s)))
     return found
 
 
 class _Begun:
-    """A scene whose motion is followed in time: first along its course, then judged.
+    """Scene whose motion is followed in time and then evaluated.
 
     Parameters
     ----------
     scene, question
-        What is asked.
+        Scene, and kind of question.
     method, motion
-        As planned, and the motion as long as nothing is touched.
+        Planned method, and the motion until a stop is touched.
     """
 
     def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:
@@ -324,7 +321,7 @@ class _Begun:
                     pace,
                     window_s,
                     min(longest_s, MOST_STATES / scene.drive.frequency_hz),
-                    # Chaos is followed on for a part of the budget; other starts have the rest.
+                    # Following chaos uses a part of the budget; other starts use the rest.
                     alone_s=ALONE * scene.budget_s if is_judged else math.inf,
                     by_itself_s=math.inf if is_judged else 0.0,
                 )
@@ -343,14 +340,14 @@ class _Begun:
         return self._found(seen, errors, memory, ensemble)
 
     def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
-        """Find the errors of a motion that reached its end."""
+        """Return the errors of a motion that reached its end."""
         rate = self._motion.slowest_rate
         return stated_errors(self._scene, self._begin, self.run, seen, self._pace, rate, follow)
 
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Follow other starts, as the budget of the scene allows or as ``draw`` says."""
+        """Follow other starts, as many as the scene's budget or ``draw`` allows."""
         asked = ReachedMotion(
             self.run,
             seen.motion,
@@ -413,7 +410,7 @@ class _Begun:
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:
-    """Find the scatter of Response I from blocks, if nothing repeats."""
+    """Return the scatter of Response I from blocks, if the motion does not repeat."""
     if seen.motion is MotionKind.PERIODIC:
         return None
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
@@ -434,7 +431,7 @@ def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pa
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind; with an automatic duration, chaotic only if chaos lasts."""
+    """Return the kind; with an automatic duration, chaos only if it lasts."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:

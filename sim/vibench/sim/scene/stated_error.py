@@ -1,10 +1,10 @@
 """Measured errors of the responses of a scene. SI units.
 
-A settled motion loses the errors of earlier steps. It is continued from its end with a far smaller
-tolerance until their effect has decayed, and compared. A motion that has not settled accumulates errors. It
-is repeated from its start with that tolerance and observed in the same window. If both runs diverge,
-another run is another draw: the difference of two draws is estimated from the parts of the window if the
-motion is stationary, else from a few indistinguishable starts.
+In a settled motion the errors of earlier steps decay. It is continued from its end with a far smaller
+tolerance until they have decayed, and compared. A motion that has not settled accumulates errors. It is
+repeated from its start with that tolerance and observed in the same window. If the two runs diverge, a
+repeated run is another random draw. The difference of two draws is then estimated from the parts of the
+window if the motion is stationary, else from a few indistinguishable starts.
 """
 
 import math
@@ -26,46 +26,47 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
+"""Tolerance of the comparison. A hundredth of the tolerance of *quick* is too large: a closed-form collision
+is more accurate."""
 FORGETTING = 4.0
-"""Forgetting times that a motion which repeats is followed before it is compared."""
+"""Forgetting times before a repeating motion is compared."""
 SHORTER = 4
-"""Number of shorter windows to compare with one, whose leakage is that many times larger."""
+"""Number of shorter windows to compare with one; their leakage is that many times larger."""
 LOOKS = 8
-"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
+"""Number of compared periods; of drive periods if the motion does not repeat."""
 SAFETY = 2.0
-"""Error that is stated over the error that was measured."""
+"""Ratio of the stated to the measured error."""
 ROUNDING = 1e-11
 """Relative error of an exact answer."""
 ROUNDED = 1e-13
-"""How far away a compared run starts, over the drive's amplitude: some times what roundings come to over a
-run, since the difference that it makes is one draw of many."""
+"""Displacement of the start of a compared run, over the drive amplitude: some times the accumulated rounding
+of a run, because its effect is one draw of many."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""y and z alike: stops may leave p no room."""
+"""y and z are displaced equally, because p may have no clearance."""
 SLOWEST_RATIO = 0.9
-"""A difference that shrinks less than this from one look to the next is taken to shrink by this."""
+"""Smallest assumed shrinkage of a difference between two checks."""
 FIRST_LOOK = 16
-"""Drive periods after which two runs from one start are compared; then whenever the time has doubled."""
+"""Drive periods before two runs from one start are first compared; then each time the time has doubled."""
 PARTED = 0.05
-"""Two runs have parted when they differ by this part of the gap, or their responses by this part."""
+"""Share of the gap, or relative difference of responses, at which two runs have diverged."""
 MEMORIES = 8.0
-"""Forgetting times of the slowest mode after which a motion that forgets its start is stationary."""
+"""Forgetting times of the slowest mode after which a chaotic motion is stationary."""
 MEMBERS = 5
-"""Number of additional starts if one window does not show the difference of draws."""
+"""Number of additional starts if one window does not show the difference between draws."""
 
 
 @dataclass(frozen=True, eq=False)
 class StatedErrors:
-    """Relative errors, of Response I and II of x, then of p; NaN where they are not known."""
+    """Relative errors of Response I and II of x, then of p; NaN where unknown."""
 
     stated: Floats
     """Error of each response, shape (4,)."""
     integration: float
-    """The largest that a stricter accuracy would lessen, as it was measured."""
+    """Largest measured error that a stricter accuracy would reduce."""
 
 
 UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
-"""Errors of a run that was lost."""
+"""Errors of a lost run."""
 
 
 def stated_errors(
@@ -82,18 +83,18 @@ def stated_errors(
     Parameters
     ----------
     scene
-        What was asked.
+        Requested scene.
     begin, run
-        The motion at time zero, and at its end.
+        Motion at time zero, and at its end.
     seen, pace
-        What was seen of it, and what decided how long is long.
+        Its findings, and its time scales and tolerances.
     slowest_rate
-        Of the slowest mode without contact [1/s], zero or negative.
+        Rate of the slowest mode without contact [1/s], zero or negative.
     follow
-        How other starts are followed.
+        Method for following other starts.
     """
     answer = seen.window.responses_m
-    # Who looks more closely may find that it does not repeat yet, and take the lines over another length.
+    # At a stricter accuracy it may not repeat yet; its lines then use another length.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -111,10 +112,10 @@ def stated_errors(
 
 
 def _by_window(seen: SceneRun) -> Floats:
-    """Estimate the relative errors made by where a window begins and ends, shape (4,).
+    """Estimate the relative errors due to the position of the window, shape (4,).
 
-    They are the largest differences from shorter windows that begin elsewhere. A motion that settled slowly
-    is compared with what it was long before, because it may go on to settle.
+    They are the largest differences from shorter windows with other starts. A slowly settling motion is
+    compared with its state long before, because it may settle further.
     """
     answer = seen.window.responses_m
     lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
@@ -128,20 +129,20 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Relative errors of exact responses: a line is what is left of a motion as large as its peaks."""
+    """Return relative errors of exact responses: rounding is relative to the peaks, also for lines."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
 @dataclass(frozen=True, eq=False)
 class _StrictRun:
-    """A motion followed from its start at a stricter accuracy."""
+    """Motion followed from its start at a stricter accuracy."""
 
     run: FollowedRun
-    """Where it parted from the answer's, on the way to the window, or at the window's end."""
+    """Run where it diverged from the result's run, else at the end of the window."""
     responses_m: Floats | None
-    """In the window, shape (4,), if it came there."""
+    """Responses in the window, shape (4,), if reached."""
     is_together: bool
-    """It never parted."""
+    """It never diverged."""
 
 
 def _difference_of_draws(
@@ -167,8 +168,7 @@ def _more_starts(
 ) -> list[Floats]:
     """Follow a few more starts, and observe the same window of them; NaN where one is lost.
 
-    The stricter run is one of them: what the steps have changed before starts come apart is common to all
-    others.
+    The stricter run is one of them: all others share the step errors made before starts diverge.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
@@ -191,8 +191,8 @@ def error_of_settled(
 ) -> Floats:
     """Return the relative errors of the responses of a repeating motion; NaN if the comparison failed.
 
-    What was answered, and what the next periods would answer, whose steps fall elsewhere, against a stricter
-    run, which is followed for as long again: a motion that forgets more slowly than its modes still moves.
+    The result, and that of the next periods (with other steps), are compared with a stricter run. That run is
+    followed twice as long, because a motion may settle more slowly than its modes.
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
@@ -212,7 +212,7 @@ def error_of_settled(
 
 
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
-    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
+    """Return the largest relative error that one drive period adds to a motion's responses; NaN if lost."""
     cycle_s = 1.0 / run.drive.frequency_hz
     on = run.apart(accuracy.tolerance)
     seen, missed = [], []
@@ -224,10 +224,10 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 
 
 def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
-    """Follow a motion from its start at a stricter accuracy until it parts, and else through the window.
+    """Follow a motion from its start at a stricter accuracy until it diverges, else through the window.
 
-    Its start is a rounding away, or laws that are flown exactly would be compared with themselves, and a
-    motion in which roundings grow would pass for exact.
+    The start is displaced by rounding. Otherwise an exact flight would be compared with itself, and a motion
+    in which rounding grows would appear exact.
     """
     loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
     strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
@@ -238,13 +238,13 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Lines over as many periods.
+    # Lines over the same number of periods.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 
 
 def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
-    """Responses of a window at whose end a run is, shape (4,); NaN if the run was lost."""
+    """Return the responses of a window that ends at the run's time, shape (4,); NaN if it was lost."""
     return window.responses_m if run.outcome is Outcome.REACHED_END else np.full(4, np.nan)
 
 
@@ -257,12 +257,12 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
 
 
 def _places_and_speeds(scene: Scene) -> Floats:
-    """Return one, and the angular frequency of the drive: what differences of a state are measured by."""
+    """Return the scales of differences of a state: one, and the angular frequency of the drive."""
     return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
-    """Responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
+    """Return responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
     seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
     if run.outcome is not Outcome.REACHED_END:
         return np.full(4, np.nan)

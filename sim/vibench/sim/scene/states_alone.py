@@ -1,7 +1,7 @@
-"""A motion followed by its states alone, until it repeats: leads, lasting chaos, other starts. SI units.
+"""Motions followed by their states alone until they repeat: leads, lasting chaos, other starts.
 
-Each is followed by itself (`StatesAlone.follow`), or several in SIMD batches of the native engine
-(`in_batches`): a motion comes to the same states whatever is in its batch.
+SI units. Each is followed by itself (`StatesAlone.follow`), or several in SIMD batches of the native engine
+(`in_batches`). The states of a motion do not depend on the others in its batch.
 """
 
 import math
@@ -27,11 +27,11 @@ from .repetition import Growth, Pace, Repetition, growth_of, longest_section, wa
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
-"""Least time between two checks [s]."""
+"""Shortest time between two checks [s]."""
 PARTS = 4
-"""Parts of a stretch over which growth is seen: whether it goes on growing."""
+"""Number of parts of a stretch, to see whether a small change keeps growing."""
 REMEMBERED = 16.0
-"""Forgetting times whose states are kept: from wandering to settled a motion needs ten, at standard."""
+"""Forgetting times whose states are kept; to settle, a motion needs ten at *standard*."""
 
 
 class StatesAlone:
@@ -40,16 +40,16 @@ class StatesAlone:
     Parameters
     ----------
     run, pace
-        The motion, and what decides how long is long.
+        The motion, with its time scales and tolerances.
     recent
-        States once a drive period before now, shape (n, 6).
+        Previous states once per drive period, shape (n, 6).
     slice_periods
-        Drive periods between two looks.
+        Drive periods between two checks.
     every
-        Keep every so manyth state in `path`; None keeps none.
+        Keep every n-th state in `path`; None keeps none.
     by_itself_s
-        Until then it is not followed in a batch [s]: on the way to its attractor a motion carries each
-        error along. A whole number of drive periods, where batches begin.
+        Time before which it is not followed in a batch [s], because errors persist on the way to the
+        attractor. A whole number of drive periods, where batches begin.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class StatesAlone:
         self.until_s = self.cost_s = math.inf
         self.by_itself_s = by_itself_s
         self.path: list[Stretch] = []
-        """What was seen of it, with the states that are kept."""
+        """Followed stretch, with the kept states."""
         self.repeats: Repetition | None = None
-        """Found; it is followed no further then."""
+        """Repetition, once found; then it is followed no further."""
         self.recent = np.empty((0, 6)) if recent is None else recent
-        """States once a drive period, up to now."""
+        """States once per drive period, up to now."""
         self._settled_s: float | None = None
         self._pace = pace
         self._every = every
@@ -86,21 +86,21 @@ class StatesAlone:
 
     @property
     def wandered_until_s(self) -> float:
-        """When it was last seen to change from period to period; now, if it does not repeat."""
+        """Return the last time at which it changed from period to period; now, if it does not repeat."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """Set the end: an instant, or a cost since the start."""
+        """Set the end: an instant or a cost since the start."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
     def follow(self, at_most_s: float = math.inf) -> None:
-        """Follow it until it repeats or its aim is reached, but not beyond ``at_most_s``."""
+        """Follow it until it repeats or reaches its end, at most to ``at_most_s``."""
         run, frequency_hz, until_s = self.run, self._pace.frequency_hz, min(self.until_s, at_most_s)
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
             goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
-            # An end between two periods is reached without a check.
+            # The last part of a period is followed without a check.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self._noted(stretch)
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Whole drive periods of the next round in a batch; none between two periods, or within a contact."""
+        """Return the whole drive periods of the next round in a batch; 0 between periods or in contact."""
         run = self.run
         if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
             return 0
@@ -119,7 +119,7 @@ class StatesAlone:
         return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
 
     def follow_to_flight(self) -> None:
-        """Follow a motion that is in contact now until a drive period ends in flight, if one does soon."""
+        """Follow a motion in contact until a drive period ends in flight, if one does soon."""
         run = self.run
         for _ in range(TRIES):
             if run.is_in_flight or run.periods is None:
@@ -127,21 +127,21 @@ class StatesAlone:
             self.follow((run.periods + 1) / run.drive.frequency_hz)
 
     def note(self, stretch: Stretch) -> bool:
-        """Keep the states of a stretch that was followed in a batch; says whether the motion seems to repeat.
+        """Keep the states of a batched stretch; return whether the motion seems to repeat.
 
-        `follow` finds that out: it goes on from here by itself.
+        `follow` then checks it without a batch.
         """
         return self._noted(stretch) is not None
 
     def _noted(self, stretch: Stretch) -> Repetition | None:
-        """Keep the states of a stretch, and say whether the motion repeats."""
+        """Keep the states of a stretch; return whether the motion repeats."""
         if self._every is not None:
             self.path.append(stretch.thinned(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Follow it on, and see how a small change grows meanwhile; nothing, over no time."""
+        """Follow it further; return the growth of a small change (none over zero time)."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -151,7 +151,7 @@ class StatesAlone:
 
 
 Follow = Callable[[Sequence[StatesAlone]], None]
-"""Follows motions as far as each aims: `one_by_one` or `in_batches`."""
+"""Function that follows motions to their ends: `one_by_one` or `in_batches`."""
 
 
 def one_by_one(several: Sequence[StatesAlone]) -> None:
@@ -161,9 +161,9 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
 
 
 WORTH_A_FIT_S = 3000.0
-"""Motion of one specimen that is worth fitting its collisions, which takes a second [s]."""
+"""Time of motion of one specimen above which a fit of its collisions, which takes a second, pays [s]."""
 AUTOMATIC_S = 10.0
-"""What an automatic duration counts for there [s]."""
+"""Assumed length of an automatic duration there [s]."""
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
@@ -176,11 +176,11 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Time between two looks at motions in a batch, and drive periods at most: their states are held."""
+"""Time and most drive periods between two checks of a batch: their states are kept in memory."""
 HELD_STATES, FULL = 1 << 20, 16
-"""States of all motions in a batch, at most, and motions at least: more fill lanes no better."""
+"""Most states of all motions in a batch, and the number of motions that fill the SIMD lanes."""
 TRIES = 8
-"""Drive periods that a motion is followed by itself until one ends in flight: batches begin there."""
+"""Most drive periods followed without a batch until one ends in flight, where batches begin."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
@@ -212,9 +212,9 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Follow motions in a batch, each for this many drive periods; gives those that are to be followed on."""
+    """Follow motions in a batch, each for this many drive periods; return those to follow further."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
-    # One that the batch has lost is where it was, and followed by itself.
+    # A motion lost by the batch stays where it was and is followed without a batch.
     return [
         each
         for (each, _), stretch in zip(ready, found, strict=True)
