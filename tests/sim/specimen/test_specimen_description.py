@@ -139,7 +139,7 @@ def test_a_description_comes_back_from_its_own_text(tmp_path):
         (("4.9e9", "1" + 400 * "0"), "hertz_stiffness = 1000"),
         (
             ("hertz_stiffness", "about = " + 3000 * "[" + 3000 * "]" + "\nhertz_stiffness"),
-            "within each other",
+            "nested too deeply",
         ),
         (("hertz_stiffness", "model = 'gong2025'\nsources = 5\nhertz_stiffness"), "sources = 5"),
         (("stiffnesses_n_per_m = [2e4,", "single_frequencies_hz = [1e200,"), "too small, or too large"),

@@ -21,12 +21,12 @@ from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Of the many-harmonic balance."""
+"""Tolerance of the many-harmonic balance."""
 
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One answer of one method."""
+    """One result of one method."""
 
     method: str
     time_s: float

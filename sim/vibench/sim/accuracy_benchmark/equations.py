@@ -18,13 +18,13 @@ from ..specimen.state import Floats
 
 
 class Place(IntEnum):
-    """Where m1 is, as far as its force depends on it."""
+    """Position of m1 relative to the stops."""
 
     ON_LOWER = -1
     FLIGHT = 0
     ON_UPPER = 1
     ANYWHERE = 2
-    """Wherever p says."""
+    """As p says."""
 
 
 class Law(NamedTuple):
@@ -38,9 +38,9 @@ class Law(NamedTuple):
     loss: float = 0.0
     reference: float = 1.0
     terms: tuple[tuple[int, float], ...] = ()
-    """Each power, and its force at the reference [N]."""
+    """Exponent and force at the reference [N] of each term."""
     beside: float = 0.0
-    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
+    """Stiffness of a linear spring parallel to the stop [N/m]."""
 
 
 def law_of(specimen: Specimen) -> Law:
@@ -79,7 +79,7 @@ def rates(time_s: float | Floats, state: Floats, place: Place, law: Law, numbers
     base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
     p, rate = y - z, vy - vz
     inner = k1 * p + c1 * rate
-    # A step that an implicit method only tries may lead beyond all numbers.
+    # A trial step of an implicit method may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         if place is not Place.FLIGHT and law.stiffness > 0.0:
             inner = inner + _stop_force(np.maximum(p - law.upper, 0.0), rate, law)

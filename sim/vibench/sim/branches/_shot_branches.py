@@ -21,10 +21,10 @@ from ..specimen.state import Floats, Vector
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06
-"""A straight line between two points of a branch misses it by less than this part of its length: by as much
-as the tangent may turn between them."""
+"""Largest distance of a branch from the chord between two of its points, over the chord's length (set by the
+largest turn of the tangent)."""
 SAME_MOTION = 1e-5
-"""Over the state's scale."""
+"""Smallest such distance, over the state's scale."""
 LENGTHS = 10.0
 """Length of the parameter's range in units, as when following a branch."""
 
@@ -55,7 +55,7 @@ class FoundBranch:
 
     @property
     def is_isolated(self) -> bool:
-        """Whether it closes on itself, so that no sweep leads there from outside."""
+        """Return whether it closes on itself, so that no sweep from outside reaches it."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 

@@ -47,7 +47,7 @@ class Chain:
 
     @property
     def size(self) -> int:
-        """How many cells."""
+        """Return the number of cells."""
         return len(self.cells)
 
     @property

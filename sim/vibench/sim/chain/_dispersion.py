@@ -28,8 +28,6 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
 
     Raises ValueError when a frequency is not positive.
 
-    Raises ValueError when a frequency is not positive.
-
     Parameters
     ----------
     unit

@@ -134,7 +134,7 @@ class ChainRun:
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Most windows times cells of a run, which take hours."""
+"""Most windows times cells of a run: they take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ class ChainImpacts:
     times_s: Floats
     """Ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
-    """Which cell, counted from 0 at the base; shape (count,)."""
+    """Cell of each contact, counted from 0 at the base; shape (count,)."""
     per_cell: NDArray[np.int64]
     """Number in each cell, shape (cells,)."""
 
@@ -184,19 +184,16 @@ def integrate_chain(
 ) -> ChainTrajectory:
     """Integrate a chain of cells under a drive.
 
-    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved
-    or excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
+    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
+    excluded by bounds and resolved with the tolerance of ``accuracy``, in any number of cells at once.
     Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does. Raises
-    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the
-    run is.
-
-    Raises ValueError when an argument is not allowed, the run would take hours, or the drive is over before
-    the run is.
+    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the run
+    is.
 
     Parameters
     ----------
     chain, drive
-        What moves, and what moves its base.
+        Chain, and motion of its base.
     duration_s
         [s]; within the drive, if that is a sweep or samples.
     accuracy
@@ -291,7 +288,7 @@ def _of_one(run: Trajectory) -> ChainTrajectory:
 
 
 def most_chain_impacts(chain: Chain, rate_hz: float, duration_s: float) -> int:
-    """Return how many impacts a run may have whose cells strike at most so often, each on average.
+    """Return the largest number of impacts in a run at a largest mean impact rate per cell.
 
     Raises ValueError when the rate is not allowed.
     """

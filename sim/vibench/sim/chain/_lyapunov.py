@@ -1,9 +1,9 @@
 """The largest Lyapunov exponent of a chain, from two neighbouring motions. SI units.
 
-Two motions a small distance apart are followed; after every interval their distance is read, in the energy
-norm, and the second motion is put back to the small distance along the line between them (Benettin, Galgani
-and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The distance is far
-above the error of a contact and far below the motion itself, which is why the accuracy is REFERENCE at first.
+Two motions a small distance apart are followed. After every interval their distance in the energy norm is
+recorded, and the second motion is moved back to the small distance along the line between them (Benettin,
+Galgani and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The distance
+must be far above the error of a contact and far below the motion, so the default accuracy is REFERENCE.
 """
 
 import math
@@ -41,13 +41,13 @@ class ChainExponent:
     """Mean growth [1/s]; negative for converging neighbours."""
     standard_error_per_s: float
     blocks: BlockedMean | None
-    """How the mean and its error were taken [1/s]."""
+    """Mean and error from blocks [1/s]."""
     interval_s: float
     """Whole drive periods between readings."""
     local_exponents_per_s: Floats
-    """In each interval after settling, shape (n,)."""
+    """Growth rate in each interval after settling, shape (n,)."""
     impacts: int
-    """Impacts of all cells, while the exponent was read."""
+    """Impacts of all cells in these intervals."""
     final_state: Floats
     """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
     outcome: Outcome
@@ -69,9 +69,6 @@ def chain_lyapunov_exponent(
     Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too
     few intervals for an error.
 
-    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too few
-    intervals for an error.
-
     Parameters
     ----------
     chain, drive, accuracy, initial_state, max_impact_rate_hz
@@ -79,7 +76,7 @@ def chain_lyapunov_exponent(
     duration_s, settle_s
         The exponent is the mean over ``duration_s``, after ``settle_s`` which find the attractor [s].
     seed
-        Of the direction in which the second motion starts.
+        Seed of the initial direction to the second motion.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
@@ -148,7 +145,7 @@ def chain_lyapunov_exponent(
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
     """Move the second motion along the line to the first, to the small distance from it."""
     apart = second - first
-    # A chain at rest under a drive is as large as the drive would move it.
+    # At rest, the motion without contact under the drive sets the size.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))

@@ -31,9 +31,9 @@ class ChainResponse:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """The largest values are taken over this long before the end."""
+    """Time before the end over which the largest values are taken."""
     line_periods: int
-    """The lines, over this many whole drive periods before the end: the most that the window holds."""
+    """Whole drive periods before the end over which lines are taken: as many as the window contains."""
     largest_m: Floats
     """Largest abs of x and p = y - z of every cell over the window, shape (cells, 2)."""
     lines_m: Complex
@@ -41,7 +41,7 @@ class ChainResponse:
     shape (cells, 4).
     """
     impacts: NDArray[np.int64]
-    """Contacts that began within the window, in each cell; shape (cells,)."""
+    """Contacts of each cell that began within the window, shape (cells,)."""
     impacts_before: NDArray[np.int64]
     """Contacts that began before the window."""
     final_state: Floats
@@ -75,9 +75,6 @@ def chain_response(
     settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is longer
     than the run or shorter than one period, or the run would take hours.
 
-    Raises ValueError when the drive has no amplitude, the window is longer than the run or shorter than one
-    period, or the run would take hours.
-
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
@@ -110,7 +107,7 @@ def chain_response(
             run.watch(watch)
             outcome = run.advance(until)
     end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
-    # Over whole periods the drive's term is where it began.
+    # Over whole periods the drive's term returns to its start.
     change = np.asarray((run.motion - line_start) * end, dtype=np.complex128)
     lines = _lines(chain, drive, run.forces, _in_order(change), line_s)
     void = 1.0 if outcome is Outcome.REACHED_END else math.nan
@@ -139,7 +136,7 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
     (m0, _, _), (k0, _, k2), (c0, _, c2) = cell.masses, cell.stiffnesses, cell.dampings
     end = cmath.exp(-1j * (omega * one.duration_s + drive.phase_rad))
-    # Over whole periods the drive's term is where it began.
+    # Over whole periods the drive's term returns to its start.
     change = (one.final_state - one.line_start_state) * end * 2.0 / line_s
     x, p, base = one.line_x_m, one.line_p_m, -1j * drive.amplitude_m
     moved = change[0] + 1j * omega * x
@@ -226,7 +223,7 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
 
 
 class MeanEnergies(NamedTuple):
-    """Energy of every cell over a run; shapes (cells,)."""
+    """Mean energy of every cell over a run, shape (cells,) each."""
 
     mean_j: Floats
     standard_error_j: Floats

@@ -27,10 +27,11 @@ WHOLE_COLLISIONS = 1e-7
 MARKOV_TERMS = 11
 """Number of Taylor coefficients of the chain's response to a unit impulse in a cell."""
 REACH = MARKOV_TERMS
-"""Cells on each side that it reaches in this many terms."""
+"""Number of cells on each side that it reaches within these terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Part of the tolerance that one cell's force may change another's rate within a window, unseen."""
+"""Share of the tolerance by which one cell's force may change another's velocity unnoticed within a
+window."""
 MOST_HALVINGS = 20
 KEPT = 2
 """Number of windows tried before the shortest."""
@@ -40,7 +41,7 @@ class ChainTables(NamedTuple):
     """Cells and windows of a chain."""
 
     kinds: Structure
-    """`CellKind` of native/structures.hpp, for each cell that differs from those before."""
+    """One `CellKind` of native/structures.hpp for each different cell."""
     kind_of: Vector
     """Shape (cells,)."""
     fastest: float
@@ -96,7 +97,7 @@ def markov_between(chain: Chain) -> Table:
 def _answers(chain: Chain, moves: Table) -> Table:
     """Taylor coefficients of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
-    Impulses too far apart to be heard by the same cell share a column. ``moves`` is 0 where a cell is held,
+    Impulses too far apart to affect the same cell share a column. ``moves`` is 0 where a cell is held,
     else 1.
     """
     places, masses = np.arange(chain.size), chain.masses.reshape(chain.size, MASSES_PER_CELL)
@@ -126,13 +127,14 @@ def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
 
 
 def _stretches(motion: Table) -> tuple[Table, Table, Table]:
-    """How far the three links of every cell are drawn out."""
+    """Return the elongation of the three links of every cell."""
     x, y, z = motion
     return np.diff(x, axis=0, prepend=0.0), y - z, z - x
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Bound how an impulse in one cell changes dp/dt of another within a window, over its own; by distance.
+    """Bound the change of dp/dt in another cell by an impulse within a window, over the cell's own change; by
+    distance.
 
     Shape (REACH + 1,): entry d is the largest among cells d apart; entry 0 is not used.
     """
@@ -150,7 +152,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Bound what an impulse does to its own cell's dp/dt by way of the neighbours, over all it does."""
+    """Bound the share of an impulse's effect on its own cell's dp/dt that returns through neighbours."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]
@@ -159,10 +161,10 @@ def _back_action(chain: Chain, between: Table, window: float) -> float:
 
 
 def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector, Vector]:
-    """Choose the windows and who may not be busy together in them.
+    """Choose the windows and the distance of cells that may be in contact in them.
 
-    In the last even neighbours may. A cell is followed as if its neighbours did not feel it: in no window
-    may that matter.
+    In the last one even neighbours may. Each cell is integrated as if its neighbours did not react; in no
+    window may that matter.
     """
     between = markov_between(chain)
     shortened = 1.0
@@ -187,30 +189,31 @@ def _clash(answers: Vector, allowed: float) -> int:
 
 # The force of a moving base on the first m0, k0 U + c0 dU/dt, as polynomials on equal pieces. SI units.
 #
-# Harmonic drives need none of it: the engine knows them. Of others the force is one more known force
+# The engine treats harmonic drives exactly. The force of other drives is one more known force
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
 """Through eight Chebyshev points of a piece of `WINDOW_TURN` a sine is off by 1e-14."""
 ALMOST = 1e-9
-"""Part of a piece that is rounding."""
+"""Share of a piece that counts as rounding."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16
 """Pieces of a sweep that are cut at a time: bounds the memory of a long sweep."""
 BaseDrive = Sampled | LinearSweep | LogarithmicSweep
-"""What is cut into pieces."""
+"""Drives that are cut into pieces."""
 
 
 class Pieces(NamedTuple):
     """Consecutive polynomials."""
 
     terms: Table
-    """Of the force on every piece, in powers of the time since it began, shape (pieces, PIECE_TERMS)."""
+    """Coefficients of the force on every piece, in powers of the time since its start, shape (pieces,
+    PIECE_TERMS)."""
     start_s: float
-    """When the first of them begins."""
+    """Start of the first piece [s]."""
     length_s: float
-    """Length of each."""
+    """Length of each piece [s]."""
 
 
 def pieces_between(
@@ -229,7 +232,7 @@ def pieces_between(
 
 
 def longest_window_s(tables: ChainTables, drive: Drive) -> float:
-    """Return the most time that a window may take: none reaches beyond a piece of the drive."""
+    """Return the longest window: none reaches beyond a piece of the drive [s]."""
     window = float(tables.windows[0])
     return window if isinstance(drive, Harmonic) else min(window, _grid(tables, drive)[0])
 

@@ -17,15 +17,15 @@ from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
-"""Length of the windows that are compared, about, and their least number [s]."""
+"""Approximate length [s] and smallest number of the compared windows."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Pairs of windows without which nothing is said, and Student's quantile for it: 19 cases of 20."""
+"""Fewest pairs of windows for an error, and its quantile: 19 cases of 20."""
 TOLERANCE_PART = 0.1
 """Part of a requested error that the accuracy of contacts may use."""
 TRIED_S, TRIED_PART = 1e-4, 0.1
-"""Length that is tried of a slow drive's period [s], and part of the time that this is to take."""
+"""Length of the trial of a slow drive's period [s], and share of the time for it."""
 LONGEST_S = 60.0
-"""Time after which an answer is refined no further, where none was requested [s]."""
+"""Default time limit of refinement [s]."""
 
 
 class TargetedResponse(NamedTuple):
@@ -55,7 +55,7 @@ def chain_response_to(
     Raises ValueError when one drive period takes longer.
 
     ``error`` is relative, of the transmission of every cell; None: as small as the time allows. The time is
-    that from the call to the answer; None: a minute. Raises ValueError when one drive period takes longer.
+    that from the call to the answer; None: a minute.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
@@ -99,7 +99,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Refuse a time in which one drive period cannot be followed, by longer and longer parts of it."""
+    """Refuse a time too short for one drive period, by a trial of growing parts of it."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # prepares
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:

@@ -38,36 +38,35 @@ from .shapes import (
 
 # Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
 #
-# In units of the depth and the time u that a collision of its speed would have with nothing else acting, a
-# collision depends on the acceleration that all other springs give the pair meanwhile, and on u: through u
-# alone it knows the specimen. The acceleration about the middle of a collision, its first four derivatives
-# there, and u are the variables; the duration and the moments of the force about the middle are fitted to
-# collisions that are solved at sixteen points.
+# The units are the depth and the time u of a free collision of the same speed. In these units a collision
+# depends only on the acceleration by all other springs, and on the specimen only through u. The variables are
+# that acceleration and its first four derivatives in the middle of the collision, and u. Duration and moments
+# of the force about the middle are fitted to collisions that are solved at sixteen points.
 
 MIDDLE = 1.47
 """Middle of a collision, in u."""
 DERIVATIVES = 5
-"""Number of derivatives of the acceleration, itself among them."""
+"""Number of derivatives of the acceleration, including itself."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Speeds that are fitted, over gap times fastest rate."""
+"""Range of fitted speeds, over gap times fastest rate."""
 HARDEST_PRESS = 0.24
-"""Accelerations that are fitted, either way, over speed / u."""
+"""Largest fitted acceleration, in both directions, over speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
 """The first derivative over speed / u^2, of the paper's specimen, and each one over the one before."""
 PAPER_TURN = 0.053
 """Fastest rate times u, of the paper's specimen in the middle of its speeds."""
 SLOWEST_TURN = 0.15
-"""Fastest rate times u, at most: a collision lasts three times as long [rad]."""
+"""Largest fastest rate times u [rad]; a collision lasts three times u."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
 NEWTON_STEPS = 8
 FIT_ERROR = 2e-7
-"""Largest error of a speed after a collision, over the speed before, that a fit may have."""
+"""Largest allowed error of a fit: speed after a collision over speed before."""
 GUESS_POINTS = 64
 
 
@@ -199,14 +198,14 @@ def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
 
 
 LEAST_TOLERANCE = 1e-7
-"""Polynomials know a collision no better; as in native/collision.hpp."""
+"""Accuracy of the polynomials; as in native/collision.hpp."""
 FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
-"""Of processors that keep eight numbers in two registers or one, and fuse products with sums."""
+"""Families of processors with wide registers and fused multiply-add."""
 MODES = 3
 MOST_DAMPED = 0.05
-"""Damping ratio up to which a mode is taken: beyond, its series would need more terms."""
+"""Largest damping ratio of a mode; above it the series needs more terms."""
 LEAST_PART = 1e-9
-"""Least part of a mode in p, over the largest: p alone is followed, and everything else found from it."""
+"""Smallest share of a mode in p, over the largest: only p is followed, and all else derived from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +213,7 @@ class BatchedMotion:
     """Result of one motion."""
 
     states: Floats
-    """Once a drive period, up to the end, shape (periods, 6). One within a short collision, unless it is the
+    """States once per drive period, shape (periods, 6). A state within a short collision, unless it is the
     last, is extrapolated from the flight after it."""
     impacts: int
 

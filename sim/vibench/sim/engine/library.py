@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from .processor import usable_families
 
 Structure = NDArray[np.void]
-"""One structure, shape (); or a row of them."""
+"""One structure, shape (), or an array of them."""
 StructureType = np.dtype[np.void]
 _STRUCTURE = re.compile(r"(\w+) \{ (.*) \}")
 _NAME = re.compile(r"(\*?)\s*(\w+)((?:\[\d+\])*)")
@@ -78,7 +78,7 @@ FUNCTIONS = (
 )
 """Functions of the library, each with one structure."""
 Tables = NDArray[np.float64]
-"""What a run of one scene needs ready, as the engine lays it out."""
+"""Prepared data of one scene, in the engine's layout."""
 _Pointer = ctypes.c_void_p
 
 
@@ -87,7 +87,7 @@ class EngineError(RuntimeError):
 
 
 class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
-    """A structure that keeps what it points to."""
+    """Structure that keeps the arrays it points to alive."""
 
     lent: dict[str, object]
 
@@ -173,7 +173,7 @@ class Engine:
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
-        """Return how many numbers of memory a chain lends; ``kinds`` counts cells that differ."""
+        """Return the number of floats of memory for a chain; ``kinds`` counts different cells."""
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:

@@ -42,7 +42,7 @@ KNOWN_MOTION = (
 )
 """Known result for the paper's specimen with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
 KNOWN_TO = 1e-6
-"""Part of 100 um and 0.1 m/s."""
+"""Tolerance of this result, over 100 um and 0.1 m/s."""
 
 
 class Watch(IntEnum):
@@ -225,7 +225,7 @@ class NativeRun:
 
     @property
     def time_s(self) -> float:
-        """How far the motion has come."""
+        """Return the current time of the motion [s]."""
         return float(self._state["clock_high"])
 
     def pass_over(self, length_s: float) -> None:
@@ -236,12 +236,12 @@ class NativeRun:
 
     @property
     def is_in_flight(self) -> bool:
-        """No stop is touched now."""
+        """Return whether no stop is touched now."""
         return bool(self._state["side"] == 0.0)
 
     @property
     def reach_m(self) -> float:
-        """Largest abs(p) from now on, as long as no stop is touched; infinite on a stop."""
+        """Return the largest future abs(p) while no stop is touched; infinite on a stop."""
         return self.engine.reach(self._tables, self._state)
 
 
@@ -296,7 +296,7 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:
-    """Return how many impacts a run may have that strikes at most so often on average."""
+    """Return the largest number of impacts in a run at a largest mean rate."""
     return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
 
 
@@ -417,7 +417,7 @@ class CubicRun:
 
     @property
     def time_s(self) -> float:
-        """How far the motion has come."""
+        """Return the current time of the motion [s]."""
         return float(self._state["clock_high"])
 
 

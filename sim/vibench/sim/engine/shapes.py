@@ -2,10 +2,10 @@
 
 Hertz collisions are solved before they happen.
 
-With t = T (1 - cos phi) / 2, T the time that it lasts, depth and force are smooth in phi, square roots at
-both ends included: sixteen Gauss points in phi hold a whole collision. Measured by the depth and the time
-of a collision of its speed all are alike except for how hard the other springs press; the shapes, and how
-they answer a change, stand in a row by that press (docs/decisions/0008-speed-of-contacts.md).
+With t = T (1 - cos phi) / 2, where T is the duration, depth and force are smooth in phi, including the square
+roots at both ends: sixteen Gauss points in phi describe a whole collision. Scaled by the depth and time of a
+free collision of the same speed, collisions differ only by the press of the other springs. The shapes and
+their derivatives are tabulated over that press (docs/decisions/0008-speed-of-contacts.md).
 """
 
 import math
@@ -22,22 +22,22 @@ POINTS = 16
 TERMS = 8
 """Terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""Shapes stand at this many presses, from the first to the last. A press is the acceleration by all other
-springs, over speed^2 / depth."""
+"""Number of tabulated presses, and the first and the last. A press is the acceleration by all other springs,
+over speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
 NEWTON_STEPS = 60
 HALF_FORCE = 1.25
 """k / m in units of the depth and the speed: m v^2 / 2 = 2 k d^(5/2) / 5."""
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
-"""Rows of a shape below those that answer the sixteen misfits of depth: that answers the last misfit, of the
-end; how the duration answers the misfits; depths at the points; and what they change by the press beside the
-shape's own, by its rate, and by what the force does through dampers and springs (two or three integrals)."""
+"""Rows of a shape after those of the sixteen misfits of depth: derivatives by the last misfit (of the end);
+derivatives of the duration by the misfits; depths at the points; and their derivatives by the press, by its
+rate, and by the force through dampers and springs (two or three integrals)."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Of the numbers beside a shape. The third: largest depth over that of the polynomial through the points,
-whose middle errs by 1e-5 where its end does by 1e-8. From the fourth on: what the duration changes by, as
-depths do."""
+"""Places of the scalars of a shape. The third is the largest depth over that of the polynomial through the
+points, whose error is 1e-5 in the middle and 1e-8 at the end. From the fourth on: derivatives of the
+duration, in the order of those of depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
@@ -59,7 +59,8 @@ def _about_middle() -> Table:
 ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""From the middle of phi: eight terms hold a depth there to 1e-7, and a tenth as far away to rounding."""
+"""Distance from the middle of phi at which eight terms are accurate to 1e-7; at a tenth of it, to
+rounding."""
 
 
 def _top_of(terms: Vector) -> float:
@@ -160,9 +161,9 @@ ORDER = 32
 POWER_QUADRATURE = 24
 """Points of the integrals of the series, exact for all terms."""
 COURSE_DEGREE = 5
-"""The first guess of F in a step is a polynomial of this degree, fitted to the step before."""
+"""Degree of the first guess of F in a step, fitted to the step before."""
 END_WEIGHT = 3.0
-"""... and to its end, with this weight."""
+"""Weight of the end of that step in the fit."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
 """Gauss's points c_i on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
@@ -200,7 +201,7 @@ def _power_shares() -> Table:
 
 POWER_SHARES: Table = _power_shares()
 INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
-"""At which an observed step is known: its start, its points, its end."""
+"""Places of an observed step: its start, points and end."""
 
 
 def _between(places: Vector) -> Table:

@@ -76,7 +76,7 @@ class Precision:
     absolute_per_s: float
     """Standard error [1/s]."""
     relative: float = 0.0
-    """Or standard error over exponent, whichever allows more."""
+    """Standard error over exponent; the larger limit counts."""
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
@@ -104,17 +104,17 @@ class LyapunovEstimate:
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
-    """What the run ended in."""
+    """Final motion of the run."""
     since_s: float
-    """Beginning of what was averaged, or of the final motion."""
+    """Start of the average, or of the final motion."""
     blocks: BlockedMean | None
-    """How the mean and its error were taken [1/s]; None unless the source is the average."""
+    """Mean and error from blocks [1/s]; None unless the source is the average."""
     interval_s: float
     """Time between readings."""
     local_time_s: Floats
     """Ends of the intervals, shape (n,)."""
     local_exponents_per_s: Floats
-    """In each interval, from time zero on, shape (n,)."""
+    """Growth rate in each interval from time zero, shape (n,)."""
     transient: ChaoticTransient | None
     impacts: int
     """Since time zero."""
@@ -144,20 +144,18 @@ def lyapunov_exponent(
     of the motion in which they end. Together the defaults are the paper's 30 s from rest. Raises ValueError
     when an argument is not allowed, or the duration holds fewer than 32 intervals.
 
-    Raises ValueError when an argument is not allowed, or the duration holds fewer than 32 intervals.
-
     Parameters
     ----------
     specimen, drive
         Specimen with any contact law, and its drive.
     accuracy
-        Of the motion. In chaos an exponent is the same at every level, within its error.
+        Accuracy of the motion. In chaos an exponent is the same at every level, within its error.
     duration_s, settle_s
         [s].
     initial_state
         x, y, z, vx, vy, vz, shape (6,); at rest when None. The state reached may depend on it.
     interval_s
-        Time between readings, about; two cycles of the slowest mode when None.
+        Approximate time between readings; two cycles of the slowest mode when None.
     precision
         End the run as soon as the error is this small. None takes the whole duration: chaos that dies out
         late is then found.
@@ -190,7 +188,7 @@ def lyapunov_exponent(
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
-    """Count the intervals of settling, and refuse times that leave too few for a mean."""
+    """Return the number of intervals of settling; refuse times that leave too few for a mean."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         msg = f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."
         raise ValueError(msg)
@@ -207,7 +205,7 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
 
 @dataclass(frozen=True)
 class _Exponent:
-    """An exponent and how it was found."""
+    """An exponent and its source."""
 
     mean: float
     error: float
@@ -238,7 +236,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Largest exponent of a periodic motion over two cycles, and half of how far they differ [1/s]."""
+    """Return the largest exponent of a periodic motion over two cycles, and half their difference [1/s]."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - it imports scipy; few scenes ask for an exponent
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []

@@ -1,4 +1,5 @@
-"""All six Lyapunov exponents of a specimen under a harmonic drive, and the dimension they give. SI units.
+"""All six Lyapunov exponents of a specimen under a harmonic drive, and their Kaplan-Yorke dimension. SI
+units.
 
 Six small variations span all directions of the state. Propagated together and made orthogonal repeatedly,
 they give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is the mean
@@ -47,7 +48,7 @@ class LyapunovSpectrum:
     blocks: NDArray[np.int64]
     """Independent stretches of the run behind each standard error, shape (6,)."""
     verdict: ExponentVerdict
-    """Verdict of the largest."""
+    """Verdict on the largest exponent."""
     source: Source
     motion: FinalMotion
     since_s: float
@@ -56,7 +57,7 @@ class LyapunovSpectrum:
     impact_rate_hz: float
     """In the final motion."""
     dimension_standard_error: float
-    """Of `dimension`, with the exponents' errors as they go together; 0 where it is a whole number."""
+    """Standard error of `dimension` from the correlated errors of the exponents; 0 for a whole number."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
@@ -157,7 +158,7 @@ ONE_BLOCK = np.ones(DIRECTIONS, dtype=np.int64)
 
 
 class _Taken(NamedTuple):
-    """What is read off a run."""
+    """Exponents derived from a run."""
 
     exponents: Floats
     errors: Floats

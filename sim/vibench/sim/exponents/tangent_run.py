@@ -25,17 +25,17 @@ from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, energy_metric
 from ..specimen.state import Floats, Table
 
-# How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
+# Standard error of the mean of a correlated series, from sufficiently long blocks.
 #
-# Neighbouring values are averaged in pairs, again and again; the error of the mean that the blocks suggest
-# grows until they are longer than the memory of the series, and stays (Flyvbjerg and Petersen, J. Chem.
-# Phys. 91 (1989) 461). That it stays is tested by the correlation of neighbouring blocks, at one length and
-# all longer ones together (Jonsson, Phys. Rev. E 98 (2018) 043304).
+# Neighbouring values are averaged in pairs repeatedly. The estimated error of the mean grows until blocks are
+# longer than the memory of the series, then stays (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461).
+# This plateau is tested by the correlation of neighbouring blocks, at one length and all longer ones
+# together (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""With fewer independent blocks an error is itself known to less than 20 per cent."""
+"""Number of independent blocks below which an error has itself more than 20 per cent uncertainty."""
 CONFIDENCE = 0.99
-"""Blocks count as independent unless the test says otherwise this certainly."""
+"""Confidence of the test above which blocks count as correlated."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class BlockedMean:
     """Values in a block: the smallest power of two for which neighbouring blocks are independent."""
     blocks: int
     correlation_length: float
-    """Values that carry as much as one independent value: variance of the mean over that of as many
-    independent ones."""
+    """Number of values equivalent to one independent value: variance of the mean over that of independent
+    values."""
     is_long_enough: bool
-    """The series holds `FEWEST_BLOCKS` independent blocks or more: else the error is a lower bound."""
+    """Whether there are at least `FEWEST_BLOCKS` independent blocks; otherwise the error is a lower bound."""
 
 
 def block_mean(values: ArrayLike) -> BlockedMean:
@@ -69,7 +69,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     if len(counts) == 0 or variances[0] == 0.0:
         error = 0.0 if len(series) > 1 else math.nan
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
-    # The shortest blocks from which on no neighbours are correlated.
+    # Choose the shortest blocks above which no neighbours are correlated.
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
     # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
@@ -100,17 +100,17 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Evidence from each length and all longer ones, if blocks are independent."""
+    """Return the evidence for correlation at each length and all longer ones."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Several changes are made orthogonal at least this often, in radians and decays of the fastest mode: they
-stay apart by several digits."""
+"""Longest time between orthogonalisations, in radians and decays of the fastest mode; changes stay distinct
+by several digits."""
 CHECKS = 32
-"""Most checks per run whether it has lasted long enough."""
+"""Most checks per run for an early end."""
 ALMOST = 1e-9
 """A duration this close to a whole number of intervals counts as whole."""
 Enough = Callable[[Floats], bool]
@@ -160,7 +160,7 @@ class TangentRun:
     """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
     impact_times_s: Floats
     is_quiet: bool
-    """At the end it is certain that no impact will follow."""
+    """Whether it is certain that no impact will follow."""
     final_state: Floats
     """Shape (6,), at ``end_time_s``."""
     end_time_s: float
@@ -233,19 +233,18 @@ def starting_changes(metric: Table, changes: int) -> Table:
 
 # When a run settles into its final kind of motion, and whether it was chaotic before. SI units.
 #
-# A run can strike its stops thousands of times and then leave them for good: chaos that was a transient
-# (Grebogi, Ott and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run belongs to no state
-# at all.
+# A motion can strike its stops thousands of times and then leave them for ever: transient chaos (Grebogi, Ott
+# and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run describes no motion.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""A section repeats when it changes by less than the first, over the state's scale, from cycle to cycle; it
-has done so since it last changed by more than the second."""
+"""Relative change per cycle below which a section repeats, and above which it did not yet repeat."""
 LONGEST_CYCLE = 16
-"""Intervals in a cycle that is looked for."""
+"""Longest searched cycle in intervals."""
 SURE = 3.0
-"""Standard errors that a number must be away from zero to have a sign."""
+"""Standard errors from zero at which a number has a sign."""
 CHANGED = 5.0
-"""Standard errors between the means before and after a change: the best of many places is looked for."""
+"""Standard errors between the means before and after a change; larger, because the best of many places is
+chosen."""
 FEWEST_INTERVALS = 32
 """Intervals on each side of a change of the exponent's sign."""
 ALIGNING = 8

@@ -1,8 +1,8 @@
 """Write an HDF5 file with reliable errors on a failing disk, without crashes and silent gaps.
 
-HDF5 2.0 crashes when it closes a file and a write fails, and h5py prints an error that it meets while it
-closes an object and goes on. So HDF5 writes to a file object that reports every write as done and keeps the
-first error, which is raised when HDF5 has closed the file. A Ctrl-C in the middle of a write is kept too.
+HDF5 2.0 crashes if a write fails while it closes a file, and h5py only prints errors that occur while it
+closes an object. Therefore HDF5 writes to a file object that reports every write as done and stores the first
+error. That error is raised after HDF5 has closed the file. A Ctrl-C during a write is also delayed.
 """
 
 import signal
@@ -73,5 +73,5 @@ def _interrupts(disk: _Disk) -> Iterator[None]:
         yield
     finally:
         for number, handler in handlers.items():
-            if signal.getsignal(number) is on_signal:  # a handler may have put another one in its place
+            if signal.getsignal(number) is on_signal:  # a handler may have replaced it
                 signal.signal(number, handler)

@@ -127,12 +127,10 @@ def integrate(
     motion is the same with any sample rate. Raises ValueError when an argument is not allowed, or the drive
     is over before the run is.
 
-    Raises ValueError when an argument is not allowed, or the drive is over before the run is.
-
     Parameters
     ----------
     specimen, drive
-        What moves, and what moves it.
+        Specimen, and motion of its base.
     duration_s
         [s]; within the drive, if that is a sweep or samples.
     accuracy
@@ -142,9 +140,9 @@ def integrate(
     sample_rate_hz
         Samples at start_time_s + k / sample_rate_hz up to the end; None keeps none.
     start_time_s
-        Time on the drive's clock at which the run begins: to go on from an earlier final state.
+        Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
-        A run that strikes more often than this on average ends with TOO_MANY_IMPACTS.
+        Mean impact rate above which a run ends with TOO_MANY_IMPACTS.
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
@@ -209,7 +207,7 @@ def check_within(available_s: float, end_s: float) -> None:
 
 
 BATCH = 1 << 16
-"""Intervals of a sweep that are made at once, which bounds the memory of a long sweep."""
+"""Number of intervals of a sweep made at once; bounds the memory of a long sweep."""
 
 
 def integrate_cubics(
@@ -281,11 +279,11 @@ class FollowedMotion:
     impacts: NDArray[np.int64]
     """Contacts that began between a sample and the next, shape (reached - 1,)."""
     asked: int
-    """Samples asked for; more than were reached when the motion became meaningless."""
+    """Number of requested samples; more than reached if the motion was lost."""
 
     @property
     def reached_end(self) -> bool:
-        """Whether there is a state for every sample asked for."""
+        """Return whether there is a state for every requested sample."""
         return len(self.states) == self.asked
 
 

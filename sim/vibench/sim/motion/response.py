@@ -23,9 +23,9 @@ class Response:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """The largest values are taken over this long before the end."""
+    """Time before the end over which the largest values are taken."""
     line_periods: int
-    """The lines, over this many whole drive periods before the end: the most that the window holds."""
+    """Whole drive periods before the end over which lines are taken: as many as the window contains."""
     largest_x_m: float
     """Response I of m0, not normalised."""
     largest_p_m: float
@@ -39,9 +39,9 @@ class Response:
     impacts_before: int
     """Contacts that began before the window."""
     line_start_state: Floats
-    """x, y, z, vx, vy, vz where the lines begin, shape (6,)."""
+    """x, y, z, vx, vy, vz at the start of the lines, shape (6,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end, shape (6,): where the next point of a sweep may start."""
+    """x, y, z, vx, vy, vz at the end, shape (6,), to start the next point of a sweep."""
     outcome: Outcome
 
     @property

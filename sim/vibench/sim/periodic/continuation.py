@@ -69,14 +69,14 @@ class ArcPoint:
     is_fold: bool = False
     """The parameter turns here; added between two steps."""
     end: ArcEnd | None = field(default=None)
-    """Why this point is the last; None on all others."""
+    """Reason why this point is the last; None on all others."""
 
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
 """A step corrected in fewer iterations is followed by a longer one."""
 FARTHEST_ASIDE = 0.5
-"""Largest correction relative to the step; a larger one found another branch."""
+"""Largest correction relative to the step; a larger one means another branch."""
 LEAP_GROWTH = 10.0
 """Factor between the lengths tried at a kink."""
 LONGEST_LEAP = 5.0
@@ -85,13 +85,13 @@ LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
 """Tolerance of test functions (a tangent's component, a multiplier's distance)."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
-"""A curve that is followed in steps below this many of the shortest, this many in a row, is at a kink."""
+"""Step length over the shortest, and number of consecutive steps below it, that indicate a kink."""
 NEAR_START = 0.2
-"""A step that passes its start at less than this part of its length is looked at for closing."""
+"""Relative distance from the start below which a step is checked for closing."""
 SAME_POINT = 1e-6
-"""Along the curve: closer than that the start has been met again."""
+"""Distance along the curve below which the start is reached again."""
 SHORTEST_BRACKET = 1e-12
-"""Along the curve: closer than that nothing is distinguished."""
+"""Distance along the curve below which points are not distinguished."""
 
 
 def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
@@ -158,7 +158,7 @@ def trace(
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
-            # Nothing smooth lies between two kinks that are so near: what is to come is not followed.
+            # There is nothing smooth between two kinks so close together: stop here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
@@ -188,7 +188,7 @@ def trace(
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
-    """Take one step, shortened until it holds; gives the point and the next step's length."""
+    """Take one step, shortened until it converges; return the point and the length of the next step."""
     while step >= steps.shortest:
         guess = here.point + step * here.tangent
         point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
@@ -222,10 +222,10 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
 
 
 def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Cross a kink, where a contact begins: the branch goes on, or turns back, within a rounding error.
+    """Cross a kink, where a contact begins and the branch continues or turns back within a rounding error.
 
-    There the unknowns go on growing but the parameter may reverse: step along the tangent so mirrored, or
-    along the tangent itself, by lengths that rise from the shortest, with no limit on the turn.
+    The unknowns continue but the parameter may reverse. So steps follow the tangent, or the tangent with its
+    parameter mirrored, with growing lengths and no limit on the turn.
     """
     mirrored = here.tangent.copy()
     mirrored[-1] = -mirrored[-1]
@@ -250,7 +250,7 @@ def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
 
 
 def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Locate a change of sign of the tangent's parameter component, by as `locate` does."""
+    """Locate a change of sign of the tangent's parameter component, as `locate` does."""
     if before.tangent[-1] * after.tangent[-1] >= 0.0:
         return None
 
@@ -287,7 +287,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois: an end that stays twice counts half, so that both ends close in.
+        # Illinois method: an end that is kept twice counts half, so that both ends move.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
@@ -300,7 +300,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Find the point on the curve at a part of the chord between two; elsewhere where a kink hinders."""
+    """Find the point on the curve at a share of the chord between two; elsewhere if a kink prevents it."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:

@@ -23,9 +23,9 @@ from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""A turning point whose value is this part of its largest term is a double zero."""
+"""Value of a turning point over its largest term, below which it is a double zero."""
 ROOT_TOLERANCE = 1e-15
-"""On ln u, absolute; brentq adds four units in the last place of it."""
+"""Absolute tolerance on ln u; brentq adds four units in its last place."""
 
 
 def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
@@ -53,13 +53,13 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Sum over its largest term: the sign is what counts."""
+    """Return the sum over its largest term; only its sign is used."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
 
 def _bounds(coefficients: Floats, exponents: Floats) -> tuple[float, float]:
-    """Beyond these t the lowest, the highest, power outweighs all others together."""
+    """Return bounds on t, beyond which the lowest or the highest power exceeds all others together."""
     sizes = np.log(np.abs(coefficients)) + np.log(len(coefficients))
     own = np.log(np.abs(coefficients))
     low = np.min((own[0] - sizes[1:]) / (exponents[1:] - exponents[0]))
@@ -112,7 +112,7 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """False on the middle one of three branches, which no experiment shows.
+    """False on the middle one of three branches, which experiments do not show.
 
     Other instabilities are not included; see `vibench.sim.periodic`.
     """

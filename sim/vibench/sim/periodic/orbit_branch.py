@@ -35,13 +35,13 @@ class OrbitFamily:
     mapping: PeriodMap
     path: DrivePath
     reference: Harmonic
-    """The drive by which states are measured."""
+    """Drive that scales states."""
     scale: float
     """Hz, or m, per unit of length."""
 
     @property
     def tolerance(self) -> float:
-        """None, because the flow is exact."""
+        """Return None: the flow is exact."""
         return math.inf
 
     @property
@@ -62,7 +62,7 @@ class OrbitFamily:
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state, own = self.drive_at(point), self.state_at(point), self.scales
-        # The map measures velocities by the drive at the point, this family by one drive throughout.
+        # The map scales velocities by the drive at the point, this family by one drive throughout.
         ratio = state_scales(self.mapping.specimen, drive) / own
         gone = (self.mapping.image(state, drive) - state) / own
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
@@ -104,7 +104,7 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
-    The branch ends at ``stop``, or back at its start's value where it turned round. Pseudo-arclength
+    The branch ends at ``stop``, or back at the value of its start if it turns back. Pseudo-arclength
     continuation (Keller 1977): steps along the curve, so that folds are passed.
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.

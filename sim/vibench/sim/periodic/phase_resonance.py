@@ -1,8 +1,8 @@
 """A mode's phase resonance along the level of the drive, stable or not: its backbone. SI units.
 
-At a phase resonance the fundamental of m0 lags the base by a given angle, a quarter of a period as a rule
-(Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base that shakes by u pushes the motion
-against it by m w^2 u, in phase with u, so that this motion is a quarter of a period behind. Shooting with the
+At a phase resonance the fundamental of m0 lags the base by a given angle, usually a quarter of a period
+(Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u drives the motion relative to
+the base by m w^2 u, in phase with u; so the relative motion lags by a quarter of a period. Shooting with the
 phase as a seventh equation and the frequency as a seventh unknown finds it on any motion; pseudo-arclength
 continuation follows it over the level.
 """
@@ -27,7 +27,7 @@ from .shooting import OrbitShape, PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
-"""A tenth of a decade of level, or a tenth of the gap, a step."""
+"""Step: a tenth of a decade of level, or a tenth of the gap."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
 """A change of the frequency by this share counts as one unit of length."""
@@ -37,7 +37,7 @@ STRAYED = 1e3
 """Largest state of an iteration in gaps; on a hard spring, larger ones would take minutes."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
-"""Step of the differences by which the phase's slopes are taken, over each unknown's scale."""
+"""Step of differences for derivatives of the phase, over each unknown's scale."""
 SCAN_POINTS = 400
 
 

@@ -18,7 +18,7 @@ class RestoringForce(Protocol):
 
     @property
     def length(self) -> float:
-        """Displacement at which the force matters [m]: a gap, or where a power law is fitted."""
+        """Return the length scale of the force [m]: a gap, or the fit displacement of a power law."""
         ...
 
     @property
@@ -157,10 +157,10 @@ class GapSpring:
 
 @dataclass(frozen=True)
 class NoForce:
-    """No spring at all: the linear structure."""
+    """No nonlinear spring: the linear structure."""
 
     length: float = 1.0
-    """Any: nothing happens anywhere."""
+    """Arbitrary length scale."""
 
     @property
     def kinks(self) -> tuple[float, ...]:

@@ -155,7 +155,8 @@ MOST_HALVINGS = 8
 RETURNED = 1e-9
 """Largest closure error of a periodic motion, over the state's scale."""
 FLOW_ERROR = 1e-10
-"""Of a period at reference accuracy, over the state's scale: measured at a tenth of it (docs/accuracy.md)."""
+"""Error of a period at reference accuracy, over the state's scale; the measured one is a tenth
+(docs/accuracy.md)."""
 SAMPLES = 4096
 """Samples of a drive period from which responses are taken."""
 SETTLING_PERIODS = 400
@@ -339,7 +340,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """How far the nearest contact is from beginning or ending, over the gap or the gap times 2 pi f."""
+    """Return the distance of the nearest contact from its start or end, over the gap or gap times 2 pi f."""
     match specimen.contact:
         case NoContact() | PowerLaw():
             return math.inf
@@ -352,7 +353,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
     dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
     nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
     rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
-    # The speed at the sample before each touch.
+    # Speed at the sample before each contact.
     places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
     slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
     return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))
@@ -362,9 +363,9 @@ class PhaseReference(StrEnum):
     """Motion of m0 that defines a phase resonance."""
 
     RELATIVE = "relative"
-    """Against the base: of the lowest mode, and wherever contacts leave little of the motion."""
+    """Relative to the base: for the lowest mode, or where contacts leave little motion."""
     ABSOLUTE = "absolute"
-    """In space: of a mode far above others, where m0 hardly follows the base."""
+    """Absolute: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
         """Return the motion whose phase counts, over that of the base, from m0's displacement over it."""

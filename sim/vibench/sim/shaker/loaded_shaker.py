@@ -29,8 +29,8 @@ STOP_DAMPING_NS_PER_M = 50.0
 class Amplifier:
     """A gain between two first-order band edges, a largest voltage and a largest current.
 
-    As it stands it passes every voltage on: so a table is driven by the voltage recorded at its coil.
-    ValueError when a number is not allowed.
+    The defaults pass every voltage unchanged, for a voltage recorded at the coil. Raises ValueError when a
+    number is not allowed.
     """
 
     gain: float = 1.0
@@ -42,7 +42,7 @@ class Amplifier:
     clip_v: float = math.inf
     """Largest output voltage, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; beyond it the voltage gives way."""
+    """Largest current, peak [A]; the voltage is limited to keep it."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -137,9 +137,9 @@ class ShakenMotion:
     m0_velocity: FloatArray
     """[m/s]"""
     ends: FloatArray
-    """Shape (steps, 9), columns MOTION_COLUMNS, at the ends of the steps; no rows unless asked for."""
+    """Motion at the ends of the steps, shape (steps, 9), columns MOTION_COLUMNS; no rows unless requested."""
     begun: FloatArray
-    """Number of contacts up to the end of each block of steps, shape (blocks,); none unless asked for."""
+    """Number of contacts up to the end of each block of steps, shape (blocks,); empty unless requested."""
 
     @classmethod
     def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
@@ -215,7 +215,7 @@ class LoadedShaker:
 
     @property
     def impacts(self) -> int:
-        """Contacts started since the start."""
+        """Number of contacts since the start."""
         return int(self.structure["impacts"])
 
     @property
@@ -228,9 +228,9 @@ class LoadedShaker:
         self.structure["gain"] = gain
 
     def change_specimen(self, specimen: Specimen) -> None:
-        """Go on with another specimen on the table, its masses where those of the last one are now.
+        """Continue with another specimen in the state of the last one.
 
-        Raises ValueError when it cannot be there.
+        Raises ValueError when the state is not possible for it.
         """
         self._place(specimen, np.array(self.structure["specimen"]["motion"]))
 
@@ -254,9 +254,9 @@ class LoadedShaker:
         noise_v
             Added at the amplifier's output [V], shape (steps,).
         end_rows
-            For how many steps, counted from the first, the state at their ends is kept.
+            Number of first steps for which the state at the end is kept.
         block
-            Steps of a block, at the end of which the number of contacts is kept; 0 for none.
+            Steps of a block for counting contacts; 0 for none.
         """
         drive, motion = (
             np.ascontiguousarray(drive_v, np.float64),
@@ -268,7 +268,7 @@ class LoadedShaker:
         return motion
 
     def move_into(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Advance like `move`, into arrays that are there."""
+        """Advance like `move`, into given arrays."""
         self.prepare(motion, drive_v, noise_v)
         self.account(native_engine().call("move_shaker", self.structure), len(drive_v))
 
@@ -286,7 +286,7 @@ class LoadedShaker:
         )
 
     def account(self, good: int, count: int) -> None:
-        """Raise MotionFailed when only ``good`` steps of a stretch could be done."""
+        """Raise MotionFailed if only ``good`` steps of a stretch were completed."""
         if good < count:
             msg = (
                 f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "

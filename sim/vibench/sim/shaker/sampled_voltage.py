@@ -1,7 +1,7 @@
-"""Rig and specimen moved together by a voltage that was sampled: base and m0 on the same grid of samples.
+"""Motion of shaker and specimen under a sampled voltage: base and m0 on the same grid of samples.
 
-The voltage is brought to the steps of a `LoadedShaker` and its motion back to the samples as band-limited
-signals (Shannon), piece by piece, so that a recording of any length fits in memory. SI units.
+The voltage is resampled to the steps of a `LoadedShaker`, and the motion back to the samples, as band-limited
+signals (Shannon). This is done piece by piece, so that a recording of any length fits in memory. SI units.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,11 +22,11 @@ Gain = Callable[[FloatArray], ComplexArray]
 """Complex gain of a sensor over frequency [Hz], shape kept."""
 
 FINEST_STEP_HZ = 5e4
-"""The steps are at least this many a second: 600 Hz then errs by 5e-4 of the specimen's push on the table."""
+"""Fewest steps per second; the specimen's force on the table then has an error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""Part of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
+"""End of the pass band over the sample rate; a cosine edge follows up to half the rate, as in a converter."""
 _MARGIN = 2048
-"""Samples on either side of a piece: the filters' memory beyond is below 1e-8."""
+"""Margin of samples on each side of a piece: the filters' memory beyond is below 1e-8."""
 _PIECE = 1 << 15
 """Samples that are filtered together."""
 _BLOCK_S = 0.02
@@ -43,13 +43,13 @@ class DrivenTable:
     """Amplifier, shaker, specimen and sensors under a voltage."""
 
     amplifier: Amplifier
-    """Without parameters if the voltage is at the coil."""
+    """Amplifier; the default if the voltage is at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
-    """Sensor of the channel that shows the base's acceleration."""
+    """Sensor of the base acceleration."""
     m0_sensor: Gain = identity
-    """Sensor of the channel that shows m0's velocity; a delay is a phase that falls."""
+    """Sensor of m0's velocity; a delay is a falling phase."""
     base_low_cut_hz: float = 0.0
     """-3 dB of the coupling of the base's channel, first order; 0 where direct voltage passes."""
 
@@ -65,7 +65,7 @@ class SampledMotion:
     impact_times_s: FloatArray
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
     impacts: FloatArray
-    """Contacts started up to them, shape (blocks + 1,)."""
+    """Number of contacts up to these, shape (blocks + 1,)."""
 
 
 def follow_voltage(
@@ -121,10 +121,9 @@ def follow_voltage(
 
 
 class _Resampling:
-    """Brings samples to steps, and means over steps to samples behind a sensor and a converter.
+    """Resamples samples to steps, and means over steps to samples behind a sensor and a converter.
 
-    Means lie half a step behind the voltage that was brought to the steps, and are read there: both
-    shifts cancel.
+    Means lie half a step after the resampled voltage and are evaluated there: both shifts cancel.
     """
 
     def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:

@@ -32,7 +32,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
-    """Turn a model's name, ``hertz`` or ``rigid:0.8`` for example, into its law.
+    """Return the contact law of a model's name, for example ``hertz`` or ``rigid:0.8``.
 
     Raises ValueError when the name is not one of the forms, or its numbers are not allowed.
 

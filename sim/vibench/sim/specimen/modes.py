@@ -39,8 +39,6 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping. Raises ValueError when a frequency
     is negative or not finite.
 
-    Raises ValueError when a frequency is negative or not finite.
-
     Parameters
     ----------
     specimen

@@ -149,7 +149,7 @@ class SpecimenDescription(_Described):
     sources: dict[str, str] = Field(default={})
     """Source of each number, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
-    """Value of a table that does not state it."""
+    """Default value of a table."""
 
     def __hash__(self) -> int:
         # A table of sources has no hash; its text contains all of it.
@@ -190,7 +190,7 @@ class SpecimenDescription(_Described):
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
-        """Write an infinite clearance as a word, because JSON has no infinite numbers."""
+        """Return an infinite clearance as a word, because JSON has no infinite numbers."""
         if isinstance(gap_m, float):
             return gap_m
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]

@@ -1,4 +1,4 @@
-"""Read TOML files, and describe what is wrong in one sentence."""
+"""Read TOML files, and describe errors in one sentence."""
 
 import re
 import tomllib
@@ -28,9 +28,7 @@ def toml_table(path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise UnreadableTomlError(f"{path}: is not valid TOML: {error}; correct that line") from error
     except RecursionError as error:
-        raise UnreadableTomlError(
-            f"{path}: holds lists or tables within each other, too many to be read; write them side by side"
-        ) from error
+        raise UnreadableTomlError(f"{path}: lists or tables are nested too deeply; flatten them") from error
 
 
 _ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")

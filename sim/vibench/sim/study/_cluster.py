@@ -38,8 +38,8 @@ def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
 class ClusterExecutor:
     """The workers behind a Dask scheduler.
 
-    Raises ClusterLost when nobody answers at the address, no worker comes, or a worker has no vibench or
-    another one.
+    Raises ClusterLost if the scheduler does not answer, there is no worker, or a worker has no or another
+    vibench.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class ClusterExecutor:
         return ()
 
     def close(self) -> None:
-        """Cancel, and leave the cluster to itself."""
+        """Cancel all work and disconnect from the cluster."""
         self.cancel()
         self._client.close()
 
@@ -131,7 +131,7 @@ class ClusterExecutor:
         return Reply(bundle, solved)
 
     def _is_in_contact(self) -> bool:
-        """Whether the scheduler answers; a client that has given up is an error."""
+        """Return whether the scheduler answers; raise ClusterLost if the client has given up."""
         if self._client.status in (RUNNING, CONNECTING):
             return bool(self._client.status == RUNNING)
         raise ClusterLost(
@@ -159,7 +159,7 @@ def _connect(address: str, patience_s: float) -> Client:
 
 
 def _require_workers(client: Client, address: str, patience_s: float) -> None:
-    """Refuse a cluster without workers, or with workers that would compute something else."""
+    """Refuse a cluster without workers, or with workers that have other software."""
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except OSError as error:

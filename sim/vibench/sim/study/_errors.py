@@ -2,12 +2,12 @@
 
 
 class StudyError(Exception):
-    """A study cannot be run, kept, resumed or opened; the text is one sentence for the person who asked."""
+    """A study cannot be run, stored, resumed or opened; the text is one sentence for the user."""
 
 
 class InvalidStudy(StudyError, ValueError):
-    """A study asks for something that is not allowed; nothing was computed."""
+    """A study is not allowed; nothing was computed."""
 
 
 class ClusterLost(StudyError, ConnectionError):
-    """The cluster cannot be reached, or is gone; what was kept before is kept."""
+    """The cluster cannot be reached or was lost; stored results are kept."""

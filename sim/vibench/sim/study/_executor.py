@@ -26,7 +26,7 @@ class Bundle:
     """Scenes sent together, to reduce overhead for short ones."""
 
     numbers: tuple[int, ...]
-    """Their points of the study."""
+    """Points of the study, one per scene."""
     scenes: tuple[Scene, ...]
 
 
@@ -36,7 +36,7 @@ class Reply:
 
     bundle: Bundle
     solved: tuple[Solved, ...]
-    """One for each scene, in order; fewer when it was cancelled or failed on the way."""
+    """Results of the scenes in order; fewer after a cancellation or an error."""
     error: BaseException | None = None
     """Error, if there are fewer."""
 
@@ -75,10 +75,9 @@ _solved_before: set[Kind] = set()
 
 
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
-    """Solve scenes, in batches or one by one, and say what each cost this thread.
+    """Solve scenes, in batches or one by one; return each with its processor time.
 
-    What they cost is learnt. A scene that begins before one of its kind has ended may have loaded modules and
-    made tables: its time says nothing.
+    Times are learnt. The first scenes of a kind may load modules and create tables; their times are not used.
     """
     for group in [scenes] if isinstance(solver, InBatches) else [[scene] for scene in scenes]:
         kinds: list[Kind] = [
@@ -91,7 +90,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
             found = [_solve_and_time(group[0], solver)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
-            # To plan a closed form takes about as long as to evaluate it.
+            # Planning a closed form takes about as long as evaluating it.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
             yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)
@@ -138,7 +137,7 @@ class ThreadExecutor:
         future.add_done_callback(partial(self._note, bundle, solved))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return what has come back."""
+        """Return the finished bundles."""
         return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:

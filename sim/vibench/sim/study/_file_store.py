@@ -3,8 +3,8 @@
 Order of a commit: cells -> sync -> states -> sync. If process or power end at any moment, a point with the
 state done has all its cells.
 
-The file is created with all known facts and space for all results. Afterwards only bytes at known places
-are written; HDF5 has closed the file, so that no crash can leave it inconsistent.
+HDF5 creates the file with all metadata and space for all results, then closes it. Afterwards only bytes at
+known offsets are written, so that no crash can leave the file inconsistent.
 """
 
 import shutil
@@ -41,7 +41,7 @@ _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 
 
 def sole_writer(path: Path) -> OpenFile:
-    """Open a file to write, and mark it so for as long as it is open.
+    """Open a file for writing, locked while it is open.
 
     Readers have the file open only briefly. Raises StudyError when another process has it open for longer,
     as a writer does, or it cannot be opened.
@@ -79,7 +79,7 @@ _COMPONENTS = {
         ),
     )
 }
-"""What the components of a column are, where that is more than their number."""
+"""Meaning of the components of a column."""
 HEAD_BYTES = 2_000_000
 """Upper bound of the size of sessions, axes and attributes."""
 
@@ -189,7 +189,7 @@ def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dat
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
-    """Attach scalars, text as UTF-8 of fixed length, which old readers understand."""
+    """Set attributes, text as UTF-8 of fixed length, which old readers understand."""
     for name, value in values.items():
         match value:
             case str():
@@ -215,7 +215,7 @@ class FileStore:
             _require_same(path, read_plan(path, type(plan)), plan)
             self._places = places_of(path, plan)
             self.arrays = read_arrays(path, plan)
-            """Everything kept so far."""
+            """Stored results so far."""
         except BaseException:
             self._disk.close()
             raise
@@ -228,7 +228,7 @@ class FileStore:
         return cls(path, plan)
 
     def begin(self, executor: str) -> None:
-        """Note moment, software and executor in the next row of sessions."""
+        """Record time, software and executor in the next row of sessions."""
         self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for column, text in zip(layout.SESSION_COLUMNS, texts, strict=True):
@@ -256,7 +256,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Fill in many points that are not computed, as whole columns in a safe order."""
+        """Store filled-in points as whole columns, in a safe order."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())
@@ -309,7 +309,7 @@ SHOWN = 60
 
 
 def _difference(name: str, kept: GridPlan, asked: GridPlan) -> str:
-    """Return how one field of two plans differs; of long lists, where they begin to."""
+    """Return how one field of two plans differs; for long lists, the first difference."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
     match there, here:
         case [*some], [*others]:

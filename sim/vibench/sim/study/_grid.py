@@ -57,9 +57,9 @@ SESSION_COLUMNS = (
     TextColumn("software_json", 512),
     TextColumn("executor", 160),
 )
-"""A session is one go at a study: the first, and every resumption."""
+"""Number of sessions; a session is the first run of a study or a resumption."""
 MOST_SESSIONS = 1024
-"""What is resumed more often notes its further sessions in the last row."""
+"""Row of all further sessions."""
 
 
 Cell = float | int | bytes | tuple[float, ...]
@@ -71,10 +71,10 @@ COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
 MOST_FOUND = 8
-"""Motions of an ensemble that have a place; of more, those with the largest shares."""
+"""Number of stored motions of an ensemble: those with the largest shares."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
-"""Kept of a text; longer ones are cut."""
+"""Longest stored text; longer ones are cut."""
 
 TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
 CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
@@ -94,13 +94,13 @@ class Column:
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """More than one: with another axis at the end."""
+    """Number of components; above one, there is another axis at the end."""
     along: str = COORDINATE
     """Name of that axis."""
 
     @property
     def missing(self) -> float | int | bytes:
-        """What stands for nothing."""
+        """Return the value that marks a missing one."""
         match self.dtype[:2]:
             case "<f":
                 return math.nan
@@ -218,7 +218,7 @@ class Grid:
 
     shape: tuple[int, ...]
     is_ordered: tuple[bool, ...]
-    """Whether points side by side along an axis are alike: frequencies are, models are not."""
+    """Whether neighbours along each axis are similar: frequencies are, models are not."""
 
     @property
     def size(self) -> int:
@@ -308,6 +308,6 @@ class GridPlan(FrozenModel, ABC):
                 raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")
 
     def differences(self, other: Self) -> tuple[str, ...]:
-        """Names of what differs between two plans."""
+        """Return the names of the fields that differ between two plans."""
         mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
         return tuple(name for name in mine if mine[name] != theirs[name])

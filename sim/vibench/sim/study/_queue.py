@@ -23,14 +23,14 @@ from ._store import Arrays, PointAnswer, Store, is_failed, states
 # How long each point of a study will take: first as planned, then as its neighbours took.
 
 SHORTEST_S = 1e-6
-"""Least time of a point, which keeps ratios finite."""
+"""Shortest time of a point, to keep ratios finite."""
 
 
 class Costs:
     """Estimates of times, improved by finished points.
 
-    A run costs about 4 us an impact, and neighbours strike about as often: once a neighbour's time is
-    known, it says more than any plan.
+    A run takes about 4 us per impact, and neighbours have similar numbers of impacts: the time of a neighbour
+    is a better estimate than any plan.
     """
 
     def __init__(self, grid: Grid, planned_s: Floats) -> None:
@@ -41,7 +41,7 @@ class Costs:
         self._is_informed = np.zeros(grid.size, dtype=np.bool_)
 
     def estimate_s(self, number: int) -> float:
-        """Time that a point is expected to take on one worker."""
+        """Return the expected time of a point on one worker [s]."""
         return float(self._estimate_s[number])
 
     def learn(self, number: int, taken_s: float) -> Iterator[int]:
@@ -55,9 +55,9 @@ class Costs:
                 yield each
 
     def left_s(self, is_missing: NDArray[np.bool_]) -> float:
-        """Worker time of the points that are missing, shape (points,).
+        """Return the worker time of missing points, shape (points,) [s].
 
-        Plans that no neighbour has corrected are scaled by how far plans have been off so far.
+        Plans without a finished neighbour are scaled by the ratio of actual to planned times so far.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
@@ -189,7 +189,7 @@ class PointScheduler:
 
 
 MOST_IN_BUNDLE = 64
-"""Answers that may be lost together with their worker."""
+"""Most results that may be lost with their worker."""
 SHARE = 8
 """Largest bundle relative to the remaining work per worker, so that all end together."""
 QUEUED_PER_SLOT = 2

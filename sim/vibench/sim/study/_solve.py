@@ -69,17 +69,18 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     if continued:
         content["start"] = {"continues": continued}
         del content["drive"]["phase_rad"]
-    # Python writes floats with as many digits as tell them apart, and infinity as a word.
+    # Python writes floats with the shortest exact digits, and infinity as a word.
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
 
 
 PLANNED = 2000
-"""Points that are planned one by one; of a larger study every so manyth, for all up to the next."""
+"""Most points that are planned individually; in a larger study, every n-th point stands for those up to the
+next."""
 
 
 def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
-    """Return whom each point continues, or NOBODY, shape (points,); ``starts`` are the last axis but one."""
+    """Return the point that each point continues, or NOBODY, shape (points,)."""
     blocks = np.full(grid.shape, NOBODY)
     numbers = np.arange(grid.size).reshape(grid.shape)
     for index, start in enumerate(starts):
@@ -114,7 +115,7 @@ def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
 
 
 def failed_point(number: int, error: BaseException) -> PointAnswer:
-    """Return what is kept of scene ``number`` that ended in ``error``: a refusal is a sentence by itself."""
+    """Return the stored result of scene ``number`` that ended in ``error``."""
     match error:
         case ValueError():
             said = str(error)
@@ -124,8 +125,8 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster; and that of
-scenes that fill the lanes."""
+"""Worker time of a bundle, worth a few milliseconds of transfer on a cluster; and of a bundle that fills the
+SIMD lanes."""
 
 
 class Expansion:
@@ -139,12 +140,12 @@ class Expansion:
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
-        """Point that each one continues, or NOBODY, shape (points,)."""
+        """Return the point that each point continues, or NOBODY, shape (points,)."""
         return predecessors(self.grid, self._study.starts)
 
     @cached_property
     def planned_s(self) -> Floats:
-        """Time that each point is planned to take, shape (points,)."""
+        """Return the planned time of each point, shape (points,)."""
         return planned_times(self.grid, self._planned)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
@@ -152,10 +153,10 @@ class Expansion:
         return np.arange(len(arrays[FINAL_STATE]))
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
-        """Make the scene of a point whose predecessor, if it has one, is done.
+        """Return the scene of a point whose predecessor, if any, is done.
 
-        A point whose predecessor ended in no finite state begins at rest; its ``continues`` says so. Raises
-        ValueError when a scene of these numbers is not allowed.
+        If the predecessor has no finite final state, the point begins at rest, and its ``continues`` says so.
+        Raises ValueError when a scene of these numbers is not allowed.
         """
         before = self._predecessor(number, arrays)
         if before == NOBODY:
@@ -167,18 +168,18 @@ class Expansion:
         return self._study.scene(self.grid.place(number), start, self._end_phase(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return what is kept of a prediction."""
+        """Return the stored results of a prediction."""
         is_at_end = solved.prediction.outcome == Outcome.REACHED_END
         cells = {**cells_of(solved.prediction), **self._origin(number, scene, arrays), TAKEN: solved.taken_s}
         state = PointState.DONE if is_at_end else PointState.STOPPED
         return PointAnswer(number, state, cells, solved.taken_s)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return what is kept of a scene that could not be computed."""
+        """Return the stored results of a failed scene."""
         return failed_point(number, error)
 
     def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
-        """Return where a point began, and which scene it is."""
+        """Return the start and the identity of a point's scene."""
         before = self._predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
         return {
@@ -205,7 +206,7 @@ class Expansion:
                 return self._study.scene(place, Rest())
 
     def _planned(self, number: int) -> float:
-        """Planned time of a point; none when its scene is not allowed, which its answer will say."""
+        """Return the planned time of a point; 0 if its scene is not allowed."""
         try:
             return expected_cost_s(self.unchained(number), self._solver)
         except ValueError:
@@ -213,9 +214,9 @@ class Expansion:
 
 
 def planned_work_s(study: Study) -> float:
-    """Time that all points of a study together are planned to take on one core [s].
+    """Return the planned time of all points of a study on one core [s].
 
-    None is run, except a pilot of about a second where points have a target.
+    No point is run, except in a pilot of about a second where points have a target.
 
     >>> from vibench.sim.study import Study
     >>> study = Study(frequencies_hz=(200.0, 260.0), amplitudes_m=(1e-6,))
@@ -249,29 +250,28 @@ def solve_study(
 ) -> StudyResults:
     """Compute a study, or the missing part of its file.
 
-    Raises StudyError in one sentence: a file of another study, a cluster that does not answer, a full disk,
-    ...
+    Raises StudyError, for example for a file of another study, a full disk or a cluster that does not answer.
 
     Parameters
     ----------
     study
-        What is asked for.
+        Requested study.
     out
-        The file that keeps the answers, ``NAME.h5``; in memory alone when None.
+        File for the results, ``NAME.h5``; in memory only when None.
     existing
-        Whether a file that is there is refused or resumed. Resuming computes what is missing; a file that
-        is not there is started.
+        Whether an existing file is refused or resumed. Resuming computes the missing points; a missing file
+        is created.
     workers
-        Threads of this process; one for each processor when None.
+        Number of threads; one per processor when None.
     cluster
         Address of a Dask scheduler, whose workers compute instead.
     observer, cancelled
-        Told, and asked, in the calling thread.
+        Called in the calling thread.
 
     Returns
     -------
     StudyResults
-        Complete, or what there was when it was cancelled.
+        Complete, or partial if cancelled.
     """
     solver = study_solver(study)
     with executor_of(workers, cluster, solver) as executor, store_of(study, out, existing) as store:
@@ -320,21 +320,19 @@ def run_study(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute every point that the store misses, longest first.
+    """Compute every point that is missing in the store, longest first.
 
-    The answers do not depend on the executor or on the order: each scene is computed alone, and a point
-    that continues another waits for it. An error in one scene is that point's answer. Raises StudyError
-    when the store or the executor fails; what was kept before is kept.
-
-    Raises StudyError when the store or the executor fails; what was kept before is kept.
+    Results do not depend on the executor or the order: scenes are independent, and a point that continues
+    another waits for it. An error in a scene becomes the result of that point. Raises StudyError when the
+    store or the executor fails; what was kept before is kept.
 
     Parameters
     ----------
     study, executor, store
-        What is asked, who computes, and where it is kept.
+        Study, executor of its scenes, and store of the results.
     observer
-        Told of every answer.
+        Called after every result.
     cancelled
-        Asked between answers whether to end.
+        Called between results; True ends the run.
     """
     return run_points(Expansion(study), executor, store, observer, cancelled)

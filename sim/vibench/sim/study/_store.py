@@ -47,7 +47,7 @@ class PointAnswer:
     number: int
     state: PointState
     cells: dict[str, Cell]
-    """Values by column; absent ones stay missing."""
+    """Values by column; others stay missing."""
     taken_s: float = math.nan
     """Processor time, where it is known."""
 
@@ -78,7 +78,7 @@ def _shape(column: Column, grid: Grid) -> tuple[int, ...]:
 
 
 def is_failed(state: NDArray[np.uint8] | PointState) -> NDArray[np.bool_]:
-    """Whether there is an error for an answer, or a run that did not reach its end."""
+    """Return whether there is an error instead of a result, or the run did not reach its end."""
     return np.isin(state, (PointState.STOPPED, PointState.FAILED))
 
 
@@ -92,16 +92,16 @@ class Store(Protocol):
 
     @property
     def arrays(self) -> Arrays:
-        """Everything kept so far; not to be written to."""
+        """Stored results so far; read-only."""
 
     def begin(self, executor: str) -> None:
-        """Note that a session begins, and who computes in it."""
+        """Record the start of a session and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Store answers safely before returning."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Fill in many points that are not computed, by column; their state says so."""
+        """Store filled-in points, by column; their state says so."""
 
 
 class MemoryStore:
@@ -200,7 +200,7 @@ def prediction_at(
     accuracy: Accuracy | AccuracyWord,
     start: str,
 ) -> ScenePrediction:
-    """Make the prediction of a point from its cells and from what the study says of it.
+    """Return the prediction of a point from its cells and from the study.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def prediction_at(
     number
         Which point.
     frequency_hz, amplitude_m, accuracy, start
-        What the study asked there.
+        Values of the study at this point.
     """
     numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
     x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))

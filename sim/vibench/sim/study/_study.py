@@ -26,7 +26,7 @@ from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_sp
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
-"""Values of all ranges together; more is a slip of the pen."""
+"""Most values of all ranges together; more is probably a mistake."""
 WHOLE = 1e-9
 """A range this close to a whole number of steps includes its stop."""
 
@@ -84,7 +84,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 MOST_POINTS = 10_000_000
 """Most points: a file of 2 GB."""
 AS_DESCRIBED = "as described"
-"""The one label of an axis that leaves to the specimen what a single number cannot say."""
+"""Label of an axis whose values only the specimen defines."""
 
 
 class Start(StrEnum):
@@ -98,10 +98,10 @@ class Start(StrEnum):
 
 
 class GivenStart(FrozenModel):
-    """A state of one's own, for every point the same."""
+    """A given state, the same for every point."""
 
     label: Annotated[str, Field(min_length=1, max_length=60)]
-    """How the start is called in the file and in results."""
+    """Name of the start in the file and in results."""
     state: tuple[float, float, float, float, float, float]
     """x, y, z, vx, vy, vz [m, m/s]."""
 
@@ -156,7 +156,7 @@ AXES_OF_SPECIMEN = 3
 
 
 class Study(GridPlan):
-    """What is to be predicted, completely: two equal studies have equal answers."""
+    """Complete request for predictions: equal studies have equal results."""
 
     called: ClassVar[str] = "study"
     format: ClassVar[str] = FORMAT
@@ -176,21 +176,23 @@ class Study(GridPlan):
     gaps_m: Annotated[Positive | None, Field(default_factory=_own_gap)]
     """Clearance at both stops; as the specimen has it when absent."""
     starts: Annotated[tuple[Start | GivenStart, ...], Field(min_length=1)] = (Start.REST,)
-    """Where each point begins: the state that is reached may depend on it."""
+    """Start of each point; the motion that is reached may depend on it."""
     observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
-    """What is looked at; sections and spectra, whose lengths differ, are asked of one scene at a time."""
+    """Observed quantities; sections and spectra, whose lengths differ, are only available for single
+    scenes."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of every point."""
     duration_s: PositiveFloat | Literal["auto"] = 30.0
     """Length of each run; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
-    """Length of the end of the run that is observed."""
+    """Length of the observed end of the run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Processor time a point for other starts, where the start is forgotten, and for following chaos on."""
+    """Processor time per point for other starts (with sensitive dependence on the start) and for following
+    chaos further."""
     error: TargetError | None = None
-    """Relative error that each point is to reach, 0.01 or "1 %"; accuracy, duration and budget follow."""
+    """Requested relative error of each point, 0.01 or "1 %"; sets accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Time in which each point is answered as exactly as possible, 2 or "2 s"; a minute when absent."""
+    """Time limit per point, 2 or "2 s"; one minute by default."""
 
     @model_validator(mode="after")
     def _target_stands_alone(self) -> Self:
@@ -240,11 +242,11 @@ class Study(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """What is kept of each point."""
+        """Stored columns of each point."""
         return COLUMNS
 
     def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
-        """Make the scene at a place of the grid.
+        """Return the scene at a place of the grid.
 
         Raises ValueError when a scene of these numbers is not allowed.
         """
@@ -266,7 +268,7 @@ class Study(GridPlan):
 
     @property
     def target(self) -> Target | None:
-        """Of every point; None where neither an error nor a time was given."""
+        """Return the target of each point; None without an error and a time."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @property
@@ -280,7 +282,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis of numbers, or of the one label of what only the specimen says."""
+    """Return an axis of numbers, or of the label for values that only the specimen defines."""
     return (
         StudyAxis(name, (AS_DESCRIBED,), "", long_name)
         if values is None
@@ -294,15 +296,14 @@ def continued_from(frequency_hz: float) -> str:
 
 
 OTHER_STARTS = 8
-"""What a point counts for whose start may be forgotten: then this many are followed at least."""
+"""Scenes that a point counts for if it may depend sensitively on its start: the fewest starts."""
 
 
 def study_solver(study: Study) -> Solver:
-    """Choose what computes the points of a study: batches, or one point after the other.
+    """Choose the solver of a study: batches, or one point after the other.
 
-    Batches follow motions that do not wait for each other, and pay where a processor has the registers and a
-    specimen is moved for long enough. What they cannot follow (other stops than Hertz's, accuracy
-    *reference*) goes one by one either way.
+    Batches need independent motions, a processor with wide registers and enough motion per specimen. Stops
+    other than Hertz's and accuracy *reference* are solved one by one.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
@@ -312,14 +313,15 @@ def study_solver(study: Study) -> Solver:
 
 
 MOST_GAPS = 1000.0
-"""A base that moves by more gaps was hardly meant: 45 mm at the paper's gap, past any shaker's stroke."""
+"""Base amplitude in gaps above which a warning is due: 45 mm at the paper's gap exceeds the stroke of any
+shaker."""
 WIDEST_M = 0.1
-"""A wider clearance was hardly meant: a specimen on a shaker is not much larger."""
+"""Clearance above which a warning is due: a specimen on a shaker is hardly larger."""
 _MICRO = 1e-6
 
 
 def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
-    """Yield what looks wrong in base amplitudes and gaps, infinite without a stop; it can be computed."""
+    """Yield warnings of implausible base amplitudes and gaps (infinite without a stop)."""
     gaps_m = tuple(gaps_m)
     largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)
     if largest_m > MOST_GAPS * narrowest_m:
