@@ -107,8 +107,8 @@ CLOCK_PPM = Bounds(20.0, inf)
 """Drift [ppm] of the ratio of two clocks: oscillators age by some ppm a year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
-    "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying "
-    "amplifier; if you have changed something that does not stand there, check it once as a new reference "
+    "the configuration has not changed: look for a changed knob, a cable, a loose sensor or a failing "
+    "amplifier; if you changed something that is not in the configuration, check once as a new reference "
     "(menu Test, or vibench bench check --new-reference)"
 )
 

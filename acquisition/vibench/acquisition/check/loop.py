@@ -90,9 +90,9 @@ DETECTED = 10.0
 """Least ratio of the sine to its uncertainty for detection."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
-"""Deviation of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
+"""Phase deviation of a channel from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""The same for m0, without FAIL, because a specimen is known less well than a shaker."""
+"""The same for m0, without FAIL, because the specimen is less well known than the shaker."""
 LEFT_OVER = Bounds(0.02, 0.05)
 """Largest remaining share of the drive with the output off."""
 
@@ -104,7 +104,7 @@ DRIVE_LEFT = "drive left after stop"
 
 
 def hears_name(role: Role) -> str:
-    """Name the finding on whether a channel hears the sine."""
+    """Return the name of the finding on whether a channel detects the sine."""
     return f"{role.value} hears the sine"
 
 
@@ -248,7 +248,7 @@ class LoopCheck:
         return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
 
     def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
-        """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
+        """Compare a channel's phase relative to the drive with the model's: 180 degrees mean a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]

@@ -58,7 +58,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Unknown = BeforeValidator(_unknown_as_none)
 """Number that is NaN in the file if unknown."""
 Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
-"""From a sample in a fortnight to a terahertz [1/s]."""
+"""Allowed sample rates: from one sample in two weeks to a terahertz [1/s]."""
 
 
 class _AbstractFacts(BaseModel):
@@ -155,7 +155,7 @@ def json_object(text: str) -> dict[str, Any]:
     try:
         value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except RecursionError as error:
-        raise ValueError("its lists and objects lie too deep in one another") from error
+        raise ValueError("its lists and objects are nested too deeply") from error
     if not isinstance(value, dict):
         raise ValueError(f"it is a JSON {type(value).__name__}, and an object is needed")  # noqa: TRY004
     if _is_deeper(value, DEEPEST_JSON):

@@ -1,4 +1,4 @@
-"""Write at known places of a file in a known order, on a disk that may be full or lose power."""
+"""Write at known offsets of a file in a known order, on a disk that may be full or lose power."""
 
 import errno
 import os
@@ -18,7 +18,7 @@ class Disk(Protocol):
     """File operations of the committer."""
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Put ``data`` at ``offset``, in the system's cache at least."""
+        """Write ``data`` at ``offset``, at least into the cache of the system."""
 
     def sync(self) -> None:
         """Return when everything written so far would survive a power cut."""
@@ -128,7 +128,7 @@ class TroubledDisk:
         self._trouble = trouble
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Put ``data`` at ``offset``."""
+        """Write ``data`` at ``offset``."""
         self._trouble.meet()
         self._disk.write(offset, data)
 

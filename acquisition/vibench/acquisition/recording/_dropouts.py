@@ -133,11 +133,11 @@ def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dro
     Parameters
     ----------
     velocity
-        Shape (samples,), of a channel that goes on.
+        Velocity of a channel that continues, shape (samples,).
     sample_rate_hz
-        Of the samples.
+        Sample rate.
     dropouts
-        Those found in it.
+        Drop-outs found in it.
     """
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
         return velocity.size
@@ -159,15 +159,15 @@ def _corners(velocity: Samples) -> tuple[Samples, float]:
 
 
 def _apart(places: Places, distance: float) -> list[Places]:
-    """Split where neighbours are farther apart."""
+    """Split numbers where neighbours are farther apart."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
     """Explain all of these runs of sharp corners by drop-outs, or none of them.
 
-    By the fewest, and of those by the ones about which the motion is smoothest: between the edges of two a
-    dark level looks like a motion as well.
+    The fewest drop-outs are chosen, then those with the smoothest motion around them: the constant level
+    between two drop-outs can also look like motion.
     """
     ends = [0, *(each.stop for each in runs)]
     begins = [*(each.first for each in runs), velocity.size]
@@ -176,10 +176,10 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
         ways = []
         for first, so_far in enumerate(best):
             one = Dropout(begins[first], ends[last])
-            # What is next to it is no motion to compare with.
+            # The neighbouring samples are not motion to compare with.
             before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
             is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
-            is_short = one.stop - one.first <= longest + flank  # with what rings on both sides
+            is_short = one.stop - one.first <= longest + flank  # with ringing on both sides
             if so_far is not None and is_alone and is_short:
                 rough = _roughness(velocity, one, before, after)
                 if rough < np.inf:
@@ -243,7 +243,7 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
 
 
 def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
-    """Yield begin and end of drop-outs that lie close together, and where the next begin."""
+    """Yield begin and end of each group of close drop-outs, and the begin of the next group."""
     groups: list[list[Dropout]] = []
     for each in dropouts:
         is_near = groups and each.first - groups[-1][-1].stop < _CONTEXT

@@ -27,7 +27,7 @@ class Steadiness(StrEnum):
 
 
 class Held(StrEnum):
-    """Whether a level was held."""
+    """Whether a level was reached."""
 
     WITHIN = "within tolerance"
     OUTSIDE = "outside tolerance"
@@ -48,7 +48,7 @@ class JumpSearchEnd(StrEnum):
     STEEP = "steep, but no jump"
     BRANCH_LOST = "its branch was not found again"
     OUT_OF_TIME = "the time for the search was over"
-    ELSEWHERE = "the motion jumped somewhere else each time"
+    ELSEWHERE = "the motion jumped elsewhere each time"
 
 
 class LockResult(StrEnum):
@@ -80,12 +80,12 @@ class AbstractNote(BaseModel):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What was said, as JSON can hold it."""
+        """Return its values as JSON types."""
         return self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
     @property
     def text(self) -> str:
-        """The event's text."""
+        """Return the text of the event."""
         return json.dumps(self.numbers)
 
 
@@ -124,7 +124,7 @@ class SegmentNote(AbstractNote):
 
 
 class DwellNote(AbstractNote):
-    """How often the level was off over a dwell."""
+    """Share of a dwell in which the level was off."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.DWELL]
@@ -133,7 +133,7 @@ class DwellNote(AbstractNote):
 
 
 class SweepNote(AbstractNote):
-    """How often the level was off over a sweep."""
+    """Share of a sweep in which the level was off."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.SWEEP]
@@ -143,7 +143,7 @@ class SweepNote(AbstractNote):
 
 
 class LevelNote(AbstractNote):
-    """The level over one look of a dwell."""
+    """Level over one check of a dwell."""
 
     kind: Literal["level"] = "level"
     at_s: SixFigures
@@ -207,9 +207,9 @@ class ResonanceNote(AbstractNote):
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
-    """Harmonic of m0, whose phase counts: above 1 the resonance is a superharmonic one."""
+    """Harmonic of m0 whose phase is used: above 1 the resonance is superharmonic."""
     subharmonic: int = 1
-    """Drives in a period of m0: above 1 the resonance is a subharmonic one."""
+    """Drive periods in one period of m0: above 1 the resonance is subharmonic."""
     harmonic_m: SixFigures | None = None
     """Amplitude of that harmonic, or subharmonic [m]."""
 
@@ -221,9 +221,9 @@ class NoiseNote(AbstractNote):
     realisation: int
     """Its number; -1 while it is equalised."""
     base_rms: SixFigures
-    """Over the band [m/s2]."""
+    """Level over the band [m/s2]."""
     asked_rms: SixFigures
-    """At full level, where it was notched as it was [m/s2]."""
+    """Level over the band at full level, with the notches used [m/s2]."""
     within: SixFigures
     """Share of the lines within the plan's tolerance of the level of this realisation."""
     worst_db: SixFigures
@@ -265,7 +265,8 @@ class BranchPointNote(AbstractNote):
     frequency_hz: SixFigures
     base_m: SixFigures
     base_u_m: SixFigures = 0.0
-    """Standard uncertainty by the scatter of what it is the mean of; 0 where a recording does not say."""
+    """Standard uncertainty from the scatter of the averaged values; 0 if the recording does not contain
+    it."""
     m0_m: SixFigures
     m0_u_m: SixFigures = 0.0
     phase_deg: SixFigures
@@ -296,13 +297,13 @@ class BranchStabilityNote(AbstractNote):
     """Point of the note that has the motion."""
     stability: Stability
     multiplier: SixFigures | None
-    """Largest over a period under a base that moves as prescribed, magnitude; None where nothing is known."""
+    """Largest multiplier over a period under a prescribed base motion, magnitude; None if unknown."""
     multiplier_u: SixFigures | None
-    """Standard uncertainty; bounds of 95 % are 2.1 times that away."""
+    """Standard uncertainty; 95 % bounds are at 2.1 times this."""
     perturbation: SixFigures
-    """Rms change of base and m0 that was requested: fundamentals over themselves, the larger of both."""
+    """Requested rms change of the fundamentals of base and m0, relative; the larger of both."""
     moved: SixFigures
-    """How far the fundamental of m0 was afterwards from what it was before, over itself."""
+    """Relative change of the fundamental of m0 from before to after."""
 
 
 class BranchEndNote(AbstractNote):
@@ -318,20 +319,20 @@ class UntilNote(AbstractNote):
 
     kind: Literal["until"] = "until"
     stretch: int
-    """Number of the step; 1 where there is one stretch."""
+    """Number of the step; 1 for a single stretch."""
     wishes: dict[str, SixFigures]
-    """Wanted bounds of 95 %, relative, by result."""
+    """Requested relative 95 % bounds, by result."""
     longest_s: SixFigures
-    """Recorded time at which it ends anyway [s]."""
+    """Longest recorded time [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
-    """Bounds of 95 % at the last look; None where none could be stated, empty before the first look."""
+    """95 % bounds at the last analysis; None if not determined, empty before the first analysis."""
     looked_s: SixFigures = 0.0
-    """Recorded at the last look [s]."""
+    """Recorded time at the last analysis [s]."""
     looks: int = 0
     hindrance: str = ""
-    """Why nothing could be stated; empty otherwise."""
+    """Reason if no bounds could be determined; empty otherwise."""
     recorded_s: SixFigures | None = None
-    """Recorded in all; None while it is recorded [s]."""
+    """Total recorded time [s]; None while it is recorded."""
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -352,7 +353,7 @@ class UntilNote(AbstractNote):
             for name, wish in self.wishes.items()
             for bound in (self.bounds.get(name),)
         )
-        # Scatter falls with the root of time.
+        # Scatter falls with the square root of time.
         needed_s = self.looked_s * max(self.shares) ** 2 if self.bounds else inf
         if self.recorded_s is not None:
             end = "known well enough" if self.is_reached else "longest time"

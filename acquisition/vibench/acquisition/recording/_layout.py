@@ -210,7 +210,7 @@ def write_text_dataset(group: h5py.Group, name: str, text: str) -> None:
 
 
 def read_text_dataset(group: h5py.Group, name: str) -> str:
-    """Text of a scalar dataset; ValueError where something else stands."""
+    """Return the text of a scalar dataset; raises ValueError if it is something else."""
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
         raise ValueError(f"{group.name}/{name} is no text")

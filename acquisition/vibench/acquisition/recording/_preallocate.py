@@ -225,7 +225,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                     sync_file(tmp)
                     if _fingerprint(path) == before:
                         rename(tmp, path)
-                        with suppress(OSError):  # after a power cut either file exists, and both are complete
+                        with suppress(OSError):  # after a power cut, one of the files exists and is complete
                             sync_folder(path.parent)
                         return answer
                 finally:

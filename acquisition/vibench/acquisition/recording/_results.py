@@ -19,7 +19,7 @@ from ._seal import SealKey, SealState, check_result, require_reachable, seal_res
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
 COMPLEX_PART = "complex_part"
-"""Attribute of the two halves of a complex array; complex numbers themselves are h5py's own habit."""
+"""Attribute of the two halves of a complex array; only h5py reads complex numbers directly."""
 SETTINGS_JSON = "settings_json"
 AXES = "axes_json"
 """Attribute of an array: the names of the arrays along its dimensions."""
@@ -62,7 +62,7 @@ def write_result(
     roles: Sequence[str],
     key: SealKey | None,
 ) -> str:
-    """Add a result, sealed; a name that exists gets ``-2``, ``-3``, ... The name that was used comes back."""
+    """Add a sealed result; return its name. An existing name gets ``-2``, ``-3``, ..."""
     _require_axes(name, arrays)
     results = file.require_group(layout.RESULTS)
     free_name = _free_name(results, name)
@@ -86,7 +86,7 @@ def write_result(
 
 
 def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
-    """Return the group of every result, by name; RecordingError where something else stands."""
+    """Return the group of every result, by name; raises RecordingError if it is something else."""
     try:
         results = file.get(layout.RESULTS)
         found = {} if results is None else dict(results.items())
@@ -100,9 +100,9 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
 
 
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
-    """Every result of a recording, by name.
+    """Return every result of a recording, by name.
 
-    Raises RecordingError when one is not as it was sealed, or is none.
+    Raises RecordingError when one was changed after sealing, or is no result.
     """
     found = {}
     for name, group in result_groups(file).items():
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of an array's axes; where they are not noted (earlier versions), scales of the right lengths."""
+    """Return the names of an array's axes; without them (earlier versions), scales of the right lengths."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

@@ -51,7 +51,7 @@ AS_SEALED = "as it was sealed"
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""By a dataset's path: its checksum as it stood before each piece, and at the end."""
+"""Checksum states by dataset path: before each piece, and at the end."""
 
 
 class SealDepth(StrEnum):
@@ -368,7 +368,7 @@ def noted_seals(path: Path) -> Mapping[str, str]:
     verify` reports it.
     """
     noted: dict[str, str] = {}
-    file = path.name.encode(errors="replace").decode()  # a name that is no text stands in no journal
+    file = path.name.encode(errors="replace").decode()  # a name that is not text is in no journal
     for journal in sorted(path.parent.glob(f"*{JOURNAL_SUFFIX}")):
         with suppress(sqlite3.Error), closing(opened_to_look(journal)) as connection:
             noted |= connection.execute(_NOTED, {"file": file}).fetchall()
@@ -395,7 +395,7 @@ def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connecti
     Parameters
     ----------
     connection
-        Just opened.
+        New connection.
 
     Raises
     ------
@@ -413,7 +413,7 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
     """Open a database read-only, also in a read-only folder."""
     address = path.resolve().as_uri()
     try:
-        # One that may write tidies up behind itself when it was the last to look.
+        # A connection that may write would clean up when it is the last to close.
         with closed_on_error(opened(f"{address}?mode=rw")) as connection:
             connection.execute("PRAGMA query_only = ON")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()
@@ -428,7 +428,7 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
 # these states, so that an analysis reads what was checked.
 
 _KNOWN: dict[str, ChannelStates] = {}
-"""By seal. About 20 kB for a recording of a minute."""
+"""States by seal; about 20 kB for a recording of a minute."""
 
 
 def remember(seal: str, states: ChannelStates) -> None:

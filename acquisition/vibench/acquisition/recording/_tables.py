@@ -38,7 +38,7 @@ class EventKind(StrEnum):
 
 
 REJECTED = "average rejected"
-"""Text of a mark: no result is taken from the realisation of noise that began last before it."""
+"""Text of a mark: the last realisation of noise that began before it is not used for results."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
 
 
 def first_number(group: h5py.Group, name: str) -> int:
-    """Return the whole number of a dataset of one; RecordingError where something else stands."""
+    """Return the whole number of a dataset with one element; raises RecordingError for anything else."""
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
         raise RecordingError(f"{group.name}/{name} is no whole number")
@@ -161,10 +161,10 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
 
 
 def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
-    """Keep the same rows without samples past the last valid one.
+    """Return the rows without samples past the last valid one.
 
-    Rows are written ahead of the counters, so after a crash they may speak of samples that are not
-    there. A segment that is still open, or loses its end here, becomes an incomplete one.
+    Rows are written before the counters, so after a crash they may refer to missing samples. A segment that
+    is still open, or loses its end here, becomes incomplete.
     """
     if table is layout.SEGMENTS:
         return _clipped_segments(columns, n_valid)
@@ -179,7 +179,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
 def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
     first = np.minimum(columns["first_sample"], n_valid)
     last = columns["last_sample"]
-    # After a power cut "complete" may stand there already, and the end not yet; only an empty one ends at -1.
+    # After a power cut it may be marked complete without its end; only an empty one ends at -1.
     is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
     is_cut = is_open | (last >= n_valid)
     return {
@@ -248,7 +248,7 @@ class SegmentLabel(StrEnum):
     SWEEP = "sweep"
     DWELL = "dwell"
     STEP = "step"
-    """A frequency of the plan's list, or a level."""
+    """Frequency of the plan's list, or level."""
     SEARCH = "search"
     """A frequency that was added to localise a jump."""
     RESONANCE = "resonance"

@@ -76,7 +76,7 @@ class CountScale:
 
 
 RESERVED = 8
-"""The recording and its copy, the folder, what is opened to look at the disk; and the journal's after it."""
+"""File descriptors for the recording, its copy, the folder and checks of the disk, then for the journal."""
 
 
 class DescriptorReserve:
@@ -101,7 +101,7 @@ class DescriptorReserve:
 
 
 QUEUE_S = 10.0
-"""Seconds of samples that may wait for the disk; the slowest sync measured took 0.12 s."""
+"""Longest time of samples that wait for the disk [s]; the slowest measured sync took 0.12 s."""
 GAP_PIECE_SAMPLES = 51_200
 
 ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILED)

@@ -45,7 +45,7 @@ def given_token() -> str:
 USUAL_GRID_RATE_HZ = 102_400.0
 """Default steps per second of the simulated analogue world."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""On a coarser grid, the base would move by 0.8 % too little at `WATCHED_HZ`: see `level_error`."""
+"""Coarsest grid: the base moves by 0.8 % too little at `WATCHED_HZ`, see `level_error`."""
 WATCHED_HZ = 500.0
 """The highest resonance of the specimen, and the top of the paper's sines."""
 _MEASURED = 0.55
@@ -53,7 +53,7 @@ _MEASURED = 0.55
 LARGEST_LEVEL_ERROR = 0.01
 """Largest level error of a plan on a coarser grid than the default."""
 STEPS_PER_SAMPLE = 2
-"""Fewest on a coarser grid than the default: room for the transition band of the converter's filter."""
+"""Fewest steps per sample on a coarser grid, for the transition band of the converter's filter."""
 
 
 class VirtualConfig(FrozenModel):
@@ -119,7 +119,7 @@ class OutputUse(StrEnum):
     """Excitations that an analogue output plays; the function generator plays the others."""
 
     STREAMS = "streams"
-    """Only signals that never repeat, which do not fit into a generator."""
+    """Only signals that do not repeat, and so do not fit into a generator."""
     TONES_AND_STREAMS = "tones_and_streams"
     """Sines too: dwells, steps and sweeps, for a bench with a permanently connected output."""
 

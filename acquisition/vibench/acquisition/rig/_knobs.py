@@ -132,7 +132,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# Long enough for a campaign of a day and a night; later, somebody may have changed a setting.
+# Validity of a sheet: a campaign of a day and a night; later, settings may have changed.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
@@ -273,7 +273,7 @@ class Calibration:
 
     @property
     def is_to_come(self) -> bool:
-        """Whether its date is in the future, a slip of the pen."""
+        """Whether its date is in the future, which is a mistake."""
         return self.age_days < 0
 
     @property
@@ -285,11 +285,11 @@ class Calibration:
     def advice(self) -> str:
         """Advice about an invalid one."""
         if self.is_to_come:
-            return "the date is still to come: enter the one on the certificate in the configuration"
+            return "the date is in the future: enter the one on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"
 
     def __str__(self) -> str:
-        when = "a day that is still to come" if self.is_to_come else f"{self.age_days} days ago"
+        when = "a day in the future" if self.is_to_come else f"{self.age_days} days ago"
         return f"{self.what} was calibrated on {self.calibrated}, {when}"
 
 

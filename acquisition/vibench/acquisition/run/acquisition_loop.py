@@ -54,7 +54,7 @@ class AcquisitionLoop:
 
     def catch_up(self) -> Iterator[Block]:
         """Read all waiting samples, and delay everything after them accordingly."""
-        # Once only, because more samples arrive during reading.
+        # Only once, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
         longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))

@@ -50,7 +50,7 @@ class Ending:
 
     def __init__(self) -> None:
         self.state = RunState.FAILED
-        self.reason = "the run ended without saying why"
+        self.reason = "the run ended without a reason"
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:

@@ -18,8 +18,8 @@ setting."""
 
 
 GUARD_S = 0.02
-"""A burst is triggered so long after the last one must have ended: what a trigger does to one that still
-plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
+"""Pause between the end of a burst and the next trigger [s]. A trigger during a burst is not documented for
+every firmware, and reading times vary by some milliseconds."""
 CHECK_MARGIN_S = 0.5
 """Extra length of a check's burst, for commands and the reading of samples [s]."""
 LITTLE = 0.98

@@ -22,8 +22,8 @@ from .silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 from .until import UntilWatch
 
 DELAY_SAMPLES = 40
-"""A delta-sigma converter's filter delays every channel by about so much (NI 9234: 38.4): cycles, over a span
-of frequencies."""
+"""Approximate delay of a delta-sigma converter's filter in samples (NI 9234: 38.4); it shifts cycles while
+the frequency changes."""
 
 
 CLEAR = 0.3
@@ -144,9 +144,9 @@ LONGEST_LEAD = 0.25
 TOLD_CYCLES = 0.1
 """Delay at the end of a glide that is noted."""
 MOST_MADE_UP = 3.0
-"""Largest change of a frequency that makes up for lost cycles, over the step between two frequencies."""
+"""Largest frequency correction for lost cycles, over the step between two frequencies."""
 LEAST_LEFT = 0.2
-"""Share of a step in which cycles are made up at least."""
+"""Smallest share of a step in which cycles are corrected."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
@@ -268,10 +268,10 @@ class PhaseRunner:
         return _Pace.AFTER_THE_COMMAND
 
     def _made_up(self, phase: Phase, late_s: float) -> Phase:
-        """Return the phase with the frequency that makes up, within its step, for the cycles lost before it.
+        """Return the phase with its frequency corrected for the cycles lost before it.
 
-        While a command is late the former tone plays on: the drive falls behind its plan by the difference
-        of the two frequencies times that. What a step cannot make up is left to the next.
+        While a command is late, the previous tone continues, and the drive loses the difference of the two
+        frequencies times the delay. Cycles that one step cannot correct are left to the next.
         """
         if not isinstance(phase.play, Tone):
             return phase
@@ -296,7 +296,7 @@ class PhaseRunner:
     def _require_pace(self, phase: Phase) -> float:
         """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.
 
-        Gives how late this one is [s].
+        Return the delay of this one [s].
 
         Samples are handed over some milliseconds after they are converted, so that a command that waits for
         them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.

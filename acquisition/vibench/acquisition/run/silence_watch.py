@@ -203,7 +203,7 @@ class SilenceWatch:
         drive = self._drive(block.volts)
         self._residue_v = _half_peak_to_peak(drive)
         self._loudest_v = max(self._loudest_v, self._residue_v)
-        # About its mean: an offset of the input is no signal.
+        # Relative to its mean: an offset of the input is not a signal.
         loud = np.flatnonzero(np.abs(drive - np.mean(drive)) > self._silent_v)
         if loud.size:
             self._last_loud = block.first_sample + int(loud[-1])

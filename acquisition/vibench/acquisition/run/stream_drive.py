@@ -183,7 +183,7 @@ class StreamDrive:
 
     def announce(self, coming: Iterable[Phase]) -> None:
         """Append ``coming`` after the silence already written."""
-        assert self._synthesizer.is_over, "what was told before is shorter than what is written ahead"
+        assert self._synthesizer.is_over, "the previous announcement is shorter than the written samples"
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
