@@ -86,8 +86,8 @@ def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_
 @pytest.mark.parametrize(
     ("specimen", "stretch_s", "why"),
     [
-        (gong2025(), (0.5, 0.7), "0.2 s of it at 51200 samples a second are no basis"),
-        (gong2025(), (1.4, 1.7), "no basis for statistics"),
+        (gong2025(), (0.5, 0.7), "0.2 s of it at 51200 samples a second are too little"),
+        (gong2025(), (1.4, 1.7), "too little for statistics"),
         (gong2025(contact="rigid:0.8"), STRETCH_S, "cannot be tracked"),
         (gong2025(contact="linear"), STRETCH_S, "without stops"),
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),

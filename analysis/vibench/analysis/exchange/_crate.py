@@ -85,7 +85,7 @@ def pack_folder(
     if outside:
         raise InvalidRequest(
             f"{outside[0]} leads out of the folder, to {outside[0].resolve()}, which would be published "
-            "with it; nothing was packed. Put a copy in its place if it belongs here, or take it away"
+            "with it; nothing was packed. Replace it by a copy if it belongs here, or remove it"
         )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):

@@ -56,7 +56,7 @@ def require_whole(path: Path) -> None:
 def _look(content: memoryview, order: str, depth: int) -> None:
     """Check consecutive elements."""
     if depth > DEEPEST:
-        raise ValueError(f"more than {DEEPEST} structs or cells lie within each other")
+        raise ValueError(f"more than {DEEPEST} nested structs or cells")
     while len(content) >= TAG_BYTES:
         kind, size = struct.unpack(f"{order}II", content[:TAG_BYTES])
         if kind >> 16:  # small: type and size share four bytes, data are in the other four

@@ -53,7 +53,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         ) from error
     # Opened here, because npTDMS does not close damaged files.
     with path.open("rb") as raw:
-        if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, and say nothing
+        if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, without an error
             raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
         # Its warnings on standard error are suppressed; errors are raised.

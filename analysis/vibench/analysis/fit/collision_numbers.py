@@ -162,7 +162,7 @@ def numbers_from_statistics(
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
         if numbers.told:
             return numbers, ""
-        why.setdefault("its statistics tell nothing better than it was assumed", []).append(each.name)
+        why.setdefault("its statistics determine nothing better than the description", []).append(each.name)
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 

@@ -136,7 +136,7 @@ class Lines:
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
 
     def is_away(self, at: Reals) -> bool:
-        """Return whether a search ran away along an undetermined parameter."""
+        """Return whether a search diverged along an undetermined parameter."""
         count = len(self.free)
         return bool(np.any(np.abs(at[:count] - self.start[:count]) > _MOST_OFF))
 
@@ -216,8 +216,8 @@ def fit_lines(lines: Lines) -> Descended:
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):
         raise NotEnoughData(
-            f"the {lines.frequency_hz.size} lines of the transmission that stand clear of the scatter do not "
-            f"tell {', '.join(lines.free)}; measure longer or with more drive"
+            f"the {lines.frequency_hz.size} lines of the transmission above the scatter do not determine "
+            f"{', '.join(lines.free)}; measure longer or with more drive"
         )
     return _fit_from_description(lines, usual, best)
 

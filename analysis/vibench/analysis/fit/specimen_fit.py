@@ -109,7 +109,7 @@ def fit_specimen(
     allowed = (*LINEAR, *ALSO_FREE)
     if not free or not set(free) <= set(allowed) or len(set(free) & set(MASSES)) > 1:
         raise InvalidRequest(
-            f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it tells any of "
+            f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it determines any of "
             f"{', '.join(allowed)}, one mass at a time"
         )
     lines = lines_of(frequency_response, nominal, free, scale_sd)

@@ -314,11 +314,11 @@ def statistical_numbers(
     measured = draws.measured
     if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
         raise NotEnoughData(
-            f"{measured.shape[1] / rate_hz:.3g} s of it at {rate_hz:g} samples a second are no basis for "
+            f"{measured.shape[1] / rate_hz:.3g} s of it at {rate_hz:g} samples a second are too little for "
             f"statistics; record {_LEAST_S:g} s or more, at {_LEAST_RATE_HZ:g} or more"
         )
     if np.isnan(measured).any():
-        raise UnusableData("samples were lost, and statistics of what is left are those of another window")
+        raise UnusableData("samples were lost, and the statistics of the remaining ones are not comparable")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
     made = _Runs(draws, specimen, linear, drive_hz, above_sensor_noise(observed, draws.noise_rms, rate_hz))
     _require_likely(made, measured)
@@ -326,8 +326,8 @@ def statistical_numbers(
     found = posterior(made, observed[made.heard], np.stack([-reach, reach], axis=1), _SEED, rounds)
     if not found.fits:
         raise UnusableData(
-            f"its statistics are {found.distance:.2g} times as far from those of any specimen that was "
-            "simulated as those are among themselves: something else of rig or specimen is not as described"
+            f"its statistics are {found.distance:.2g} times as far from those of any simulated specimen as "
+            "these are from each other: something else of rig or specimen is not as described"
         )
     return tuple(_determined_parameters(found, specimen)), found.distance
 
@@ -390,8 +390,8 @@ def _require_likely(made: _Runs, measured: Reals) -> None:
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
         raise UnusableData(
-            f"the recorded voltage would shake the described rig at {drawn:.3g} m/s2 rms and shook it at "
-            f"{seen:.3g}, so that nothing is simulated beside it; describe amplifier and shaker as they are"
+            f"the recorded voltage gives {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} were "
+            "recorded, so no simulation is possible; describe amplifier and shaker as they are"
         )
 
 
@@ -406,7 +406,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         flat = high - low > _TOLD * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
-        why = "the motion's statistics tell it no better than it was assumed" if flat else ""
+        why = "the statistics of the motion do not determine it better than the description" if flat else ""
         # The centre of the bounds, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"

@@ -176,7 +176,7 @@ def _response(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Comple
 def _off(_: Specimen, further: Reals) -> str:
     return (
         f"the sensitivity of the vibrometer over that of the accelerometer "
-        f"{100 * np.expm1(further[0]):+.3g} % off (which of the two no transmission tells)"
+        f"{100 * np.expm1(further[0]):+.3g} % off (no transmission shows which of the two)"
     )
 
 

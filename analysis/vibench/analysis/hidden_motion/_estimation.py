@@ -33,8 +33,8 @@ _WANDER = 0.02
 REBUILT_S = 0.05
 """Interval after which the tables are computed for the current parameters [s]."""
 _LOST = (
-    f"each track was lost within {REBUILT_S:g} s while the numbers were looked for, so that what is taken as "
-    "described (m0, m2, k1, the kind of contact) may be otherwise"
+    f"each track was lost within {REBUILT_S:g} s of the search for parameters, so the values taken as "
+    "described (m0, m2, k1, kind of contact) may be wrong"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
 """Schedule: length of tracked motion, and factor of the velocity variance until then."""
@@ -224,7 +224,7 @@ def search_start(
         gaps = _gaps_by_law(numbers.tracked, told.impacts)
     if not any(gaps):
         count = told.impacts.samples.size
-        seen = f"{count} impacts that were found tell no gap" if count else "no impacts were found"
+        seen = f"{count} impacts that were found determine no gap" if count else "no impacts were found"
         return numbers.tracked, (
             f"{seen} without a contact model, so m1 hardly reached its stops in this motion or stayed at one "
             "of them, or the specimen's linear numbers are wrong; fit them to weak noise first"

@@ -292,7 +292,7 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
 
 
 def _parameter(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
-    why = "" if is_told else "told by this motion no better than was assumed"
+    why = "" if is_told else "this motion does not determine it better than the description"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 

@@ -171,7 +171,7 @@ def hidden_motion(
     numbers
         Whether gaps, m1, springs, dampers and contact law are found first.
     observer
-        Told how far it is.
+        Receives the progress.
 
     Raises
     ------
@@ -209,9 +209,9 @@ def hidden_motion_in_samples(
     m0_velocity
         Absolute velocity of m0 at the same instants, shape (n,) [m/s].
     sample_rate_hz
-        Of both.
+        Sample rate of both.
     specimen
-        What was shaken, as it is known.
+        Description of the specimen.
     numbers
         Whether gaps, m1, springs, dampers and contact law are found first.
 
@@ -348,8 +348,8 @@ def _free_sentence(motion: HiddenMotion) -> str:
         elif gap is not None:
             said += f", {side} gap {MICRO * gap.value_m:.3g} µm"
     if not any(motion.free_gaps):
-        return f"{said}; too few to tell a gap."
-    no_bounds = "without bounds, since no track confirms the numbers of the specimen that they rest on"
+        return f"{said}; too few to determine a gap."
+    no_bounds = "without bounds, since no track confirms the specimen's parameters that were used"
     return f"{said}." if motion.is_confirmed else f"{said}, {no_bounds}."
 
 

@@ -47,7 +47,7 @@ class LatentMotion:
     is_open: Flags
     """Samples with a possible contact force."""
     is_dark: Flags
-    """Those of them without measurement."""
+    """Samples in drop-outs among these."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""

@@ -214,9 +214,9 @@ class LiveTwin:
         executor
             Runs the search for parameters (one second of computing) during tracking.
         specimen
-            As it is known.
+            Description of the specimen.
         known
-            Parameters of its baseline, which replace those described.
+            Parameters of its baseline, which replace the described ones.
 
         Raises
         ------
@@ -313,9 +313,9 @@ class LiveTwin:
         Parameters
         ----------
         first_sample
-            Their number in the recording.
+            Index of the first one in the recording.
         acceleration, velocity
-            Of the base [m/s2] and of m0 [m/s], shape (samples,).
+            Acceleration of the base [m/s2] and velocity of m0 [m/s], shape (samples,).
         frequency_hz
             Frequency of a sine excitation, for a forecast; otherwise None.
         """

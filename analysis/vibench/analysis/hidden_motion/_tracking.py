@@ -81,7 +81,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
         )
     begin = _calmest(model, found.smoothed, found.is_open, motion.sample_rate_hz)
     if begin is None:
-        return "no flight between two impacts was told well enough to begin a track"
+        return "no flight between two impacts was determined well enough to begin a track"
     ahead = smooth(model.without_stops, found.run.samples(begin), found.force_variance[begin:])
     return FilterState(ahead.first, ahead.states[0].copy(), _ACQUIRED_EXCESS * ahead.first_covariance)
 
