@@ -26,6 +26,7 @@ class Log(io.StringIO):
 def test_without_a_terminal_progress_is_one_line_each_time():
     log = Log()
     with show_bars(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
+        assert not log.written.wait(0.1), "a line without a bar"
         bars.update(bars.add_task("noise", total=60), completed=15)
         bars.add_task("opening", total=None)
         log.written.clear()

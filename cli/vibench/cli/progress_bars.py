@@ -32,7 +32,8 @@ def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]
 
     def print_lines() -> None:
         while not ending.wait(interval_s):
-            bars.console.print("progress:", progress_line(bars))
+            if bars.tasks:
+                bars.console.print("progress:", progress_line(bars))
 
     thread = Thread(target=print_lines, name="progress lines", daemon=True)
     thread.start()

@@ -113,6 +113,12 @@ def test_a_file_may_start_from_another_beside_it(tmp_path):
     assert specimen.gaps_m == (30e-6, math.inf)
 
 
+def test_the_line_about_a_specimen_does_not_describe_a_changed_one(tmp_path):
+    changed = load_specimen(written(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
+    assert "45 um" in load_specimen("gong2025").about
+    assert changed.about == ""
+
+
 def test_a_description_comes_back_from_its_own_text(tmp_path):
     described = load_specimen(written(tmp_path, WHOLE))
     assert SpecimenDescription.model_validate_json(described.model_dump_json()) == described

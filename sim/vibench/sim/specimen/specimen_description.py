@@ -354,8 +354,9 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace given values. The alternative key of each given one and its sources are removed."""
+    """Replace given values. `about`, each given key's alternative and its source are removed."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
+    replaced |= {"about"} if said else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
     _warn_of_changes(base, {**kept, **said}, said)
     old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
