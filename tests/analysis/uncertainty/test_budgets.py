@@ -15,7 +15,7 @@ from vibench.analysis.overlay.ensemble import EnsembleCurve
 from vibench.analysis.overlay.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
-from vibench.analysis.uncertainty.budget import Cause, Contribution, stated_uncertainties
+from vibench.analysis.uncertainty.budget import Budget, Cause, Contribution, stated_uncertainties
 from vibench.analysis.uncertainty.quantities import dwell_budgets, sd_of_largest, sweep_budgets
 
 DRAWS = 150
@@ -128,6 +128,13 @@ def test_anything_that_is_not_stated_is_stated_and_is_not_zero(weak):
     table = uncertainty_table([weak])
     assert table.rows[2][1] == "Response II"
     assert table.rows[2][3] == "not stated"
+
+
+def test_a_value_without_a_stated_uncertainty_has_no_coverage_factor():
+    budget = Budget(
+        "A0", 32.68, "µm", (Contribution(Cause.CHANCE, None, ""), Contribution(Cause.NOISE, 0.0, ""))
+    )
+    assert budget.sentence == "A0 32.68 µm (not stated: chance)"
 
 
 def test_calibration_source_and_date_reach_the_document(weak):

@@ -133,10 +133,9 @@ class Budget(Labelled):
         causes = dict.fromkeys(each.cause for each in self.contributions)
         parts = sorted(((size, cause.value) for cause in causes if (size := self.share(cause))), reverse=True)
         each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
-        said = f"standard uncertainties: {each}" if each else "nothing stated"
-        missing = ", ".join(self.not_stated)
-        left = f"; not stated: {missing}" if missing else ""
-        return f"{self.quantity} {self.text} (k = {COVERAGE:g}; {said}{left})"
+        said = [f"k = {COVERAGE:g}; standard uncertainties: {each}"] if each else []
+        said += [f"not stated: {', '.join(self.not_stated)}"] if self.not_stated else []
+        return f"{self.quantity} {self.text} ({'; '.join(said) or 'no uncertainty'})"
 
     @property
     def parts(self) -> list[dict[str, object]]:
