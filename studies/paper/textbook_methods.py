@@ -70,8 +70,7 @@ def runge_kutta(step_s: float) -> TextbookMethod:
     Raises ValueError when the step is not positive and finite.
     """
     if not 0.0 < step_s < math.inf:
-        msg = f"A step of {step_s} s is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"A step of {step_s} s is not allowed: it must be positive and finite.")
     return TextbookMethod(f"Runge-Kutta, steps of {step_s:g} s", _RUNGE_KUTTA, step_s)
 
 
@@ -81,11 +80,10 @@ def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0
     Raises ValueError when a tolerance or the longest step is not positive and finite.
     """
     if not all(0.0 < each < math.inf for each in (relative, absolute, longest_s)):
-        msg = (
+        raise ValueError(
             f"Tolerances of {relative} and {absolute} with steps up to {longest_s} s are not allowed: "
             "each must be positive and finite."
         )
-        raise ValueError(msg)
     name = f"ode45, tolerances {relative:g} and {absolute:g}"
     return TextbookMethod(name, _DORMAND_PRINCE, longest_s, relative, absolute)
 

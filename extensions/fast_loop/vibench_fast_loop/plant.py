@@ -29,8 +29,9 @@ class LoopTiming:
 
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):
-            msg = f"{self.rate_hz} samples a second, {self.latency_s} s of latency are not allowed: positive."
-            raise ValueError(msg)
+            raise ValueError(
+                f"{self.rate_hz} samples a second, {self.latency_s} s of latency are not allowed: positive."
+            )
 
     @property
     def step_s(self) -> float:

@@ -44,17 +44,15 @@ class MotionSearch:
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
-            msg = (
+            raise ValueError(
                 f"A search at {self.places} places from {self.starts} starts over {self.settling_periods} "
                 "periods is not allowed: 2 places or more, no negative number, at least twice the longest "
                 "motion."
             )
-            raise ValueError(msg)
         if self.most_periods < 1 or self.most_branches < 1:
-            msg = (
+            raise ValueError(
                 f"Motions of {self.most_periods} periods, {self.most_branches} branches: at least 1 of each."
             )
-            raise ValueError(msg)
 
 
 def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[PeriodicOrbit]:

@@ -268,6 +268,5 @@ def least_growth_time_s(loop_time_s: float) -> float:
         Latency from motion to drive [s].
     """
     if not 0.0 < loop_time_s < math.inf:
-        msg = f"A loop time of {loop_time_s} s is not allowed: positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"A loop time of {loop_time_s} s is not allowed: positive and finite.")
     return UPDATES_TO_HOLD * loop_time_s

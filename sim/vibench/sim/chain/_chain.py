@@ -32,16 +32,14 @@ class Chain:
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.cells) <= MOST_CELLS:
-            msg = f"A chain of {len(self.cells)} cells is not allowed: give 1 to {MOST_CELLS}."
-            raise ValueError(msg)
+            raise ValueError(f"A chain of {len(self.cells)} cells is not allowed: give 1 to {MOST_CELLS}.")
         for place, cell in enumerate(self.cells, start=1):
             match cell.contact:
                 case RigidStops():
-                    msg = (
+                    raise ValueError(
                         f"Cell {place} has rigid stops, which a chain cannot follow: take stops that yield, "
                         "such as hunt_crossley:0.5."
                     )
-                    raise ValueError(msg)
                 case _:
                     pass
 
@@ -86,8 +84,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
         One or more; one cell is the specimen itself.
     """
     if not 1 <= cells <= MOST_CELLS:
-        msg = f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}."
-        raise ValueError(msg)
+        raise ValueError(f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}.")
     return Chain((specimen,) * cells)
 
 

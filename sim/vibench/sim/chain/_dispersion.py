@@ -41,8 +41,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
-        msg = "Frequencies must be finite and positive, in Hz."
-        raise ValueError(msg)
+        raise ValueError("Frequencies must be finite and positive, in Hz.")
     across = np.tile(np.eye(2, dtype=np.complex128), (len(omega), 1, 1))
     for cell in unit.cells:
         across = _across(cell, omega) @ across
@@ -97,8 +96,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
     if not np.all(np.isfinite(phase)):
-        msg = "A wave number that is not finite is not allowed: give radians per unit."
-        raise ValueError(msg)
+        raise ValueError("A wave number that is not finite is not allowed: give radians per unit.")
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
     # The first cell is coupled to the last of the previous unit, whose phase lags.
@@ -149,8 +147,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
-        msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
-        raise ValueError(msg)
+        raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
     cells = [reduce_to_m0(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
     # From the free end: each cell and the rest of the chain as one stiffness at its m0.
     seen = [cells[-1].stiffness]

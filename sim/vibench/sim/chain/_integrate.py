@@ -187,8 +187,8 @@ def integrate_chain(
     Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
     excluded by bounds and resolved with the tolerance of ``accuracy``, in any number of cells at once.
     Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does. Raises
-    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the run
-    is.
+    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the
+    run is.
 
     Parameters
     ----------
@@ -250,12 +250,11 @@ def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
     """Raise ValueError for a run that would take hours, in windows of at most ``window_s``."""
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
-        msg = (
+        raise ValueError(
             f"{duration_s:g} s of {chain.size} cells are not allowed: they take {work:.2g} windows of "
             f"{window_s:.2g} s, one for each cell, and {MOST_CELL_WINDOWS:.0e} are the most; shorten the "
             "run, or lower the highest frequency of drive and cells."
         )
-        raise ValueError(msg)
 
 
 def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
@@ -263,11 +262,10 @@ def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
     shape = (chain.size, STATES_PER_CELL)
     motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != shape or not bool(np.all(np.isfinite(motion))):
-        msg = (
+        raise ValueError(
             f"An initial state of shape {motion.shape} is not allowed: give finite numbers "
             f"x, y, z, vx, vy, vz for each of the {chain.size} cells, shape {shape}."
         )
-        raise ValueError(msg)
     return motion
 
 

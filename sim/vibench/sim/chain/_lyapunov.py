@@ -66,8 +66,8 @@ def chain_lyapunov_exponent(
 ) -> ChainExponent:
     """Return the largest Lyapunov exponent of a chain.
 
-    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too
-    few intervals for an error.
+    Raises ValueError when an argument is not allowed, the run would take hours, or the duration holds too few
+    intervals for an error.
 
     Parameters
     ----------
@@ -82,11 +82,10 @@ def chain_lyapunov_exponent(
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
     intervals = math.floor(duration_s / interval_s * (1.0 + 1e-9)) if math.isfinite(duration_s) else 0
     if intervals < FEWEST_INTERVALS:
-        msg = (
+        raise ValueError(
             f"Duration {duration_s} s is not allowed for an exponent at {drive.frequency_hz} Hz: "
             f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
-        raise ValueError(msg)
     tables = chain_tables(chain, drive, accuracy)
     # Two motions.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))

@@ -52,8 +52,6 @@ def chain_response_to(
     time_s
         From the call to the answer; a minute when None [s].
 
-    Raises ValueError when one drive period takes longer.
-
     ``error`` is relative, of the transmission of every cell; None: as small as the time allows. The time is
     that from the call to the answer; None: a minute.
     """
@@ -107,11 +105,10 @@ def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit
         integrate_chain(chain, drive, tried_s, accuracy)
         took_s = time.monotonic() - began_s
     if took_s * period_s / tried_s > limit_s:
-        msg = (
+        raise ValueError(
             f"A time of {limit_s:g} s is not allowed for this chain: one drive period of {period_s:g} s "
             "takes longer to follow; give more time."
         )
-        raise ValueError(msg)
 
 
 def _errors(windows: Sequence[ChainResponse]) -> Floats:

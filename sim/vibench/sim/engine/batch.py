@@ -264,8 +264,9 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     engine = first.engine
     fit = collision_fit(engine, first.specimen) if is_batchable(first.specimen, first.tolerance) else None
     if fit is None:
-        msg = "This specimen cannot be followed in a batch: use Hertz's stops and three modes that turn."
-        raise ValueError(msg)
+        raise ValueError(
+            "This specimen cannot be followed in a batch: use Hertz's stops and three modes that turn."
+        )
     # Longest first, so that all lanes end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((count, DIRECTIONS)) for count in periods]

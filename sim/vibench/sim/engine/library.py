@@ -39,8 +39,9 @@ def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     for text in texts:
         whole = _STRUCTURE.fullmatch(text)
         if whole is None:
-            msg = f"{text!r} is not a structure of the native engine: its form is 'Name {{ double field; }}'."
-            raise ValueError(msg)
+            raise ValueError(
+                f"{text!r} is not a structure of the native engine: its form is 'Name {{ double field; }}'."
+            )
         name, fields = whole.groups()
         declared = [each.strip().removeprefix("const ") for each in fields.split(";") if each.strip()]
         rows = [field for each in declared for field in _fields(each, known)]
@@ -55,8 +56,9 @@ def _fields(
     for name in names.split(","):
         found = _NAME.fullmatch(name.strip())
         if found is None:
-            msg = f"{name!r} is not a field of a structure: its form is 'name', 'name[6]' or '*name'."
-            raise ValueError(msg)
+            raise ValueError(
+                f"{name!r} is not a field of a structure: its form is 'name', 'name[6]' or '*name'."
+            )
         pointer, word, sizes = found.groups()
         shape = tuple(int(size) for size in re.findall(r"\d+", sizes))
         yield word, np.uintp if pointer else _NUMBERS.get(kind) or known[kind], shape
@@ -131,8 +133,9 @@ class Engine:
         for index, (name, of) in enumerate(types.items()):
             size = self._library.vibench_size_of(index)
             if size != of.itemsize:
-                msg = f"{self.path} uses {size} bytes for a {name}, Python {of.itemsize}: run {REBUILD}."
-                raise EngineError(msg)
+                raise EngineError(
+                    f"{self.path} uses {size} bytes for a {name}, Python {of.itemsize}: run {REBUILD}."
+                )
         return types
 
     @property
@@ -168,8 +171,9 @@ class Engine:
         """
         code = int(self._functions[function](structure.ctypes.data))
         if code < 0:
-            msg = f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
+            )
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
@@ -184,8 +188,9 @@ class Engine:
         size = int(self._library.vibench_size_of_tables(int(scene["specimen"]["law"])))
         tables = np.zeros(size // 8, np.float64)
         if self._library.vibench_prepare(scene.ctypes.data, tables.ctypes.data) != 0:
-            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
-            raise ValueError(msg)
+            raise ValueError(
+                "This scene is not allowed: numbers must be finite, masses and springs positive."
+            )
         return tables
 
     def prepare_cubics(self, scene: Structure) -> Tables:
@@ -193,8 +198,9 @@ class Engine:
         size = int(self._library.vibench_size_of_cubic_tables(int(scene["specimen"]["law"])))
         tables = np.zeros(size // 8, np.float64)
         if self._library.vibench_prepare_cubics(scene.ctypes.data, tables.ctypes.data) != 0:
-            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
-            raise ValueError(msg)
+            raise ValueError(
+                "This scene is not allowed: numbers must be finite, masses and springs positive."
+            )
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
@@ -254,8 +260,9 @@ def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
-        msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous float64 arrays."
-        raise TypeError(msg)
+        raise TypeError(
+            f"An array of {numbers.dtype} was given: the native engine takes contiguous float64 arrays."
+        )
     return numbers.__array_interface__["data"][0], numbers.size
 
 

@@ -164,8 +164,7 @@ class NativeRun:
         self._state["motion"] = motion
         refuse_inside_a_stop(self._state["motion"], self.specimen)
         if self.engine.start(self._tables, self._state, self.tolerance) != 0:
-            msg = f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1."
-            raise ValueError(msg)
+            raise ValueError(f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1.")
 
     def apart(self, tolerance: float | None = None) -> Self:
         """Return a copy; with another tolerance, without small changes."""
@@ -200,8 +199,9 @@ class NativeRun:
         tangent = self._tangent if self._tangent["changes"] > 0 else None
         code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
         if code < 0:
-            msg = f"The native engine refuses to advance to {until_s} s: the instant must be finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"The native engine refuses to advance to {until_s} s: the instant must be finite."
+            )
         return Outcome(code)
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
@@ -288,11 +288,10 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
     p = float(motion[Y] - motion[Z])
     beyond = max(p - upper, -p - lower)
     if beyond > INSIDE * (min(lower, upper) + float(np.abs(motion[:3]).sum())):
-        msg = (
+        raise ValueError(
             f"A start at y - z = {p} m is not allowed: rigid stops are at {-lower} and {upper} m; "
             "start between them."
         )
-        raise ValueError(msg)
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:
@@ -318,8 +317,9 @@ def check_known_answer(engine: Engine) -> None:
     outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
     off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
     if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
-        msg = f"{engine.path} fails its self-test by {off.max():.1e}: rebuild it, or report this."
-        raise EngineError(msg)
+        raise EngineError(
+            f"{engine.path} fails its self-test by {off.max():.1e}: rebuild it, or report this."
+        )
 
 
 def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Tables:
@@ -328,8 +328,7 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
     Raises ValueError when the engine refuses the interval or the specimen.
     """
     if not 0.0 < interval_s < math.inf:
-        msg = f"Interval {interval_s} s is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"Interval {interval_s} s is not allowed: it must be positive and finite.")
     scene = engine.new("CubicScene", interval=interval_s)
     fill_specimen(scene["specimen"], specimen)
     scene["fastest"] = np.max(np.abs(np.linalg.eigvals(state_matrix(specimen)[0])))
@@ -406,8 +405,7 @@ class CubicRun:
     def _run(self, drive: Structure, record: RunRecord) -> Outcome:
         code = self._engine.run_cubics(self._tables, self._state, drive, self._tolerance, record.structure)
         if code < 0:
-            msg = "The native engine refuses these intervals: their ends must lie within them."
-            raise ValueError(msg)
+            raise ValueError("The native engine refuses these intervals: their ends must lie within them.")
         return Outcome(code)
 
     @property
@@ -430,6 +428,7 @@ def start_motion(initial_state: ArrayLike | None) -> Floats:
     """Return the checked initial state; rest if None."""
     motion = np.zeros(6) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != (6,) or not bool(np.all(np.isfinite(motion))):
-        msg = f"Initial state {motion} is not allowed: give six finite numbers x, y, z, vx, vy, vz."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Initial state {motion} is not allowed: give six finite numbers x, y, z, vx, vy, vz."
+        )
     return motion

@@ -80,8 +80,7 @@ class Precision:
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
-            msg = f"Precision {self} is not allowed: zero or positive numbers."
-            raise ValueError(msg)
+            raise ValueError(f"Precision {self} is not allowed: zero or positive numbers.")
 
     def is_reached_by(self, exponents: Floats) -> bool:
         """Return whether the mean of local exponents, shape (n,), is known to this precision."""
@@ -190,16 +189,16 @@ def lyapunov_exponent(
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
     """Return the number of intervals of settling; refuse times that leave too few for a mean."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
-        msg = f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."
+        )
     skipped = max(ALIGNING, math.ceil(settle_s / interval.length_s - ALMOST))
     left = interval.count_in(settle_s + duration_s) - skipped
     if left < FEWEST_INTERVALS:
-        msg = (
+        raise ValueError(
             f"Duration {duration_s} s holds {max(left, 0)} intervals of {interval.length_s} s: "
             f"ask for {FEWEST_INTERVALS} or more, by a longer duration or a shorter interval."
         )
-        raise ValueError(msg)
     return skipped
 
 

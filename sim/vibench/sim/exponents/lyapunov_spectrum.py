@@ -84,8 +84,7 @@ class LyapunovSpectrum:
 
     def _reach(self, confidence: float) -> Floats:
         if not 0.0 < confidence < 1.0:
-            msg = f"A confidence of {confidence} is not allowed: it must lie between 0 and 1."
-            raise ValueError(msg)
+            raise ValueError(f"A confidence of {confidence} is not allowed: it must lie between 0 and 1.")
         return np.asarray(scipy.special.stdtrit(np.maximum(self.blocks - 1, 1), 0.5 + 0.5 * confidence))
 
 

@@ -62,8 +62,9 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     """
     series = np.asarray(values, dtype=np.float64)
     if series.ndim != 1 or len(series) == 0 or not bool(np.all(np.isfinite(series))):
-        msg = f"A series of shape {series.shape} has no mean here: give one row of finite numbers."
-        raise ValueError(msg)
+        raise ValueError(
+            f"A series of shape {series.shape} has no mean here: give one row of finite numbers."
+        )
     mean = float(series.mean())
     variances, correlations, counts = _levels(series - mean)
     if len(counts) == 0 or variances[0] == 0.0:
@@ -139,8 +140,7 @@ def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = No
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
     if not 0.0 < about < math.inf:
-        msg = f"Interval {about} s is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"Interval {about} s is not allowed: it must be positive and finite.")
     periods = max(1, round(about * drive.frequency_hz))
     if periods > 2.0 * about * drive.frequency_hz:
         return Interval(about, 0)

@@ -176,34 +176,36 @@ def integrate(
 def check_impact_rate(max_impact_rate_hz: float) -> None:
     """Refuse a limit of the impact rate that is not positive."""
     if not 0.0 <= max_impact_rate_hz < math.inf:
-        msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
+        )
 
 
 def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | None) -> None:
     """Refuse impossible times and sample rates."""
     if not 0.0 <= duration_s < math.inf:
-        msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
-        raise ValueError(msg)
+        raise ValueError(f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite.")
     if not 0.0 <= start_time_s <= LATEST_START_S:
-        msg = f"Start time {start_time_s} s is not allowed: it must lie between 0 and {LATEST_START_S:g} s."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Start time {start_time_s} s is not allowed: it must lie between 0 and {LATEST_START_S:g} s."
+        )
     if sample_rate_hz is not None and not 0.0 < sample_rate_hz < math.inf:
-        msg = f"Sample rate {sample_rate_hz} Hz is not allowed: it must be positive and finite, or None."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Sample rate {sample_rate_hz} Hz is not allowed: it must be positive and finite, or None."
+        )
     if sample_rate_hz is not None and duration_s * sample_rate_hz > MOST_SAMPLES:
-        msg = (
+        raise ValueError(
             f"{duration_s * sample_rate_hz:.3g} samples are not allowed: {MOST_SAMPLES:.1g} at most; "
             "lower the sample rate or cut the run."
         )
-        raise ValueError(msg)
 
 
 def check_within(available_s: float, end_s: float) -> None:
     """Refuse a run that lasts longer than its drive."""
     if end_s > available_s * (1.0 + ROUNDING):
-        msg = f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
-        raise ValueError(msg)
+        raise ValueError(
+            f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
+        )
 
 
 BATCH = 1 << 16

@@ -122,19 +122,19 @@ def steady_response(
 def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
     """Refuse windows that cannot be observed; return the number of whole periods in the window."""
     if drive.amplitude_m == 0.0:
-        msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
-        raise ValueError(msg)
+        raise ValueError(
+            "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
+        )
     if not 0.0 < duration_s < math.inf:
-        msg = f"Duration {duration_s} s is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"Duration {duration_s} s is not allowed: it must be positive and finite.")
     if not 0.0 < window_s <= duration_s:
-        msg = f"Window {window_s} s is not allowed: it must be positive and within the run of {duration_s} s."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Window {window_s} s is not allowed: it must be positive and within the run of {duration_s} s."
+        )
     periods = math.floor(window_s * drive.frequency_hz * (1.0 + WHOLE))
     if periods < 1:
-        msg = (
+        raise ValueError(
             f"Window {window_s} s is not allowed at {drive.frequency_hz} Hz: "
             f"it must hold one drive period, {1.0 / drive.frequency_hz} s."
         )
-        raise ValueError(msg)
     return periods

@@ -50,11 +50,10 @@ class BalanceOptions:
     def __post_init__(self) -> None:
         object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
         if not (1 <= self.fewest <= self.most and 0.0 < self.tolerance < math.inf):
-            msg = (
+            raise ValueError(
                 f"From {self.fewest} to {self.most} harmonics at tolerance {self.tolerance} is not allowed: "
                 "at least 1, ascending, and positive."
             )
-            raise ValueError(msg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +113,11 @@ def balance(
         contact needs a near one, such as a neighbour's or an integrated orbit's.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
-        msg = f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: both must be positive."
-        raise ValueError(msg)
+        raise ValueError(
+            f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: both must be positive."
+        )
     if options.kept is HarmonicSet.ODD and not spring.is_odd:
-        msg = "Odd harmonics alone cannot describe unequal stops: choose HarmonicSet.ALL."
-        raise ValueError(msg)
+        raise ValueError("Odd harmonics alone cannot describe unequal stops: choose HarmonicSet.ALL.")
     omega = 2.0 * math.pi * frequency_hz
     guess = first_guess(structure, spring, frequency_hz, amplitude_m) if start is None else start
     highest = options.fewest
@@ -253,8 +252,9 @@ def balance_branch_within(
     the start did not converge, or lies outside.
     """
     if start.outcome is BalanceEnd.NO_SOLUTION:
-        msg = f"A branch cannot start at {start.frequency_hz} Hz and {start.amplitude_m} m: {start.outcome}."
-        raise ValueError(msg)
+        raise ValueError(
+            f"A branch cannot start at {start.frequency_hz} Hz and {start.amplitude_m} m: {start.outcome}."
+        )
     value = parameter_value(path, Harmonic(start.frequency_hz, start.amplitude_m))
     scale = range_scale(low, high, value)
     problem = BalanceProblem(structure, spring, start.harmonics)

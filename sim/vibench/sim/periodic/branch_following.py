@@ -55,11 +55,10 @@ class FrequencyPath:
         given = max(1, len(self.frequencies_hz))
         ascending = all(before < after for before, after in pairwise(self.frequencies_hz))
         if len(self.amplitudes_m) != given or given == 1 != len(self.amplitudes_m) or not ascending:
-            msg = (
+            raise ValueError(
                 f"{len(self.amplitudes_m)} amplitudes at {len(self.frequencies_hz)} frequencies are not "
                 "allowed: one amplitude alone, or one for each of two or more ascending frequencies."
             )
-            raise ValueError(msg)
         for amplitude in self.amplitudes_m:
             _refuse_unless_positive("amplitude", amplitude, "m")
 
@@ -120,8 +119,7 @@ def path_from(parameter: Parameter, frequency_hz: float, amplitude_m: float) -> 
 
 def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
     if not 0.0 < value < math.inf:
-        msg = f"A drive {name} of {value} {unit} is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"A drive {name} of {value} {unit} is not allowed: it must be positive and finite.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +183,7 @@ def branch_range(
     """Return the start of a branch to ``stop``, and its unit of length [Hz, m]."""
     value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
     if not 0.0 < stop < math.inf or stop == value:
-        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
-        raise ValueError(msg)
+        raise ValueError(f"A branch from {value} to {stop} is not allowed: positive, and two different ends.")
     return value, abs(stop - value) / RANGE_LENGTH
 
 
@@ -198,8 +195,9 @@ def parameter_value(path: DrivePath, drive: Harmonic) -> float:
 def range_scale(low: float, high: float, value: float) -> float:
     """Return the unit of length of a range [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
-        msg = f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
-        raise ValueError(msg)
+        raise ValueError(
+            f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
+        )
     return (high - low) / RANGE_LENGTH
 
 

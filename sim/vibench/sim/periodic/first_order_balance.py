@@ -98,8 +98,9 @@ def fundamental_share(exponent: int) -> float:
     Whole numbers of any size divided once: correctly rounded for every odd n.
     """
     if exponent < 1 or exponent % 2 == 0:
-        msg = f"Exponent {exponent} is not allowed: the first-order balance takes odd powers 1, 3, 5, ..."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Exponent {exponent} is not allowed: the first-order balance takes odd powers 1, 3, 5, ..."
+        )
     return math.comb(exponent, (exponent - 1) // 2) / (1 << (exponent - 1))
 
 
@@ -133,11 +134,10 @@ def first_order_states(
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
-        msg = (
+        raise ValueError(
             f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: "
             "its frequency must be positive, its amplitude zero or positive, both finite."
         )
-        raise ValueError(msg)
     seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
     drive = -1j * amplitude_m
     alone = seen.linear * drive

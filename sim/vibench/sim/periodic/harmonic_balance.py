@@ -51,8 +51,9 @@ class LinearStructure:
         size = len(self.direction)
         square = all(table.shape == (size, size) for table in (self.mass, self.damping, self.stiffness))
         if not square or self.entry_stiffness.shape != (size,) or self.entry_damping.shape != (size,):
-            msg = f"The matrices and entries of this structure do not fit its direction of {size} places."
-            raise ValueError(msg)
+            raise ValueError(
+                f"The matrices and entries of this structure do not fit its direction of {size} places."
+            )
 
     @property
     def size(self) -> int:
@@ -246,8 +247,7 @@ class BalanceEnd(StrEnum):
 def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
     """Harmonic numbers, ascending."""
     if highest < 1:
-        msg = f"Highest harmonic {highest} is not allowed: it must be 1 or more."
-        raise ValueError(msg)
+        raise ValueError(f"Highest harmonic {highest} is not allowed: it must be 1 or more.")
     return np.arange(1, highest + 1, 2) if kept is HarmonicSet.ODD else np.arange(highest + 1)
 
 

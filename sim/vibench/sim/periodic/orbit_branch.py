@@ -147,7 +147,6 @@ def _family_at(
     orbit: PeriodicOrbit, path: DrivePath, value: float, scale: float
 ) -> tuple[OrbitFamily, Vector]:
     if orbit.outcome is not ShootingEnd.CONVERGED:
-        msg = f"A branch cannot start at {orbit.drive}: {orbit.outcome}."
-        raise ValueError(msg)
+        raise ValueError(f"A branch cannot start at {orbit.drive}: {orbit.outcome}.")
     family = OrbitFamily(orbit.period_map, path, orbit.drive, scale)
     return family, np.append(orbit.state / family.scales, value / scale)

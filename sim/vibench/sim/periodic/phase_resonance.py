@@ -142,20 +142,18 @@ def phase_resonance_branch(
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     if not any(specimen.dampings):
-        msg = (
+        raise ValueError(
             "A specimen without damping has no phase resonance: at a resonance its motion without contacts "
             "grows without end. Give a damping time above 0."
         )
-        raise ValueError(msg)
     frequency_hz = linear_phase_resonance_hz(specimen, band_hz, of, phase_rad)
     drive = Harmonic(frequency_hz, low_m)
     answer = base_transmissibility(specimen, frequency_hz)[0]
     if not 0.0 < low_m < high_m or low_m * abs(answer[3]) >= min(specimen.gaps_m):
-        msg = (
+        raise ValueError(
             f"Levels {low_m:g} to {high_m:g} m are not allowed: ascending, and the lower one below "
             f"{min(specimen.gaps_m) / abs(answer[3]):.3g} m, where m1 reaches its stops."
         )
-        raise ValueError(msg)
     phasors = -1j * low_m * answer[:3]
     state = np.concatenate([phasors.real, (2j * math.pi * frequency_hz * phasors).real])
     family = PhaseResonanceFamily(PeriodMap(specimen, OrbitShape.MIRRORED), drive, phase_rad, of)
@@ -163,11 +161,10 @@ def phase_resonance_branch(
     start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
     if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
         # Contacts that act at every p move it away from the linear motion.
-        msg = (
+        raise ValueError(
             f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
             "beginning with the linear one: give a lower level to begin with, or a wider band."
         )
-        raise ValueError(msg)
     far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
     return follow(family, start, 1.0, (-1e-9, far), steps)
 
@@ -193,8 +190,7 @@ def linear_phase_resonance_hz(
     if len(found_hz) == 1:
         return found_hz[0]
     where = f"at {', '.join(f'{each:.4g}' for each in found_hz)} Hz" if found_hz else "nowhere"
-    msg = (
+    raise ValueError(
         f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 over the base is {where} "
         f"{math.degrees(phase_rad):.3g} degrees: give a band around one mode."
     )
-    raise ValueError(msg)

@@ -55,12 +55,14 @@ class PowerSpring:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.length < math.inf:
-            msg = f"Reference displacement {self.length} m is not allowed: it must be positive and finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Reference displacement {self.length} m is not allowed: it must be positive and finite."
+            )
         for exponent, force in self.terms:
             if exponent < 1 or exponent % 2 == 0 or not math.isfinite(force):
-                msg = f"The term ({exponent}, {force} N) is not allowed: odd exponent, finite force."
-                raise ValueError(msg)
+                raise ValueError(
+                    f"The term ({exponent}, {force} N) is not allowed: odd exponent, finite force."
+                )
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -107,14 +109,14 @@ class GapSpring:
 
     def __post_init__(self) -> None:
         if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
-            msg = (
+            raise ValueError(
                 f"A stop of stiffness {self.stiffness_coefficient}, exponent {self.exponent} and loss "
                 f"{self.loss} s/m is not allowed: positive, at least 1, zero or more."
             )
-            raise ValueError(msg)
         if not (self.upper > 0.0 and self.lower > 0.0 and math.isfinite(min(self.upper, self.lower))):
-            msg = f"Stops at {self.upper} and -{self.lower} m are not allowed: positive, one of them finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Stops at {self.upper} and -{self.lower} m are not allowed: positive, one of them finite."
+            )
 
     @property
     def length(self) -> float:
@@ -197,7 +199,8 @@ def spring_of(specimen: Specimen) -> RestoringForce:
         case NoContact():
             return NoForce()
         case RigidStops():
-            msg = "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
-            raise ValueError(msg)
+            raise ValueError(
+                "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
+            )
         case law:
             return GapSpring(*law.stops.term, upper, lower, law.stops.loss, law.stops.spring_beside)

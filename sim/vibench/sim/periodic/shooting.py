@@ -66,11 +66,11 @@ class PeriodMap:
 
     def __post_init__(self) -> None:
         if self.periods < 1:
-            msg = f"A motion of {self.periods} periods is not allowed: 1 or more."
-            raise ValueError(msg)
+            raise ValueError(f"A motion of {self.periods} periods is not allowed: 1 or more.")
         if self.shape is OrbitShape.MIRRORED and self.periods % 2 == 0:
-            msg = f"A mirrored motion of {self.periods} periods cannot be: an odd number, or a repeated one."
-            raise ValueError(msg)
+            raise ValueError(
+                f"A mirrored motion of {self.periods} periods cannot be: an odd number, or a repeated one."
+            )
 
     @property
     def turns(self) -> float:
@@ -227,8 +227,9 @@ def periodic_orbit(
         x, y, z, vx, vy, vz at time zero, shape (6,); None takes where a run from rest is after 400 periods.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
-        msg = f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."
+        )
     mapping = PeriodMap(specimen, chosen(OrbitShape, shape), periods)
     settling = SETTLING_PERIODS / drive.frequency_hz
     first = integrate(specimen, drive, settling).final_state if start is None else start_motion(start)

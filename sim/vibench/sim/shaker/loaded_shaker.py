@@ -46,18 +46,17 @@ class Amplifier:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
-            msg = f"A gain of {self.gain} is not allowed: it must be finite and not zero."
-            raise ValueError(msg)
+            raise ValueError(f"A gain of {self.gain} is not allowed: it must be finite and not zero.")
         if not 0.0 <= self.low_cut_hz < self.high_cut_hz:
-            msg = (
+            raise ValueError(
                 f"A band from {self.low_cut_hz} to {self.high_cut_hz} Hz is not allowed: it must begin at "
                 "0 Hz or above, and end above its beginning."
             )
-            raise ValueError(msg)
         for name in ("clip_v", "current_limit_a"):
             if not getattr(self, name) > 0.0:
-                msg = f"{name} = {getattr(self, name)} is not allowed: it must be positive, or infinite."
-                raise ValueError(msg)
+                raise ValueError(
+                    f"{name} = {getattr(self, name)} is not allowed: it must be positive, or infinite."
+                )
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,7 @@ class Shaker:
         for each in fields(self):
             value = getattr(self, each.name)
             if not 0.0 < value <= (math.inf if each.name == "stroke_m" else 1e300):
-                msg = f"{each.name} = {value} is not allowed: it must be positive."
-                raise ValueError(msg)
+                raise ValueError(f"{each.name} = {value} is not allowed: it must be positive.")
 
     def equations(self) -> StateSpace:
         """Return coil and table as first-order equations, driven by the coil's voltage and a force.
@@ -288,11 +286,10 @@ class LoadedShaker:
     def account(self, good: int, count: int) -> None:
         """Raise MotionFailed if only ``good`` steps of a stretch were completed."""
         if good < count:
-            msg = (
+            raise MotionFailed(
                 f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
                 "or a contact made no progress. Lower the drive, or check it for values that are no numbers"
             )
-            raise MotionFailed(msg)
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:

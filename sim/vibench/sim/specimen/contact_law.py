@@ -51,5 +51,4 @@ def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw
         except UnreadableLawError:
             pass
     *forms, last = (law.form for law in CONTACT_LAWS.values())
-    msg = f"Contact {text!r} is not known: give one of {', '.join(forms)}, {last}."
-    raise ValueError(msg)
+    raise ValueError(f"Contact {text!r} is not known: give one of {', '.join(forms)}, {last}.")

@@ -31,8 +31,7 @@ class Harmonic:
         _require_frequency("Drive frequency", self.frequency_hz)
         _require_amplitude(self.amplitude_m)
         if not math.isfinite(self.phase_rad):
-            msg = f"Drive phase {self.phase_rad} rad is not allowed: it must be finite."
-            raise ValueError(msg)
+            raise ValueError(f"Drive phase {self.phase_rad} rad is not allowed: it must be finite.")
 
 
 @dataclass(frozen=True)
@@ -103,16 +102,16 @@ class Sampled:
     def __post_init__(self) -> None:
         samples = np.array(self.displacement_m, dtype=np.float64)
         if samples.ndim != 1 or len(samples) < FEWEST_SAMPLES:
-            msg = (
+            raise ValueError(
                 f"A sampled drive of shape {samples.shape} is not allowed: "
                 f"give one row of {FEWEST_SAMPLES} samples or more."
             )
-            raise ValueError(msg)
         _require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
         if not bool(np.all(np.isfinite(samples))):
             bad = int(np.flatnonzero(~np.isfinite(samples))[0])
-            msg = f"Sample {bad} of the drive is {samples[bad]}: every displacement must be finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Sample {bad} of the drive is {samples[bad]}: every displacement must be finite."
+            )
         samples.flags.writeable = False
         object.__setattr__(self, "displacement_m", samples)
 
@@ -128,26 +127,23 @@ Drive = Harmonic | LinearSweep | LogarithmicSweep | Sampled
 
 def _require_positive(name: str, value: float, unit: str) -> None:
     if not 0.0 < value < math.inf:
-        msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"{name} {value} {unit} is not allowed: it must be positive and finite.")
 
 
 def _require_frequency(name: str, frequency_hz: float) -> None:
     if not LOWEST_FREQUENCY_HZ <= frequency_hz <= HIGHEST_FREQUENCY_HZ:
-        msg = (
+        raise ValueError(
             f"{name} {frequency_hz} Hz is not allowed: "
             f"it must lie between {LOWEST_FREQUENCY_HZ:g} and {HIGHEST_FREQUENCY_HZ:g} Hz."
         )
-        raise ValueError(msg)
 
 
 def _require_amplitude(amplitude_m: float) -> None:
     if amplitude_m != 0.0 and not SMALLEST_AMPLITUDE_M <= amplitude_m <= LARGEST_AMPLITUDE_M:
-        msg = (
+        raise ValueError(
             f"Drive amplitude {amplitude_m} m is not allowed: "
             f"it must be zero, or lie between {SMALLEST_AMPLITUDE_M:g} and {LARGEST_AMPLITUDE_M:g} m."
         )
-        raise ValueError(msg)
 
 
 def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude_m: float) -> None:
@@ -156,8 +152,9 @@ def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude
     _require_positive("Sweep duration", duration_s, "s")
     _require_amplitude(amplitude_m)
     if start_hz == stop_hz:
-        msg = f"A sweep from {start_hz} to {stop_hz} Hz is not allowed: for one frequency use Harmonic."
-        raise ValueError(msg)
+        raise ValueError(
+            f"A sweep from {start_hz} to {stop_hz} Hz is not allowed: for one frequency use Harmonic."
+        )
 
 
 WHOLE = 1e-9

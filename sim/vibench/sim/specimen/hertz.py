@@ -48,11 +48,13 @@ class Elasticity:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.youngs_modulus < math.inf:
-            msg = f"Young's modulus {self.youngs_modulus} Pa is not allowed: it must be positive and finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Young's modulus {self.youngs_modulus} Pa is not allowed: it must be positive and finite."
+            )
         if not -1.0 < self.poissons_ratio <= 0.5:
-            msg = f"Poisson's ratio {self.poissons_ratio} is not allowed: it must lie in (-1, 0.5]."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Poisson's ratio {self.poissons_ratio} is not allowed: it must lie in (-1, 0.5]."
+            )
 
     @property
     def plane_strain_compliance(self) -> float:
@@ -69,7 +71,6 @@ def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> f
     Raises ValueError when the radius is not positive.
     """
     if not 0.0 < radius_m < math.inf:
-        msg = f"Sphere radius {radius_m} m is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"Sphere radius {radius_m} m is not allowed: it must be positive and finite.")
     modulus = 1.0 / (sphere.plane_strain_compliance + plane.plane_strain_compliance)
     return 4.0 / 3.0 * modulus * math.sqrt(radius_m)

@@ -31,8 +31,9 @@ class HuntCrossley:
     def __post_init__(self) -> None:
         require_positive("Contact stiffness", self.stiffness, "N/m^1.5")
         if not 0.0 <= self.loss < math.inf:
-            msg = f"Contact loss {self.loss} s/m is not allowed: it must be zero or positive, and finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"Contact loss {self.loss} s/m is not allowed: it must be zero or positive, and finite."
+            )
 
     @property
     def stops(self) -> Stops:

@@ -52,8 +52,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
-        msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
-        raise ValueError(msg)
+        raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
     omega = 2.0 * np.pi * frequency
     (m0, m1, m2), squared = specimen.masses, omega**2
     springs, dampers = specimen.stiffnesses, specimen.dampings
@@ -115,11 +114,10 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     modes, omega, _ = np.linalg.svd(factor)
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
-        msg = (
+        raise ValueError(
             f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s span more than double "
             "precision resolves: give masses and stiffnesses closer to each other."
         )
-        raise ValueError(msg)
     losses = modes.T @ (damping / np.outer(root, root)) @ modes
     shapes, rows = modes / root[:, None], (modes * root[:, None]).T
     diagonal = np.diag(losses)

@@ -45,19 +45,16 @@ class PowerLaw:
     def __post_init__(self) -> None:
         require_positive("Reference displacement", self.reference, "m")
         if not self.terms:
-            msg = "A power law without terms is not allowed: give one exponent or more."
-            raise ValueError(msg)
+            raise ValueError("A power law without terms is not allowed: give one exponent or more.")
         if len(self.terms) > MOST_TERMS:
-            msg = f"A power law of {len(self.terms)} terms is not allowed: at most {MOST_TERMS}."
-            raise ValueError(msg)
+            raise ValueError(f"A power law of {len(self.terms)} terms is not allowed: at most {MOST_TERMS}.")
         previous = 0
         for exponent, force in self.terms:
             if exponent % 2 == 0 or not max(previous, 1) < exponent <= HIGHEST_EXPONENT:
-                msg = (
+                raise ValueError(
                     f"Exponents {[n for n, _ in self.terms]} are not allowed: "
                     f"odd, ascending, from 3 to {HIGHEST_EXPONENT}."
                 )
-                raise ValueError(msg)
             require_positive(f"Force of p^{exponent} at the reference", force, "N")
             previous = exponent
 
@@ -90,8 +87,9 @@ def fit_power_law(
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
-        msg = f"Shares {parts} of exponents {list(exponents)} are not allowed: one each, adding up to 1."
-        raise ValueError(msg)
+        raise ValueError(
+            f"Shares {parts} of exponents {list(exponents)} are not allowed: one each, adding up to 1."
+        )
     require_positive("Indentation of the fit", indentation_m, "m")
     force = contact_stiffness * indentation_m**HERTZ_EXPONENT
     terms = sorted((n, part * force) for n, part in zip(exponents, parts, strict=True))

@@ -20,8 +20,7 @@ class RigidStops:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.restitution <= 1.0:
-            msg = f"Restitution {self.restitution} is not allowed: it must lie in [0, 1]."
-            raise ValueError(msg)
+            raise ValueError(f"Restitution {self.restitution} is not allowed: it must lie in [0, 1].")
 
     @property
     def stops(self) -> Stops:

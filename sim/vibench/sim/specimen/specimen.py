@@ -57,16 +57,16 @@ class Specimen:
         _refuse_unless_positive("stiffness k", "N/m", self.stiffnesses)
         for index, damping in enumerate(self.dampings):
             if not 0.0 <= damping < math.inf:
-                msg = f"Damping c{index} = {damping} N s/m is not allowed: it must be zero or positive."
-                raise ValueError(msg)
+                raise ValueError(
+                    f"Damping c{index} = {damping} N s/m is not allowed: it must be zero or positive."
+                )
         lower, upper = self.gaps_m
         if not (lower > 0.0 and upper > 0.0 and min(lower, upper) < math.inf):
-            msg = (
+            raise ValueError(
                 f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
                 "it must be positive, and one side finite; "
                 'for no stops at all give the contact "linear".'
             )
-            raise ValueError(msg)
 
     @property
     def gaps_m(self) -> Gaps:
@@ -179,12 +179,10 @@ def gong2025(
         `vibench.sim.specimen`.
     """
     if not 0.0 <= damping_time_s < math.inf:
-        msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."
-        raise ValueError(msg)
+        raise ValueError(f"Damping time {damping_time_s} s is not allowed: it must be zero or positive.")
     stiffness = hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)
     if isinstance(gap_m, tuple) and len(gap_m) != len(("lower", "upper")):
-        msg = f"Gap {gap_m} m is not allowed: give one clearance, or (lower, upper)."
-        raise ValueError(msg)
+        raise ValueError(f"Gap {gap_m} m is not allowed: give one clearance, or (lower, upper).")
     lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
     law = law_by_name(contact, stiffness, upper if lower is None else min(lower, upper))
     m0, m1, m2 = PAPER_MASSES
@@ -203,8 +201,9 @@ def gong2025(
 def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
     for index, value in enumerate(values):
         if not 0.0 < value < math.inf:
-            msg = f"The {name}{index} = {value} {unit} is not allowed: it must be positive and finite."
-            raise ValueError(msg)
+            raise ValueError(
+                f"The {name}{index} = {value} {unit} is not allowed: it must be positive and finite."
+            )
 
 
 def _chain_matrix(links: Triple) -> Matrix:

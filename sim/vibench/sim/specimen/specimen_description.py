@@ -272,8 +272,7 @@ class SpecimenDescription(_Described):
             assert self.dampings_ns_per_m is not None, "one of the two is given"
             return self.dampings_ns_per_m
         if not 0.0 <= time_s < math.inf:
-            msg = f"Damping time {time_s} s is not allowed: it must be zero or positive."
-            raise ValueError(msg)
+            raise ValueError(f"Damping time {time_s} s is not allowed: it must be zero or positive.")
         k0, k1, k2 = self.stiffnesses
         return time_s * k0, time_s * k1, time_s * k2
 

@@ -88,8 +88,7 @@ def require_nothing(detail: str) -> None:
 def require_positive(name: str, value: float, unit: str) -> None:
     """Refuse numbers that are not positive and finite."""
     if not 0.0 < value < math.inf:
-        msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
-        raise ValueError(msg)
+        raise ValueError(f"{name} {value} {unit} is not allowed: it must be positive and finite.")
 
 
 Choice = TypeVar("Choice", bound=StrEnum)
@@ -103,5 +102,4 @@ def chosen(kind: type[Choice], word: str) -> Choice:
     try:
         return kind(word)
     except ValueError:
-        msg = f"{kind.__name__} {word!r} is not allowed: give one of {', '.join(kind)}."
-        raise ValueError(msg) from None
+        raise ValueError(f"{kind.__name__} {word!r} is not allowed: give one of {', '.join(kind)}.") from None
