@@ -43,6 +43,8 @@ def chain_response_to(
 ) -> TargetedResponse:
     """Observe windows until their later half determines the lines to the requested error.
 
+    Raises ValueError when one drive period takes longer.
+
     Parameters
     ----------
     chain, drive
@@ -51,9 +53,6 @@ def chain_response_to(
         Relative, of the transmission of every cell; as small as the time allows when None.
     time_s
         From the call to the answer; a minute when None [s].
-
-    ``error`` is relative, of the transmission of every cell; None: as small as the time allows. The time is
-    that from the call to the answer; None: a minute.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
