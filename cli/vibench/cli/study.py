@@ -45,7 +45,11 @@ def study(
         plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
     )
     if only_estimate:
-        print_work(request, as_json)
+        points, work_s = request.grid.size, planned_work_s(request)
+        if as_json:
+            print_json({"points": points, "work_s": work_s})
+        else:
+            console.print(f"{points} points, planned as {work_s:.2g} s of one core")
         return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with (
@@ -57,17 +61,10 @@ def study(
     if as_json:
         print_json(document(results, out))
     else:
-        print_progress(results, out)
+        failed = sum(1 for _ in results.failures())
+        state = "complete" if results.is_complete else "stopped: continue with --resume"
+        console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
     complain_about_points(request, list(results.failures()), results.kept)
-
-
-def print_work(study: Study, as_json: bool) -> None:
-    """Print the number of points and the estimated work."""
-    points, work_s = study.grid.size, planned_work_s(study)
-    if as_json:
-        print_json({"points": points, "work_s": work_s})
-    else:
-        console.print(f"{points} points, planned as {work_s:.2g} s of one core")
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
@@ -81,13 +78,6 @@ def document(results: StudyResults, out: Path) -> dict[str, object]:
         "failures": [{**where, "message": why} for where, why in results.failures()],
         "study": results.study.model_dump(mode="json"),
     }
-
-
-def print_progress(results: StudyResults, out: Path) -> None:
-    """Print the progress of a study."""
-    failed = sum(1 for _ in results.failures())
-    state = "complete" if results.is_complete else "stopped: continue with --resume"
-    console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
 
 
 _DIGEST = 16

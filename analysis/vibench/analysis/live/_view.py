@@ -352,10 +352,6 @@ class LiveView:
     def _has(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)
 
-    def _settled(self) -> int:
-        """Return the number of samples after the lead-in."""
-        return max(0, self._ring.next_sample - self._lead_in)
-
     def _is_point_due(self) -> bool:
         return self._ring.next_sample - self._pointed >= _POINT_EVERY_S * self._rate_hz
 
@@ -364,7 +360,7 @@ class LiveView:
         lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * self._band_hz[0])
         wanted = max(stretch_samples(lowest_hz, self._rate_hz), look_samples(self._rate_hz))
         rows = (self._rows[DRIVE], self._rows[BASE], self._rows[self._response])
-        newest = self._ring.newest(min(wanted, self._settled()))
+        newest = self._ring.newest(min(wanted, max(0, self._ring.next_sample - self._lead_in)))
         point = sine_point(newest, rows, self._rate_hz, self._quantity)
         if point is not None:
             self._trace.add(point)

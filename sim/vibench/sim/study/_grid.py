@@ -268,11 +268,6 @@ class StudyAxis:
         return bool(self.units)
 
 
-def grid_of(axes: tuple[StudyAxis, ...]) -> Grid:
-    """Grid over these axes, the last one running fastest."""
-    return Grid(tuple(len(axis.values) for axis in axes), tuple(axis.is_ordered for axis in axes))
-
-
 class GridPlan(FrozenModel, ABC):
     """Complete plan; equal plans have equal results."""
 
@@ -294,7 +289,9 @@ class GridPlan(FrozenModel, ABC):
     @property
     def grid(self) -> Grid:
         """All points."""
-        return grid_of(self.axes)
+        return Grid(
+            tuple(len(axis.values) for axis in self.axes), tuple(axis.is_ordered for axis in self.axes)
+        )
 
     def coordinates(self, number: int) -> dict[str, float | str]:
         """Values of the axes at a point."""

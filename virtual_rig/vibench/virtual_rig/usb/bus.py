@@ -206,15 +206,60 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
 
     def get_device_descriptor(self, dev: _Port) -> SimpleNamespace:
         """Return the device descriptor."""
-        return device_descriptor(dev.device.identification, dev.address)
+        return SimpleNamespace(
+            bLength=_DEVICE_BYTES,
+            bDescriptorType=usb.util.DESC_TYPE_DEVICE,
+            bcdUSB=0x0200,
+            bDeviceClass=0,
+            bDeviceSubClass=0,
+            bDeviceProtocol=0,
+            bMaxPacketSize0=_CONTROL_PACKET_BYTES,
+            idVendor=dev.device.identification.vendor_id,
+            idProduct=dev.device.identification.product_id,
+            bcdDevice=0x0100,
+            iManufacturer=_MAKER,
+            iProduct=_PRODUCT,
+            iSerialNumber=_SERIAL,
+            bNumConfigurations=1,
+            address=dev.address,
+            bus=1,
+            port_number=dev.address,
+            port_numbers=(dev.address,),
+            speed=_HIGH_SPEED,
+        )
 
     def get_configuration_descriptor(self, dev: _Port, config: int) -> SimpleNamespace:  # noqa: ARG002
         """Return a configuration; IndexError past the last."""
-        return configuration_descriptor(config)
+        if config != 0:
+            raise IndexError(config)
+        return SimpleNamespace(
+            bLength=_CONFIGURATION_BYTES,
+            bDescriptorType=usb.util.DESC_TYPE_CONFIG,
+            wTotalLength=_CONFIGURATION_BYTES + _INTERFACE_BYTES + _ENDPOINT_BYTES * len(_ENDPOINTS),
+            bNumInterfaces=1,
+            bConfigurationValue=1,
+            iConfiguration=0,
+            bmAttributes=_SELF_POWERED,
+            bMaxPower=1,
+            extra_descriptors=array("B"),
+        )
 
     def get_interface_descriptor(self, dev: _Port, intf: int, alt: int, config: int) -> SimpleNamespace:  # noqa: ARG002
         """Return an interface; IndexError past the last."""
-        return interface_descriptor(intf, alt)
+        if (intf, alt) != (0, 0):
+            raise IndexError((intf, alt))
+        return SimpleNamespace(
+            bLength=_INTERFACE_BYTES,
+            bDescriptorType=usb.util.DESC_TYPE_INTERFACE,
+            bInterfaceNumber=0,
+            bAlternateSetting=0,
+            bNumEndpoints=len(_ENDPOINTS),
+            bInterfaceClass=_TMC_CLASS,
+            bInterfaceSubClass=_TMC_SUBCLASS,
+            bInterfaceProtocol=_USB488_PROTOCOL,
+            iInterface=0,
+            extra_descriptors=array("B"),
+        )
 
     def get_endpoint_descriptor(
         self,
@@ -399,66 +444,6 @@ _CONTROL_PACKET_BYTES = 64
 _DEVICE_BYTES, _CONFIGURATION_BYTES, _INTERFACE_BYTES, _ENDPOINT_BYTES = 18, 9, 9, 7
 _SELF_POWERED = 0xC0
 _ENDPOINTS = (BULK_OUT, BULK_IN)
-
-
-def device_descriptor(identification: Identification, address: int) -> SimpleNamespace:
-    """Return the device descriptor (table 9-8) and the device's position on the bus."""
-    return SimpleNamespace(
-        bLength=_DEVICE_BYTES,
-        bDescriptorType=usb.util.DESC_TYPE_DEVICE,
-        bcdUSB=0x0200,
-        bDeviceClass=0,
-        bDeviceSubClass=0,
-        bDeviceProtocol=0,
-        bMaxPacketSize0=_CONTROL_PACKET_BYTES,
-        idVendor=identification.vendor_id,
-        idProduct=identification.product_id,
-        bcdDevice=0x0100,
-        iManufacturer=_MAKER,
-        iProduct=_PRODUCT,
-        iSerialNumber=_SERIAL,
-        bNumConfigurations=1,
-        address=address,
-        bus=1,
-        port_number=address,
-        port_numbers=(address,),
-        speed=_HIGH_SPEED,
-    )
-
-
-def configuration_descriptor(config: int) -> SimpleNamespace:
-    """Return the only configuration (table 9-10); IndexError for others."""
-    if config != 0:
-        raise IndexError(config)
-    return SimpleNamespace(
-        bLength=_CONFIGURATION_BYTES,
-        bDescriptorType=usb.util.DESC_TYPE_CONFIG,
-        wTotalLength=_CONFIGURATION_BYTES + _INTERFACE_BYTES + _ENDPOINT_BYTES * len(_ENDPOINTS),
-        bNumInterfaces=1,
-        bConfigurationValue=1,
-        iConfiguration=0,
-        bmAttributes=_SELF_POWERED,
-        bMaxPower=1,
-        extra_descriptors=array("B"),
-    )
-
-
-def interface_descriptor(interface: int, alternate: int) -> SimpleNamespace:
-    """Return the only interface, USBTMC with the USB488 protocol (table 9-12); IndexError for others."""
-    if (interface, alternate) != (0, 0):
-        raise IndexError((interface, alternate))
-    return SimpleNamespace(
-        bLength=_INTERFACE_BYTES,
-        bDescriptorType=usb.util.DESC_TYPE_INTERFACE,
-        bInterfaceNumber=0,
-        bAlternateSetting=0,
-        bNumEndpoints=len(_ENDPOINTS),
-        bInterfaceClass=_TMC_CLASS,
-        bInterfaceSubClass=_TMC_SUBCLASS,
-        bInterfaceProtocol=_USB488_PROTOCOL,
-        iInterface=0,
-        extra_descriptors=array("B"),
-    )
 
 
 def string_descriptor(identification: Identification, index: int) -> bytes | None:
