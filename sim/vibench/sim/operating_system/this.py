@@ -9,60 +9,25 @@ from enum import Enum, auto
 from pathlib import Path
 
 if sys.platform == "win32":
-    from .windows import (
-        allocate,
-        bound_memory,
-        is_locked_alone,
-        lock_in_use,
-        lock_sole_writer,
-        lower_priority,
-        open_for_all,
-        open_to_write,
-        process_start,
-        read_at,
-        sync_data,
-        sync_folder,
-        usual_shared_folder,
-        usual_state_folder,
-        write_at,
-    )
+    from . import windows as system
 else:
-    from .posix import (
-        allocate,
-        bound_memory,
-        is_locked_alone,
-        lock_in_use,
-        lock_sole_writer,
-        lower_priority,
-        open_for_all,
-        open_to_write,
-        process_start,
-        read_at,
-        sync_data,
-        sync_folder,
-        usual_shared_folder,
-        usual_state_folder,
-        write_at,
-    )
+    from . import posix as system
 
-__all__ = [
-    "allocate",
-    "bound_memory",
-    "is_locked_alone",
-    "lock_in_use",
-    "lock_sole_writer",
-    "lower_priority",
-    "open_for_all",
-    "open_to_write",
-    "process_start",
-    "read_at",
-    "rename",
-    "sync_data",
-    "sync_folder",
-    "usual_shared_folder",
-    "usual_state_folder",
-    "write_at",
-]
+allocate = system.allocate
+bound_memory = system.bound_memory
+is_locked_alone = system.is_locked_alone
+lock_in_use = system.lock_in_use
+lock_sole_writer = system.lock_sole_writer
+lower_priority = system.lower_priority
+open_for_all = system.open_for_all
+open_to_write = system.open_to_write
+process_start = system.process_start
+read_at = system.read_at
+sync_data = system.sync_data
+sync_folder = system.sync_folder
+usual_shared_folder = system.usual_shared_folder
+usual_state_folder = system.usual_state_folder
+write_at = system.write_at
 
 
 Buffer = bytes | memoryview
