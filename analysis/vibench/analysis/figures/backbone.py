@@ -18,18 +18,8 @@ from ..sine.stepped_response import (
     tracked_resonances,
 )
 from ..tables import rows, table
+from . import style
 from .stepped_sine import tracked_caption
-from .style import (
-    BOUNDS,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    DrawnFigure,
-    legend_above,
-    new_figure,
-    prefixed,
-    styled,
-)
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
@@ -43,14 +33,16 @@ _LOST = "no resonance found at this level"
 _SIMULATED = "simulated under the recorded base"
 
 
-def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
+def backbone_figure(
+    analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None
+) -> style.DrawnFigure:
     """Draw the resonance over level, and m0's amplitude over the resonance, for levels where it was found."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, laid)
     lost = lost_levels(analysis.facts.feedback)
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         places = figure.subplot_mosaic([["frequency", "backbone"], ["amplitude", "backbone"]])
         broken = _broken(levels, lost)
         _frequencies(places["frequency"], broken)
@@ -61,14 +53,14 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
             places[each].set_xlim(0.0, (1 + _MARGIN) * max((*base, *lost)))
         places["frequency"].sharex(places["amplitude"])
         places["frequency"].tick_params(labelbottom=False)
-        legend_above(figure, [places["frequency"], places["amplitude"]], columns=2)
+        style.legend_above(figure, [places["frequency"], places["amplitude"]], columns=2)
     name = f"backbone_{analysis.facts.name}"
     columns = rows(
         levels, "base_m_per_s2 frequency_hz u_frequency_hz mode_hz u_mode_hz damping_ratio amplitude_m"
     )
     if simulated_m is not None:
         columns["amplitude_m_simulated"] = simulated_m
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title=f"Tracked resonance, around {np.median(columns['frequency_hz']):.4g} Hz",
         caption=_caption(analysis, levels),
@@ -91,19 +83,19 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
     """Return amplitudes in a readable unit, with its factor and name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
-    scale, unit = prefixed(float(np.nanmax(amplitude_m)), "m")
+    scale, unit = style.prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
 
 
 def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
     axes.errorbar(
         _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
-        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
+        color=style.MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
     )  # fmt: skip
     mode_hz, u_hz = rows(levels, "mode_hz u_mode_hz").values()
     if np.isfinite(mode_hz).any():
         axes.errorbar(
-            _base(levels), mode_hz, 2 * u_hz, color=PREDICTED, marker="D", markerfacecolor="none",
+            _base(levels), mode_hz, 2 * u_hz, color=style.PREDICTED, marker="D", markerfacecolor="none",
             markersize=4, linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
         )  # fmt: skip
     axes.set_ylabel("frequency [Hz]")
@@ -114,10 +106,10 @@ def _amplitudes(
     axes: Axes, levels: Sequence[TrackedResonance], base: Reals, simulated_m: Reals | None
 ) -> None:
     amplitude, scale, unit = _amplitude(levels)
-    axes.plot(_base(levels), amplitude, color=MEASURED, marker="o", markersize=4, linewidth=0.8)
+    axes.plot(_base(levels), amplitude, color=style.MEASURED, marker="o", markersize=4, linewidth=0.8)
     if simulated_m is not None:
         axes.plot(
-            base, scale * simulated_m, color=SIMULATED, marker="s", markerfacecolor="none",
+            base, scale * simulated_m, color=style.SIMULATED, marker="s", markerfacecolor="none",
             markersize=5, linestyle="none", label=_SIMULATED,
         )  # fmt: skip
     axes.set_xlabel(_LEVEL)
@@ -130,7 +122,7 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
     axes.errorbar(
         [each.frequency_hz for each in levels], amplitude,
         xerr=[2 * each.u_frequency_hz for each in levels],
-        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
+        color=style.MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
     )  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
     axes.set_xlabel("phase resonance [Hz]" if levels[0].is_fundamental else "drive at phase resonance [Hz]")
@@ -152,7 +144,7 @@ def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> Non
 def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
     for number, level in enumerate(lost_m_per_s2):
         label = _LOST if number == 0 else None
-        axes.axvline(level, color=BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
+        axes.axvline(level, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
 
 
 def _simulated_m(

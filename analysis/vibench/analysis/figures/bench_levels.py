@@ -3,7 +3,7 @@
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts
 from ..tables import table
-from .style import MEASURED, DrawnFigure, new_figure, plain_label, prefixed, styled
+from . import style
 
 _ROW_IN = 0.85
 _FRAME_IN = 0.6
@@ -11,19 +11,19 @@ _UNITS = {"m s-1": "m/s", "m s-2": "m/s²"}
 """Readable forms of units that files give as UDUNITS text."""
 
 
-def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
+def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
     """Draw the extremes of every channel over the whole recording."""
-    with styled():
-        figure = new_figure(_FRAME_IN + _ROW_IN * len(facts.channels))
+    with style.styled():
+        figure = style.new_figure(_FRAME_IN + _ROW_IN * len(facts.channels))
         panels = figure.subplots(len(facts.channels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, level in zip(panels, facts.channels, strict=True):
-            factor, unit = prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+            factor, unit = style.prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
             shape = level.envelope
             axes.fill_between(
-                shape.time_s, factor * shape.lower, factor * shape.upper, color=MEASURED, linewidth=0.3
+                shape.time_s, factor * shape.lower, factor * shape.upper, color=style.MEASURED, linewidth=0.3
             )
-            role = plain_label(level.header.role).replace("_", "\n")
-            axes.set_ylabel(f"{role}\n[{plain_label(unit)}]", fontsize=7.5)
+            role = style.plain_label(level.header.role).replace("_", "\n")
+            axes.set_ylabel(f"{role}\n[{style.plain_label(unit)}]", fontsize=7.5)
         panels[-1].set_xlabel("time since the first sample [s]")
         panels[-1].set_xlim(0, facts.duration_s)
         figure.align_ylabels()
@@ -31,7 +31,7 @@ def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
     for level in facts.channels:
         columns[f"{level.header.role}_lower"] = level.envelope.lower
         columns[f"{level.header.role}_upper"] = level.envelope.upper
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=f"levels_{facts.name}",
         title="Levels of all channels",
         caption=bench_levels_caption(facts),
@@ -47,5 +47,5 @@ def bench_levels_caption(facts: RecordingFacts) -> str:
 
 
 def _peak(level: ChannelLevel) -> str:
-    factor, unit = prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+    factor, unit = style.prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
     return f"{level.header.role.replace('_', ' ')} {factor * level.peak:.3g} {unit}"

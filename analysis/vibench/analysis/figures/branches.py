@@ -14,20 +14,7 @@ from ..dynamics import BranchDiagram, BranchLine
 from ..signals.arrays import Reals
 from ..sine.stepped_response import TrackedResonance
 from ..tables import Table, rows, table
-from .style import (
-    COLLIDING,
-    LEVELS,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    plain_label,
-    styled,
-)
+from . import style
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
@@ -45,7 +32,7 @@ _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPO
 
 def branches_figure(
     diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
-) -> DrawnFigure:
+) -> style.DrawnFigure:
     """Draw Responses I and II of m0 on every branch over the parameter, with recordings beneath.
 
     If the request names a bench's control loop, a third panel shows which unstable motions it can hold.
@@ -59,15 +46,15 @@ def branches_figure(
     tracked
         Tracked resonances; drawn with a phase resonance, whose first panel shows its frequency.
     """
-    with styled():
+    with style.styled():
         holdable = diagram.holdable
-        figure = new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
+        figure = style.new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
         panels = figure.subplots(2 if holdable is None else 3, 1, sharex=True)
         for axes, (name, kind) in zip(panels[:2], _PANELS, strict=True):
             _draw_measured(axes, diagram, [each for each in measured if each.response is kind])
             for line in diagram.lines:
                 draw_line(axes, line, _place(diagram, line), getattr(line, name)[:, 0])
-            magnitude_axis(axes)
+            style.magnitude_axis(axes)
             axes.set_ylabel(f"{kind.value}\nof m0 over A0")
         if diagram.request.resonance_band_hz is not None:
             _backbone(panels, diagram, tracked)
@@ -75,9 +62,9 @@ def branches_figure(
         if diagram.request.loop_time_s is not None and holdable is not None:
             _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
         _across(panels[-1], diagram)
-        legend_above(figure, list(panels), columns=4)
+        style.legend_above(figure, list(panels), columns=4)
         figure.align_ylabels()
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="branches",
         title=f"Branches: {diagram.request.title}",
         caption=(
@@ -93,7 +80,11 @@ def branches_figure(
 
 def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
     """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable ones dashed."""
-    colour = PREDICTED if line.periods == 1 else LEVELS[1 + (line.periods - 2) % (len(LEVELS) - 1)]
+    colour = (
+        style.PREDICTED
+        if line.periods == 1
+        else style.LEVELS[1 + (line.periods - 2) % (len(style.LEVELS) - 1)]
+    )
     period = "" if line.periods == 1 else f", period {line.periods}"
     for is_stable, piece in line.pieces():
         axes.plot(
@@ -119,10 +110,10 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
     response = np.array([each.amplitude_m for each in tracked]) / base_m
     error_hz = [2.0 * each.u_frequency_hz for each in tracked]
     panels[0].errorbar(
-        1e6 * base_m, frequency_hz, error_hz, color=MEASURED, linestyle="none", marker="o", markersize=3.5,
-        capsize=2, label="tracked, ± two standard uncertainties",
+        1e6 * base_m, frequency_hz, error_hz, color=style.MEASURED, linestyle="none", marker="o",
+        markersize=3.5, capsize=2, label="tracked, ± two standard uncertainties",
     )  # fmt: skip
-    panels[1].plot(1e6 * base_m, response, color=MEASURED, linestyle="none", marker="o", markersize=3.5)
+    panels[1].plot(1e6 * base_m, response, color=style.MEASURED, linestyle="none", marker="o", markersize=3.5)
 
 
 def _growth(
@@ -132,17 +123,17 @@ def _growth(
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
         for told, chosen, colour in (
-            ("holdable", grows & held, MEASURED),
-            ("not holdable by this bench", grows & ~held, SIMULATED),
+            ("holdable", grows & held, style.MEASURED),
+            ("not holdable by this bench", grows & ~held, style.SIMULATED),
         ):
             if np.any(chosen):
                 axes.plot(
                     place[chosen], line.growth_time_s[chosen], ".", markersize=3, color=colour, label=told
                 )
-    axes.axhline(least_s, color=MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
+    axes.axhline(least_s, color=style.MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
     axes.set_yscale("log")
     low, high = axes.get_ylim()
-    axes.axhspan(min(low, 0.5 * least_s), least_s, color=COLLIDING, alpha=0.6, linewidth=0)
+    axes.axhspan(min(low, 0.5 * least_s), least_s, color=style.COLLIDING, alpha=0.6, linewidth=0)
     axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
     axes.set_ylabel("time to\ngrow by e [s]")
 
@@ -181,12 +172,12 @@ def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) 
         axes.plot(
             curve.frequency_hz,
             curve.magnitude,
-            color=SIMULATED if is_simulated else MEASURED,
+            color=style.SIMULATED if is_simulated else style.MEASURED,
             linestyle="none",
             marker=".",
             markersize=2.5,
             alpha=0.7,
-            label=plain_label(f"{curve.source}, {curve.origin.value}"),
+            label=style.plain_label(f"{curve.source}, {curve.origin.value}"),
         )
 
 
@@ -194,7 +185,7 @@ def _across(axes: Axes, diagram: BranchDiagram) -> None:
     request = diagram.request
     if request.along is Parameter.FREQUENCY:
         axes.set_xlabel("drive frequency [Hz]")
-        frequency_axis(axes, request.start, request.stop)
+        style.frequency_axis(axes, request.start, request.stop)
         return
     axes.set_xlabel("base amplitude A0 [µm]")
     axes.set_xlim(1e6 * request.start, 1e6 * request.stop)

@@ -10,20 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..dynamics import ChainAnswer, ChainDrive, ChainRun
 from ..tables import Table, table
-from .style import (
-    BOUNDS,
-    COLLIDING,
-    LEVELS,
-    LINEAR,
-    MEASURED,
-    SIMULATED,
-    DrawnFigure,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    prefixed,
-    styled,
-)
+from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
 """Heights without and with runs."""
@@ -35,11 +22,11 @@ _NOTHING = 1e-300
 """Replaces zero motion before a logarithm is taken."""
 
 
-def chain_figure(found: ChainAnswer) -> DrawnFigure:
+def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
     """Draw waves and transmission, and the motion, energies and impacts of the last run, if any."""
     last = found.shown_run
-    with styled():
-        figure = new_figure(_WAVES_IN if last is None else _RUNS_IN)
+    with style.styled():
+        figure = style.new_figure(_WAVES_IN if last is None else _RUNS_IN)
         if last is None:
             waves, across = figure.subplots(2, 1, sharex=True)
         else:
@@ -50,8 +37,8 @@ def chain_figure(found: ChainAnswer) -> DrawnFigure:
             _per_cell(figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1]), last)
         _waves(waves, found)
         _across(across, found)
-        legend_above(figure, [waves, across], columns=4)
-    return DrawnFigure(
+        style.legend_above(figure, [waves, across], columns=4)
+    return style.DrawnFigure(
         name="chain",
         title=f"Chain: {found.request.title}",
         caption=_caption(found, last),
@@ -77,19 +64,21 @@ def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
 def _shade(axes: Axes, found: ChainAnswer) -> None:
     top_hz = float(found.linear_hz[-1])
     for gap in found.gaps:
-        axes.axvspan(gap.lower_hz, min(gap.upper_hz, top_hz), color=COLLIDING, linewidth=0)
+        axes.axvspan(gap.lower_hz, min(gap.upper_hz, top_hz), color=style.COLLIDING, linewidth=0)
     axes.set_xlim(0.0, top_hz)
 
 
 def _waves(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
     for number, band_hz in enumerate(found.bands_hz.T):
-        axes.plot(band_hz, found.wave_numbers / np.pi, color=LINEAR, label="phase" if number == 0 else None)
+        axes.plot(
+            band_hz, found.wave_numbers / np.pi, color=style.LINEAR, label="phase" if number == 0 else None
+        )
     axes.set_ylabel("phase / π")
     axes.set_ylim(0.0, 1.0)
     decay = axes.twinx()
-    decay.plot(found.linear_hz, found.attenuation_db, color=BOUNDS, linewidth=0.8)
-    decay.set_ylabel("decay [dB a unit]", color=BOUNDS)
+    decay.plot(found.linear_hz, found.attenuation_db, color=style.BOUNDS, linewidth=0.8)
+    decay.set_ylabel("decay [dB a unit]", color=style.BOUNDS)
     decay.set_ylim(0.0, 1.1 * float(np.max(found.attenuation_db)))
     decay.grid(visible=False)
     axes.tick_params(labelbottom=False)
@@ -98,21 +87,21 @@ def _waves(axes: Axes, found: ChainAnswer) -> None:
 def _across(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
     for number, (cells, place, name) in enumerate(found.shown_cells):
-        colour = LEVELS[number % len(LEVELS)]
+        colour = style.LEVELS[number % len(style.LEVELS)]
         linear = np.maximum(found.linear_transmission(cells)[:, place], _SMALLEST)
         axes.plot(found.linear_hz, linear, "--", color=colour, linewidth=0.8, label=name)
         over_hz, driven = found.driven_transmission(cells, place)
         marker = "o" if found.request.drive is ChainDrive.STEADY else ""
         axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker, markersize=3)
-    axes.plot([], "--", color=BOUNDS, linewidth=0.8, label="without contact")
-    magnitude_axis(axes)
+    axes.plot([], "--", color=style.BOUNDS, linewidth=0.8, label="without contact")
+    style.magnitude_axis(axes)
     axes.set_ylabel("|x / U|")
     axes.set_xlabel("frequency [Hz]")
 
 
 def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
     largest = float(np.nanmax(np.abs(run.motion_m), initial=0.0))
-    factor, unit = prefixed(largest, "m")
+    factor, unit = style.prefixed(largest, "m")
     edges = np.arange(run.cells + 1) + 0.5
     middle = run.time_s
     half = 0.5 * float(middle[1] - middle[0]) if middle.size > 1 else 0.5
@@ -127,7 +116,9 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
         norm=Normalize(-top, top) if is_steady else LogNorm(top * 10.0**-_DECADES, top),
         rasterized=True,
     )
-    axes.plot(run.impact_time_s, run.impact_cell + 1, ".", color=MEASURED, markersize=2 if is_steady else 0.6)
+    axes.plot(
+        run.impact_time_s, run.impact_cell + 1, ".", color=style.MEASURED, markersize=2 if is_steady else 0.6
+    )
     axes.set_xlim(times[0], times[-1])
     axes.set_ylabel("cell")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -139,14 +130,19 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
 
 def _per_cell(energies: Axes, impacts: Axes, run: ChainRun) -> None:
     place = np.arange(1, run.cells + 1)
-    factor, unit = prefixed(float(np.nanmax(run.energy_j, initial=0.0)), "J")
+    factor, unit = style.prefixed(float(np.nanmax(run.energy_j, initial=0.0)), "J")
     energies.errorbar(
-        place, factor * run.energy_j, factor * run.energy_error_j, fmt="o", markersize=3, color=SIMULATED
+        place,
+        factor * run.energy_j,
+        factor * run.energy_error_j,
+        fmt="o",
+        markersize=3,
+        color=style.SIMULATED,
     )
     if float(np.nanmin(run.energy_j, initial=math.inf)) > 0.0:
-        magnitude_axis(energies)
+        style.magnitude_axis(energies)
     energies.set_ylabel(f"mean energy [{unit}]")
-    impacts.bar(place, run.impacts / run.observed_s, color=MEASURED, width=0.7)
+    impacts.bar(place, run.impacts / run.observed_s, color=style.MEASURED, width=0.7)
     impacts.set_ylabel("impacts a second")
     for axes in (energies, impacts):
         axes.set_xlabel("cell, from the base")

@@ -12,18 +12,7 @@ from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference, 
 from ..errors import InvalidRequest
 from ..overlay.ensemble import CurveDifference
 from ..tables import Table, table
-from .style import (
-    BOUNDS,
-    LEVELS,
-    MEASURED,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    plain_label,
-    styled,
-)
+from . import style
 
 Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
 _HEIGHT_IN = 4.6
@@ -46,7 +35,7 @@ def comparison_figure(
     curves: Sequence[Curve],
     pair: tuple[Curve, Curve] | None = None,
     markers_hz: Sequence[float] = (),
-) -> DrawnFigure:
+) -> style.DrawnFigure:
     """Draw curves with their bounds, the difference of two of them, and markers.
 
     Raises InvalidRequest when there is no curve, and NotEnoughData when the pair has no frequency in common.
@@ -61,27 +50,27 @@ def comparison_figure(
     if not curves:
         raise InvalidRequest("a figure of no curves was requested; choose one or more")
     difference = None if pair is None else curve_difference(*pair)
-    with styled():
+    with style.styled():
         rows = 1 if difference is None else 2
-        figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
+        figure = style.new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
         panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
         top: Axes = panels[0]
         sources = list(dict.fromkeys(each.source for each in curves))
         for curve in curves:
-            _curve(top, curve, LEVELS[sources.index(curve.source) % len(LEVELS)])
-        magnitude_axis(top)
+            _curve(top, curve, style.LEVELS[sources.index(curve.source) % len(style.LEVELS)])
+        style.magnitude_axis(top)
         top.set_ylim(*_heights(curves))
         top.set_ylabel("|x / U|  (m0 over base)")
         if difference is not None and pair is not None:
             _difference(panels[1], difference)
         for marker_hz in markers_hz:
             for axes in panels:
-                axes.axvline(marker_hz, color=BOUNDS, linewidth=0.8, linestyle="-.")
+                axes.axvline(marker_hz, color=style.BOUNDS, linewidth=0.8, linestyle="-.")
         panels[-1].set_xlabel("frequency [Hz]")
-        frequency_axis(top, *_span(curves))
-        legend_above(figure, [top], columns=2)
+        style.frequency_axis(top, *_span(curves))
+        style.legend_above(figure, [top], columns=2)
         figure.align_ylabels()
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title="Comparison",
         caption=comparison_caption(curves, pair),
@@ -105,14 +94,14 @@ def _curve(axes: Axes, curve: Curve, colour: str) -> None:
         marker="o" if lone else None,
         markersize=5,
         linewidth=1.0,
-        label=plain_label(curve.name),
+        label=style.plain_label(curve.name),
         gid=printable(curve.name),
     )
 
 
 def _difference(axes: Axes, difference: CurveDifference) -> None:
-    axes.plot(difference.frequency_hz, difference.decibel, color=MEASURED, linewidth=0.8)
-    axes.axhline(0, color=BOUNDS, linewidth=0.6)
+    axes.plot(difference.frequency_hz, difference.decibel, color=style.MEASURED, linewidth=0.8)
+    axes.axhline(0, color=style.BOUNDS, linewidth=0.6)
     axes.set_ylabel("difference\n[dB]")
 
 

@@ -11,7 +11,7 @@ from vibench.sim import PowerLaw, RigidStops, Specimen, spring_of
 
 from ..signals.arrays import Reals
 from ..tables import Table, table
-from .style import MEASURED, SIMULATED, DrawnFigure, new_figure, styled
+from . import style
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
@@ -22,7 +22,7 @@ _SPEED_M_PER_S = 0.1
 _POINTS = 801
 
 
-def contact_forces_figure(specimens: Mapping[str, Specimen]) -> DrawnFigure:
+def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigure:
     """Draw the force that pushes m1 back, for each specimen by its label; p = y - z.
 
     The nearer stop is shown. A law that depends on the speed is drawn for loading and unloading at
@@ -30,15 +30,15 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> DrawnFigure:
     """
     rows = -(-len(specimens) // _COLUMNS)
     tables = []
-    with styled():
-        figure = new_figure(0.6 + 2.1 * rows)
+    with style.styled():
+        figure = style.new_figure(0.6 + 2.1 * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(specimens)), squeeze=False).flat
         for axes, named in zip_longest(panels, specimens.items()):
             if named is None:
                 axes.set_visible(False)
                 continue
             tables += _draw(axes, *named)
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="contact_forces",
         title="Forces of the contact laws",
         caption=(
@@ -63,15 +63,15 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     axes.set_xlabel("p [µm]")
     axes.set_ylabel("force [N]")
     if isinstance(specimen.contact, RigidStops):
-        axes.plot([1e6 * p[0], 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, side], color=MEASURED)
+        axes.plot([1e6 * p[0], 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, side], color=style.MEASURED)
         axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3, linewidth=0)
         axes.set_ylim(min(-0.1 * side, side), max(-0.1 * side, side))
         axes.set_yticks([0.0])
         return []
     pressed, let_go = (_force(specimen, p, side * each) for each in (_SPEED_M_PER_S, -_SPEED_M_PER_S))
-    axes.plot(1e6 * p, pressed, color=MEASURED)
+    axes.plot(1e6 * p, pressed, color=style.MEASURED)
     if not np.array_equal(pressed, let_go):
-        axes.plot(1e6 * p, let_go, color=SIMULATED, linestyle="--")
+        axes.plot(1e6 * p, let_go, color=style.SIMULATED, linestyle="--")
     name = re.sub(r"\W+", "_", label).strip("_")
     return [table(f"contact_forces_{name}", p_m=p, pressed_n=pressed, let_go_n=let_go)]
 

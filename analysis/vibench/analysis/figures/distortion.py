@@ -8,38 +8,27 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.periodic import PeriodicFrequencyResponse
 from ..signals.arrays import Reals
 from ..tables import table
-from .style import (
-    BOUNDS,
-    LINEAR,
-    MEASURED,
-    SIMULATED,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    styled,
-)
+from . import style
 
 _HEIGHT_IN = 4.6
 _LOW_HEIGHT_IN = 3.0
-_EVEN, _ODD = LINEAR, SIMULATED
+_EVEN, _ODD = style.LINEAR, style.SIMULATED
 
 
-def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> DrawnFigure:
+def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> style.DrawnFigure:
     """Draw the parts of noise and distortion in the scatter, and the levels at lines without drive."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
-    with styled():
-        figure = new_figure(_HEIGHT_IN if has_quiet_lines else _LOW_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN if has_quiet_lines else _LOW_HEIGHT_IN)
         panels: list[Axes] = list(figure.subplots(1 + has_quiet_lines, 1, sharex=True, squeeze=False)[:, 0])
         _shares(panels[0], periodic)
         if has_quiet_lines:
             _detection(panels[1], periodic)
         panels[-1].set_xlabel("frequency [Hz]")
         driven_hz = periodic.frequency_response.frequency_hz
-        frequency_axis(panels[0], float(driven_hz[0]), float(driven_hz[-1]))
-        legend_above(figure, panels)
+        style.frequency_axis(panels[0], float(driven_hz[0]), float(driven_hz[-1]))
+        style.legend_above(figure, panels)
         figure.align_ylabels()
     name = f"distortion_{analysis.facts.name}"
     varied = periodic.distortion_variance
@@ -52,7 +41,7 @@ def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyRespon
         "detection_m_per_s": lines.response_amplitude,
         "detection_noise_m_per_s": lines.noise_amplitude,
     }
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title=f"Noise and distortion, {analysis.excitation.amplitude_vpp:g} Vpp noise",
         caption=distortion_caption(periodic),
@@ -70,7 +59,7 @@ def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     axes.plot(
         frequency_hz,
         _share(periodic.noise_variance, periodic),
-        color=BOUNDS,
+        color=style.BOUNDS,
         linewidth=0.9,
         label="not repeating (noise or chaos), one realisation",
     )
@@ -81,13 +70,13 @@ def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         axes.plot(
             frequency_hz,
             seen,
-            color=MEASURED,
+            color=style.MEASURED,
             marker=".",
             markersize=3,
             linewidth=0.7,
             label="nonlinear distortion",
         )
-    magnitude_axis(axes)
+    style.magnitude_axis(axes)
     axes.set_ylabel("sd over |H|")
 
 
@@ -102,12 +91,12 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     axes.plot(
         lines.frequency_hz,
         lines.noise_amplitude,
-        color=BOUNDS,
+        color=style.BOUNDS,
         linewidth=0.9,
         linestyle=":",
         label="what does not repeat there",
     )
-    magnitude_axis(axes)
+    style.magnitude_axis(axes)
     axes.set_ylabel("velocity of the mass [m/s]")
 
 

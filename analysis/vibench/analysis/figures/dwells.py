@@ -12,6 +12,7 @@ from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
 from ..tables import Table, plus_minus, table
+from . import style
 from .ensemble_band import (
     ModelResonances,
     band_columns,
@@ -22,17 +23,6 @@ from .ensemble_band import (
     run_text,
     simulated_label,
 )
-from .style import (
-    COLLIDING,
-    MEASURED,
-    SIMULATED,
-    DrawnFigure,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    prefixed,
-    styled,
-)
 
 _ROW_IN = 1.75
 _FRAME_IN = 1.1
@@ -42,12 +32,12 @@ _RANGE_DECADES = 5.0
 Pair = tuple[DwellAnalysis, DwellOverlay | None]
 
 
-def dwells_figure(pairs: Sequence[Pair]) -> DrawnFigure:
+def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
     """Draw one row for each level, weak to strong: whole dwell, its last periods, spectrum of its window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
     at = model_resonances(specimen_of(rising[0][0].facts.bench))
-    with styled():
-        figure = new_figure(_FRAME_IN + _ROW_IN * len(rising))
+    with style.styled():
+        figure = style.new_figure(_FRAME_IN + _ROW_IN * len(rising))
         panels = figure.subplots(len(rising), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.5))
         for row, (analysis, laid) in zip(panels, rising, strict=True):
             _whole(row[0], analysis)
@@ -58,9 +48,9 @@ def dwells_figure(pairs: Sequence[Pair]) -> DrawnFigure:
         panels[0, 0].set_title("whole dwell")
         panels[0, 1].set_title(f"last {_ZOOM_PERIODS:g} periods")
         label_resonances(panels[0, 2], ModelResonances((), at.bound_hz))
-        legend_above(figure, [panels[0, 1], panels[0, 0], panels[0, 2]], columns=3)
+        style.legend_above(figure, [panels[0, 1], panels[0, 0], panels[0, 2]], columns=3)
         figure.align_ylabels(panels[:, 0])
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="dwells_" + "_".join(analysis.facts.name for analysis, _ in rising),
         title=f"Dwells at {rising[0][0].excitation.frequency_hz:g} Hz",
         caption=dwells_caption(rising),
@@ -71,11 +61,13 @@ def dwells_figure(pairs: Sequence[Pair]) -> DrawnFigure:
 
 def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
     found, response = analysis.displacement, analysis.response
-    factor, unit = prefixed(float(np.max(np.abs(found.upper))), "m")
+    factor, unit = style.prefixed(float(np.max(np.abs(found.upper))), "m")
     motion = response.displacement
     stop_s = (motion.samples.size - motion.edge_samples) / motion.sample_rate_hz
-    axes.axvspan(stop_s - response.window_s, stop_s, color=COLLIDING, zorder=0, label="window analysed")
-    axes.fill_between(found.time_s, factor * found.lower, factor * found.upper, color=MEASURED, linewidth=0)
+    axes.axvspan(stop_s - response.window_s, stop_s, color=style.COLLIDING, zorder=0, label="window analysed")
+    axes.fill_between(
+        found.time_s, factor * found.lower, factor * found.upper, color=style.MEASURED, linewidth=0
+    )
     axes.set_xlim(0, motion.samples.size / motion.sample_rate_hz)
     axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of {analysis.facts.mass} [{unit}]")
 
@@ -90,13 +82,13 @@ def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
 
 def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> None:
     time_s, motion = last_periods(response)
-    factor, unit = prefixed(float(np.max(np.abs(motion))), "m")
-    axes.plot(1e3 * time_s, factor * motion, color=MEASURED, linewidth=1.2, label="measured")
+    factor, unit = style.prefixed(float(np.max(np.abs(motion))), "m")
+    axes.plot(1e3 * time_s, factor * motion, color=style.MEASURED, linewidth=1.2, label="measured")
     if laid is not None:
         axes.plot(
             1e3 * time_s,
             factor * last_periods(laid.response)[1],
-            color=SIMULATED,
+            color=style.SIMULATED,
             linewidth=0.8,
             linestyle=(0, (4, 2)),
             label=simulated_label(laid.run),
@@ -108,12 +100,12 @@ def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> Non
 def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at: ModelResonances) -> None:
     mark_resonances(axes, ModelResonances((), at.bound_hz))
     frequency_hz, size = spectrum_columns(response)
-    axes.plot(frequency_hz, size, color=MEASURED, linewidth=1.0)
+    axes.plot(frequency_hz, size, color=style.MEASURED, linewidth=1.0)
     if laid is not None:
         middle = draw_band(axes, frequency_hz, laid, SPECTRUM)
         curve = spectrum_columns(laid.response) if middle is None else (frequency_hz, middle)
-        axes.plot(*curve, color=SIMULATED, linewidth=0.6, zorder=3)
-    magnitude_axis(axes)
+        axes.plot(*curve, color=style.SIMULATED, linewidth=0.6, zorder=3)
+    style.magnitude_axis(axes)
     top = float(np.max(size))
     axes.set_ylim(top * 10**-_RANGE_DECADES, 3 * top)
     axes.set_xlim(0, float(frequency_hz[-1]))

@@ -14,7 +14,7 @@ from ..overlay.overlay import AbstractOverlay
 from ..overlay.prediction import ResponsePrediction
 from ..signals.arrays import Reals
 from ..tables import Table, columns, table
-from .style import BOUNDS, SIMULATED, TERMINAL
+from . import style
 
 
 def simulated_label(run: SimulatedRun) -> str:
@@ -42,7 +42,7 @@ def draw_band(
         along,
         shown(found.lower),
         shown(found.upper),
-        color=SIMULATED,
+        color=style.SIMULATED,
         alpha=0.25,
         linewidth=0,
         zorder=1.5,
@@ -130,16 +130,16 @@ def mark_resonances(axes: Axes, at: ModelResonances) -> None:
     """Draw dashed lines without contact and dotted ones with m1 stuck to m2."""
     for number, frequency in enumerate(at.free_hz):
         label = _FREE_LABEL if number == 0 else None
-        axes.axvline(frequency, color=BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
+        axes.axvline(frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
     for number, frequency in enumerate(at.bound_hz):
         label = _BOUND_LABEL if number == 0 else None
-        axes.axvline(frequency, color=TERMINAL, linestyle=":", linewidth=1.0, label=label, zorder=1)
+        axes.axvline(frequency, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=label, zorder=1)
 
 
 def label_resonances(axes: Axes, at: ModelResonances) -> None:
     """Write the frequencies above the axis."""
     _write(axes, at.free_hz, "#555555")
-    _write(axes, at.bound_hz, TERMINAL)
+    _write(axes, at.bound_hz, style.TERMINAL)
 
 
 def _write(axes: Axes, frequencies_hz: Sequence[float], colour: str) -> None:

@@ -7,7 +7,7 @@ from vibench.acquisition.plan import Measurement, SignalPreview
 from ..signals.arrays import Reals
 from ..signals.envelope import envelope
 from ..tables import table
-from .style import PREDICTED, DrawnFigure, frequency_axis, new_figure, prefixed, styled
+from . import style
 
 _HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
@@ -17,7 +17,7 @@ _SMALLEST_PART = 0.2
 _COLUMNS = 2000
 
 
-def excitation_figure(measurement: Measurement) -> DrawnFigure:
+def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
     """Draw the planned voltage in time and as a spectrum."""
     excitation = measurement.excitation
     rate_hz = _SAMPLES_PER_CYCLE * excitation.highest_frequency_hz
@@ -25,24 +25,26 @@ def excitation_figure(measurement: Measurement) -> DrawnFigure:
     shape = envelope(seen.volts, rate_hz)
     frequency_hz, size = _largest_lines(seen)
     strong = np.flatnonzero(size > _SMALLEST_PART * float(np.max(size)))
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         signal, spectrum = figure.subplots(1, 2)
-        factor, unit = prefixed(seen.peak_v, "V")
+        factor, unit = style.prefixed(seen.peak_v, "V")
         signal.fill_between(
-            shape.time_s, factor * shape.lower, factor * shape.upper, color=PREDICTED, linewidth=0.3
+            shape.time_s, factor * shape.lower, factor * shape.upper, color=style.PREDICTED, linewidth=0.3
         )
         signal.set_xlim(0, float(shape.time_s[-1]))
         signal.set_xlabel("time [s]")
         signal.set_ylabel(f"planned voltage [{unit}]")
-        factor, unit = prefixed(float(np.max(size)), "V")
-        spectrum.plot(frequency_hz, factor * size, color=PREDICTED, linewidth=0.8)
-        frequency_axis(spectrum, 0.8 * float(frequency_hz[strong[0]]), 1.25 * float(frequency_hz[strong[-1]]))
+        factor, unit = style.prefixed(float(np.max(size)), "V")
+        spectrum.plot(frequency_hz, factor * size, color=style.PREDICTED, linewidth=0.8)
+        style.frequency_axis(
+            spectrum, 0.8 * float(frequency_hz[strong[0]]), 1.25 * float(frequency_hz[strong[-1]])
+        )
         spectrum.set_ylim(bottom=0)
         spectrum.set_xlabel("frequency [Hz]")
         spectrum.set_ylabel(f"amplitude of a line [{unit}]")
     name = f"excitation_{measurement.name}"
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title="Excitation as planned",
         caption=(

@@ -8,25 +8,25 @@ from vibench.sim import Parameter
 from ..dynamics import ExponentSpectrum
 from ..signals.arrays import Reals
 from ..tables import Table, rows, table
-from .style import BOUNDS, LEVELS, MEASURED, DrawnFigure, legend_above, new_figure, styled
+from . import style
 
 _HEIGHT_IN = 5.2
 
 
-def exponent_spectrum_figure(found: ExponentSpectrum) -> DrawnFigure:
+def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
     """Draw six exponents with their intervals, and below them the Kaplan-Yorke dimension."""
     request = found.request
     is_frequency = request.along is Parameter.FREQUENCY
     place = found.column("frequency_hz") if is_frequency else 1e6 * found.column("amplitude_m")
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         _exponents(upper, place, found)
         _dimension(lower, place, found)
         lower.set_xlabel("drive frequency [Hz]" if is_frequency else "base amplitude A0 [µm]")
-        legend_above(figure, [upper], columns=6)
+        style.legend_above(figure, [upper], columns=6)
         figure.align_ylabels()
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="spectrum",
         title=f"All exponents: {request.title}",
         caption=(
@@ -51,14 +51,14 @@ def _exponents(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
             place[known],
             values[known, k],
             np.nan_to_num(reach),
-            color=LEVELS[k],
+            color=style.LEVELS[k],
             marker=".",
             markersize=3,
             linewidth=0.9,
             elinewidth=0.7,
             label=f"λ{k + 1}",
         )
-    axes.axhline(0.0, color=BOUNDS, linewidth=0.7)
+    axes.axhline(0.0, color=style.BOUNDS, linewidth=0.7)
     axes.set_ylabel("exponent [1/s]")
 
 
@@ -68,7 +68,7 @@ def _dimension(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
         place,
         middle,
         np.nan_to_num(np.abs(np.stack([middle - low, high - middle]))),
-        color=MEASURED,
+        color=style.MEASURED,
         marker=".",
         markersize=3,
         linewidth=0.9,

@@ -6,18 +6,7 @@ from matplotlib.axes import Axes
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, measured_gaps
 from ..signals.arrays import Reals
 from ..tables import Table, columns, table
-from .style import (
-    BOUNDS,
-    COLLIDING,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    DrawnFigure,
-    legend_above,
-    new_figure,
-    prefixed,
-    styled,
-)
+from . import style
 
 _MICRO = 1e6
 _COLUMNS = 1200
@@ -29,16 +18,16 @@ _DEEPEST_SHOWN_M = 2e-6
 _POINTS = 200
 
 
-def hidden_motion_figure(motion: HiddenMotion) -> DrawnFigure:
+def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw p between the stops, over the whole stretch and over a short part of it."""
-    with styled():
-        figure = new_figure(4.4)
+    with style.styled():
+        figure = style.new_figure(4.4)
         whole, zoom = figure.subplots(2, 1)
         _whole(whole, motion)
         tables = _zoom(zoom, motion)
-        legend_above(figure, [zoom, whole], columns=4)
+        style.legend_above(figure, [zoom, whole], columns=4)
         figure.align_ylabels([whole, zoom])
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=f"hidden_motion_{motion.name}",
         title=f"Hidden motion of {motion.name}",
         caption=(
@@ -56,7 +45,7 @@ def _stops(axes: Axes, motion: HiddenMotion) -> None:
     lower, upper = motion.gaps_m
     for level in (-lower, upper):
         if np.isfinite(level):
-            axes.axhline(_MICRO * level, color=SIMULATED, linewidth=0.9, label="stops")
+            axes.axhline(_MICRO * level, color=style.SIMULATED, linewidth=0.9, label="stops")
     axes.set_ylabel("p [µm]")
 
 
@@ -64,7 +53,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     rate = motion.sample_rate_hz
     for gone in motion.tracked.not_followed:
         first, last = (motion.first_sample + each for each in (gone.first, gone.stop))
-        axes.axvspan(first / rate, last / rate, color=COLLIDING, linewidth=0, label="not followed")
+        axes.axvspan(first / rate, last / rate, color=style.COLLIDING, linewidth=0, label="not followed")
     length = max(1, motion.tracked.p.size // _COLUMNS)
     count = motion.tracked.p.size // length
     pieces = motion.tracked.p[: count * length].reshape(count, length)
@@ -72,7 +61,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     low, high = np.full(count, np.nan), np.full(count, np.nan)
     low[told], high[told] = np.nanmin(pieces[told], axis=1), np.nanmax(pieces[told], axis=1)
     time_s = motion.time_s[: count * length : length]
-    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=MEASURED, linewidth=0)
+    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED, linewidth=0)
     _stops(axes, motion)
     axes.set_xlim(motion.time_s[0], motion.time_s[-1])
     axes.set_xlabel("time [s]")
@@ -88,9 +77,9 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     time_s, p, sd = motion.time_s[place], motion.tracked.p[place], motion.tracked.p_sd[place]
     free = motion.free.p[place]
     low, high = _MICRO * (p - _BOUND * sd), _MICRO * (p + _BOUND * sd)
-    axes.fill_between(time_s, low, high, color=BOUNDS, linewidth=0, label="bounds of 95 %")
-    axes.plot(time_s, _MICRO * p, color=MEASURED, linewidth=1.1, label="tracked")
-    axes.plot(time_s, _MICRO * free, color=PREDICTED, linestyle=":", label="without a contact model")
+    axes.fill_between(time_s, low, high, color=style.BOUNDS, linewidth=0, label="bounds of 95 %")
+    axes.plot(time_s, _MICRO * p, color=style.MEASURED, linewidth=1.1, label="tracked")
+    axes.plot(time_s, _MICRO * free, color=style.PREDICTED, linestyle=":", label="without a contact model")
     _stops(axes, motion)
     if time_s.size:
         axes.set_xlim(time_s[0], time_s[-1])
@@ -106,16 +95,16 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     )
 
 
-def hidden_impacts_figure(motion: HiddenMotion) -> DrawnFigure:
+def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw impulses over time, force against penetration, energy lost at impacts, and measured gaps."""
-    with styled():
-        figure = new_figure(5.2)
+    with style.styled():
+        figure = style.new_figure(5.2)
         (impulses, force), (energy, gaps) = figure.subplots(2, 2)
         _impulses(impulses, motion)
         law = _force(force, motion)
         _energy(energy, motion)
         _gaps(gaps, motion)
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=f"hidden_impacts_{motion.name}",
         title=f"Collisions of {motion.name}",
         caption=(
@@ -133,8 +122,8 @@ def hidden_impacts_figure(motion: HiddenMotion) -> DrawnFigure:
 def _impulses(axes: Axes, motion: HiddenMotion) -> None:
     found, free = motion.tracked.collisions, motion.free.impacts
     largest = max([*found.impulses, *free.impulses], default=1.0)
-    factor, unit = prefixed(largest, "N s")
-    for impacts, mark, color in ((found, ".", MEASURED), (free, "x", PREDICTED)):
+    factor, unit = style.prefixed(largest, "N s")
+    for impacts, mark, color in ((found, ".", style.MEASURED), (free, "x", style.PREDICTED)):
         time_s = (motion.first_sample + impacts.samples) / motion.sample_rate_hz
         axes.plot(time_s, factor * impacts.impulses, mark, color=color, markersize=2.0, rasterized=True)
     axes.set_xlabel("time [s]")
@@ -146,7 +135,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     tracked = motion.specimen
     depth = np.linspace(0.0, _DEEPEST_SHOWN_M, _POINTS)
     force = tracked.steepness * depth**tracked.exponent
-    axes.plot(_MICRO * depth, force, color=MEASURED)
+    axes.plot(_MICRO * depth, force, color=style.MEASURED)
     axes.set_xlabel("penetration [µm]")
     axes.set_ylabel("force [N]")
     at_1um, exponent = found.get(Hidden.FORCE), found.get(Hidden.EXPONENT)
@@ -155,7 +144,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
         axes.set_title("as described: not told by this motion", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
     low, high = _band(depth, at_1um, exponent)
-    axes.fill_between(_MICRO * depth, low, high, color=BOUNDS, alpha=0.5, linewidth=0)
+    axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5, linewidth=0)
     return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force, low_n=low, high_n=high),)
 
 
@@ -171,24 +160,24 @@ def _energy(axes: Axes, motion: HiddenMotion) -> None:
     share = 1.0 - (free.rate_after / free.rate_before) ** 2
     good = (free.rate_before > 0) & (np.abs(share) < 1.0)
     axes.plot(
-        free.rate_before[good], 100 * share[good], ".", color=PREDICTED, markersize=2.0, rasterized=True
+        free.rate_before[good], 100 * share[good], ".", color=style.PREDICTED, markersize=2.0, rasterized=True
     )
-    axes.axhline(0.0, color=BOUNDS, linewidth=0.8)
+    axes.axhline(0.0, color=style.BOUNDS, linewidth=0.8)
     if good.any():
-        axes.axhline(100 * float(np.median(share[good])), color=MEASURED, linewidth=1.0)
+        axes.axhline(100 * float(np.median(share[good])), color=style.MEASURED, linewidth=1.0)
     axes.set_xlabel("speed of approach [m/s]")
     axes.set_ylabel("energy lost [%]")
 
 
 def _gaps(axes: Axes, motion: HiddenMotion) -> None:
     free, measured = motion.free.impacts, measured_gaps(motion.free.impacts)
-    for side, label, color in ((-1.0, "lower", PREDICTED), (1.0, "upper", MEASURED)):
+    for side, label, color in ((-1.0, "lower", style.PREDICTED), (1.0, "upper", style.MEASURED)):
         here = measured[(free.sides == side) & ~np.isnan(measured)]
         if here.size:
             axes.hist(_MICRO * here, bins=_BINS, histtype="step", color=color, label=label)
-    for gap, style in zip(motion.gaps_m, ("--", "-"), strict=True):
+    for gap, dashes in zip(motion.gaps_m, ("--", "-"), strict=True):
         if np.isfinite(gap):
-            axes.axvline(_MICRO * gap, color=SIMULATED, linestyle=style, linewidth=1.0)
+            axes.axvline(_MICRO * gap, color=style.SIMULATED, linestyle=dashes, linewidth=1.0)
     axes.set_xlabel("gap [µm]")
     axes.set_ylabel("impacts")
     if axes.get_legend_handles_labels()[0]:

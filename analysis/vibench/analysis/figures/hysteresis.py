@@ -5,16 +5,16 @@ import numpy as np
 from ..sine.jumps import Hysteresis, Jump, hysteresis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import table
-from .style import COLLIDING, LEVELS, DrawnFigure, legend_above, magnitude_axis, new_figure, styled
+from . import style
 
 _HEIGHT_IN = 3.4
 
 
-def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> DrawnFigure:
+def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigure:
     """Draw Response II of both directions, their jumps, and where they differ."""
     found = hysteresis(up.response, down.response, up.jumps, down.jumps)
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         axes = figure.subplots()
         axes.fill_between(
             found.frequency_hz,
@@ -22,24 +22,24 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> DrawnFigure:
             1,
             where=found.differs.tolist(),
             transform=axes.get_xaxis_transform(),
-            color=COLLIDING,
+            color=style.COLLIDING,
             linewidth=0,
             label="they differ",
         )
         for curve, jumps, colour, line, label in (
-            (found.up, up.jumps, LEVELS[0], "-", "up"),
-            (found.down, down.jumps, LEVELS[2], "--", "down"),
+            (found.up, up.jumps, style.LEVELS[0], "-", "up"),
+            (found.down, down.jumps, style.LEVELS[2], "--", "down"),
         ):
             axes.plot(found.frequency_hz, curve, color=colour, linestyle=line, label=f"sweep {label}")
             for jump in jumps:
                 axes.axvspan(jump.lower_hz, jump.upper_hz, color=colour, alpha=0.4, linewidth=0.5)
-        magnitude_axis(axes)
+        style.magnitude_axis(axes)
         axes.set_xlim(float(found.frequency_hz[0]), float(found.frequency_hz[-1]))
         axes.set_xlabel("drive frequency [Hz]")
         axes.set_ylabel("Response II\n|x at f| / A0")
-        legend_above(figure, [axes])
+        style.legend_above(figure, [axes])
     name = f"hysteresis_{up.facts.name}_{down.facts.name}"
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title=f"Up against down, {up.excitation.amplitude_vpp:g} Vpp",
         caption=_caption(up, down, found),

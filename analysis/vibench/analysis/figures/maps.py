@@ -25,25 +25,14 @@ from ..dynamics import (
 from ..figure_choices import SHOWN
 from ..signals.arrays import Reals
 from ..tables import Table, rows, table
+from . import style
 from .branches import draw_line
-from .style import (
-    LEVELS,
-    MEASURED,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    plain_label,
-    prefixed,
-    styled,
-)
 
 _PANEL_IN = 3.6
 _STRIP_IN = 2.6
 MICRO = 1e6
 _LINEAR = ("lyapunov", "motions", "duration")
-_COLOURS = (*LEVELS, "#f0e442", "#1b1b1b")
+_COLOURS = (*style.LEVELS, "#f0e442", "#1b1b1b")
 _UP_AND_DOWN = {"up": ("#0072b2", "up"), "down": ("#d55e00", "down")}
 
 
@@ -52,7 +41,7 @@ def map_figure(
     shown: str | None = None,
     diagram: BranchDiagram | None = None,
     levels: Sequence[RecordedLevel] = (),
-) -> DrawnFigure:
+) -> style.DrawnFigure:
     """Draw a map over two quantities, or the diagram along one.
 
     Parameters
@@ -67,13 +56,13 @@ def map_figure(
     levels
         Levels of recordings, overlaid on a map of frequency and amplitude as lines.
     """
-    with styled():
+    with style.styled():
         if len(results.plan.varied) == 1:
             figure, title = _diagram(results, diagram), "Motions along one parameter"
         else:
             usual = "duration" if results.plan.is_basin else "response_i"
             figure, title = _map(results, shown or usual, levels), "Map of motions"
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="map",
         title=f"{title}: {', '.join(each.long_name for each in results.plan.varied)}",
         caption=map_caption(results),
@@ -89,7 +78,7 @@ def _map(
 ) -> Figure:
     has_several = len(results.plan.start_labels) > 1 and shown != "motions"
     quantities = [shown, "motions"] if has_several else [shown]
-    figure = new_figure(_PANEL_IN * (1 + len(quantities)))
+    figure = style.new_figure(_PANEL_IN * (1 + len(quantities)))
     panels = figure.subplots(1 + len(quantities), 1, sharex=True)
     if results.plan.is_basin:
         _draw_basins(panels[0], results)
@@ -105,10 +94,10 @@ def _map(
     return figure
 
 
-def _draw(axes: Axes, results: MapResults, values: Reals, **style: Any) -> QuadMesh:
+def _draw(axes: Axes, results: MapResults, values: Reals, **look: Any) -> QuadMesh:
     first, second = results.plan.varied
     (across, _), (up, _) = _axis_edges(results, first), _axis_edges(results, second)
-    return axes.pcolormesh(across, up, values, rasterized=True, shading="flat", **style)
+    return axes.pcolormesh(across, up, values, rasterized=True, shading="flat", **look)
 
 
 def _axis_edges(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
@@ -116,7 +105,9 @@ def _axis_edges(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
     chosen = results.plan.range_of(quantity)
     edges = np.array(chosen.edges)
     factor, unit = (
-        (1.0, quantity.units) if quantity.units == "Hz" else prefixed(max(map(abs, edges)), quantity.units)
+        (1.0, quantity.units)
+        if quantity.units == "Hz"
+        else style.prefixed(max(map(abs, edges)), quantity.units)
     )
     return factor * edges, f"{quantity.long_name} [{unit.replace('u', 'µ')}]"
 
@@ -125,7 +116,7 @@ def _place(axes: Axes, results: MapResults) -> None:
     first, second = results.plan.varied
     for quantity, label, scale in (
         (first, axes.set_xlabel, partial(axes.set_xscale, "log")),
-        (second, axes.set_ylabel, partial(magnitude_axis, axes)),
+        (second, axes.set_ylabel, partial(style.magnitude_axis, axes)),
     ):
         label(_axis_edges(results, quantity)[1])
         if results.plan.range_of(quantity).spacing is Spacing.LOGARITHMIC:
@@ -174,21 +165,27 @@ def _scale(name: str, values: Reals) -> Normalize:
 def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
     """Draw a recording's level as a line, with measured values in the colours of the map."""
     frequency_hz, amplitude_m = np.array(level.pairs).T
-    axes.plot(frequency_hz, MICRO * amplitude_m, color=MEASURED, linewidth=4.0, label=plain_label(level.name))
+    axes.plot(
+        frequency_hz,
+        MICRO * amplitude_m,
+        color=style.MEASURED,
+        linewidth=4.0,
+        label=style.plain_label(level.name),
+    )
     for curve in level.measured:
         place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
         axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)
 
 
 def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
-    figure = new_figure(2.0 * _STRIP_IN)
+    figure = style.new_figure(2.0 * _STRIP_IN)
     panels = figure.subplots(2, 1, sharex=True)
     quantity = results.plan.varied[0]
     values = np.array(results.plan.axes[-1].values)
     _, label = _axis_edges(results, quantity)
     factor = _axis_edges(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
     for index, start in enumerate(results.plan.start_labels):
-        colour, said = _UP_AND_DOWN.get(start, (LEVELS[index % len(LEVELS)], f"from {start}"))
+        colour, said = _UP_AND_DOWN.get(start, (style.LEVELS[index % len(style.LEVELS)], f"from {start}"))
         dots = {"color": colour, "linestyle": "none", "marker": "."}
         panels[0].plot([], [], markersize=5.0, label=said, **dots)
         panels[0].plot(factor * values, results.shown("response_i", index), markersize=2.0, **dots)
@@ -200,13 +197,13 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
             place = factor * line.along(diagram.request.along)
             draw_line(panels[0], line, place, line.response_i[:, 0])
             draw_line(panels[1], line, place, _section(line))
-    magnitude_axis(panels[0])
+    style.magnitude_axis(panels[0])
     panels[0].set_ylabel("Response I of m0 over A0")
     panels[1].set_ylabel("p once a drive period [µm]")
     panels[1].set_xlabel(label)
     if quantity.axis == "frequency":
-        frequency_axis(panels[1], float(values[0]), float(values[-1]))
-    legend_above(figure, list(panels), columns=4)
+        style.frequency_axis(panels[1], float(values[0]), float(values[-1]))
+    style.legend_above(figure, list(panels), columns=4)
     figure.align_ylabels()
     return figure
 

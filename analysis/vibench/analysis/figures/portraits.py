@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from ..chaos.verdict import MotionKind, MotionVerdict
 from ..sine.dwell_analysis import DwellAnalysis
 from ..tables import columns, table
-from .style import BOUNDS, SIMULATED, DrawnFigure, legend_above, new_figure, prefixed, styled
+from . import style
 
 _PANEL_IN = 2.9
 _COLUMNS = 3
@@ -17,19 +17,19 @@ _ORBIT_PERIODS = 60.0
 _MOST_POINTS = 2000
 
 
-def portraits_figure(analyses: Sequence[DwellAnalysis]) -> DrawnFigure:
+def portraits_figure(analyses: Sequence[DwellAnalysis]) -> style.DrawnFigure:
     """Draw m0's velocity over displacement with one point per drive period, one panel for each level."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     rows = -(-len(rising) // _COLUMNS)
-    with styled():
-        figure = new_figure(0.5 + _PANEL_IN * rows)
+    with style.styled():
+        figure = style.new_figure(0.5 + _PANEL_IN * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(rising)), squeeze=False).ravel()
         for axes, analysis in zip(panels, rising, strict=False):
             _portrait(axes, analysis)
         for unused in panels[len(rising) :]:
             unused.set_axis_off()
-        legend_above(figure, [panels[0]], columns=2)
-    return DrawnFigure(
+        style.legend_above(figure, [panels[0]], columns=2)
+    return style.DrawnFigure(
         name="portraits_" + "_".join(each.facts.name for each in rising),
         title=f"Phase portraits at {rising[0].excitation.frequency_hz:g} Hz",
         caption=_caption(rising),
@@ -55,21 +55,21 @@ def verdict_text(verdict: MotionVerdict) -> str:
 
 def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     section = analysis.motion.section
-    length, unit = prefixed(float(np.max(np.abs(section.orbit_displacement_m))), "m")
-    speed, speed_unit = prefixed(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
+    length, unit = style.prefixed(float(np.max(np.abs(section.orbit_displacement_m))), "m")
+    speed, speed_unit = style.prefixed(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
     rate = analysis.response.displacement.sample_rate_hz
     shown = round(_ORBIT_PERIODS / section.drive_hz * rate)
     axes.plot(
         length * section.orbit_displacement_m[-shown:],
         speed * section.orbit_velocity_m_per_s[-shown:],
-        color=BOUNDS,
+        color=style.BOUNDS,
         linewidth=0.4,
         label=f"last {_ORBIT_PERIODS:g} drive periods",
     )
     axes.plot(
         length * section.displacement_m[-_MOST_POINTS:],
         speed * section.velocity_m_per_s[-_MOST_POINTS:],
-        color=SIMULATED,
+        color=style.SIMULATED,
         linestyle="none",
         marker=".",
         markersize=2.5,

@@ -20,18 +20,8 @@ from ..signals.arrays import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis, feedback_sentences, noted_jumps
 from ..tables import columns, plus_minus, table
+from . import style
 from .ensemble_band import band_columns, run_text, simulated_label
-from .style import (
-    LINEAR,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    DrawnFigure,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    styled,
-)
 
 _HEIGHT_IN = 4.6
 _ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
@@ -54,18 +44,18 @@ class SteppedLook(Generic[P]):
 
 def stepped_sine_figure(
     analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]
-) -> DrawnFigure:
+) -> style.DrawnFigure:
     """Draw Responses I and II over the stepped quantity, with one marker for each direction."""
     along = look.along(analysis.response)
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
         _responses(first, along, analysis, laid, RESPONSE_I)
         _responses(second, along, analysis, laid, RESPONSE_II)
         first.set_ylabel("Response I\nmax |x| / A0")
         second.set_ylabel("Response II\n|x at f| / A0")
         second.set_xlabel(look.axis)
-        legend_above(figure, [first], columns=2)
+        style.legend_above(figure, [first], columns=2)
     found = analysis.response
     content = columns(
         found,
@@ -77,7 +67,7 @@ def stepped_sine_figure(
         content |= band_columns(laid, RESPONSE_I, "response_i")
         content |= band_columns(laid, RESPONSE_II, "response_ii")
     name = f"stepped_sine_{analysis.facts.name}"
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title=look.title(analysis.excitation, found),
         caption=_caption(analysis, laid, look),
@@ -96,14 +86,14 @@ def _responses(
         axes.plot(
             along[rising],
             sines.linear[rising],
-            color=LINEAR,
+            color=style.LINEAR,
             linestyle="--",
             label="without contact",
         )
         axes.plot(
             along,
             getattr(sines, attribute),
-            color=PREDICTED,
+            color=style.PREDICTED,
             linestyle="none",
             marker=".",
             markersize=4,
@@ -115,7 +105,7 @@ def _responses(
         axes.plot(
             along[chosen],
             getattr(found, attribute)[chosen],
-            color=MEASURED,
+            color=style.MEASURED,
             label=f"measured, {direction}",
             linestyle="none",
             marker=marker,
@@ -124,8 +114,8 @@ def _responses(
         if laid is not None:
             _draw_simulated(axes, along, chosen, laid, what, (marker, direction))
     for jump in noted_jumps(analysis.facts.feedback):
-        axes.axvspan(jump.low_hz, jump.high_hz, color=MEASURED, alpha=0.3, linewidth=0)
-    magnitude_axis(axes)
+        axes.axvspan(jump.low_hz, jump.high_hz, color=style.MEASURED, alpha=0.3, linewidth=0)
+    style.magnitude_axis(axes)
 
 
 def _draw_simulated(
@@ -142,7 +132,7 @@ def _draw_simulated(
         along[chosen],
         values,
         yerr=reach,
-        color=SIMULATED,
+        color=style.SIMULATED,
         markerfacecolor="none",
         label=f"{simulated_label(laid.run)}, {direction}",
         linestyle="none",

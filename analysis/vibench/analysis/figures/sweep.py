@@ -10,40 +10,27 @@ from ..sine.collision_region import Collisions
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Table, columns, plus_minus, table
+from . import style
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from .hysteresis import jumps_text
-from .style import (
-    COLLIDING,
-    LINEAR,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    TERMINAL,
-    DrawnFigure,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    prefixed,
-    styled,
-)
 
 _HEIGHT_IN = 6.4
 _ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 
 
-def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> DrawnFigure:
+def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> style.DrawnFigure:
     """Draw the envelope in time with a frequency axis, and Responses I and II over frequency."""
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
         _envelope(envelope, analysis, laid)
         _responses(first, analysis, laid, RESPONSE_I, "Response I\nmax |x| / A0")
         _responses(second, analysis, laid, RESPONSE_II, "Response II\n|x at f| / A0")
         second.set_xlabel("drive frequency [Hz]")
         first.tick_params(labelbottom=False)
-        legend_above(figure, [envelope, first], columns=3)
+        style.legend_above(figure, [envelope, first], columns=3)
         figure.align_ylabels()
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=f"sweep_{analysis.facts.name}",
         title=f"Sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
         caption=sweep_caption(analysis, laid),
@@ -55,15 +42,15 @@ def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> D
 def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) -> None:
     found = analysis.response
     largest = float(max(np.max(found.upper), -np.min(found.lower)))
-    factor, unit = prefixed(largest, "m/s")
+    factor, unit = style.prefixed(largest, "m/s")
     for number, region in enumerate(analysis.collisions.regions):
         label = "masses collide (measured)" if number == 0 else None
-        axes.axvspan(region.start.time_s, region.stop.time_s, color=COLLIDING, zorder=0, label=label)
+        axes.axvspan(region.start.time_s, region.stop.time_s, color=style.COLLIDING, zorder=0, label=label)
     axes.fill_between(
         found.time_s,
         factor * found.lower,
         factor * found.upper,
-        color=MEASURED,
+        color=style.MEASURED,
         alpha=0.85,
         linewidth=0,
         label=f"measured {analysis.facts.mass} velocity",
@@ -71,7 +58,9 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
     if laid is not None:
         for number, outline in enumerate((laid.response.upper, laid.response.lower)):
             label = simulated_label(laid.run) if number == 0 else None
-            axes.plot(laid.response.time_s, factor * outline, color=SIMULATED, linewidth=0.7, label=label)
+            axes.plot(
+                laid.response.time_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label
+            )
     axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
     axes.set_ylabel(f"{analysis.facts.mass} velocity\n[{unit}]")
     axes.set_xlabel("time of the sweep [s]")
@@ -95,13 +84,13 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
 def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str, label: str) -> None:
     measured, attribute = analysis.response, _ATTRIBUTES[what]
     for region in analysis.collisions.regions:
-        axes.axvspan(region.low_hz, region.high_hz, color=COLLIDING, zorder=0)
+        axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     if laid is not None:
         sines = laid.prediction
         axes.plot(
             sines.frequency_hz,
             sines.linear,
-            color=LINEAR,
+            color=style.LINEAR,
             linestyle="--",
             linewidth=1.0,
             label="without contact",
@@ -109,7 +98,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
         axes.plot(
             sines.frequency_hz,
             getattr(sines, attribute),
-            color=PREDICTED,
+            color=style.PREDICTED,
             linestyle="none",
             marker=".",
             markersize=3,
@@ -118,7 +107,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
     axes.plot(
         measured.frequency_hz,
         getattr(measured, attribute),
-        color=MEASURED,
+        color=style.MEASURED,
         linewidth=1.3,
         label="measured response",
     )
@@ -127,16 +116,16 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
         axes.plot(
             laid.response.frequency_hz,
             getattr(laid.response, attribute) if middle is None else middle,
-            color=SIMULATED,
+            color=style.SIMULATED,
             linewidth=0.7,
             linestyle=(0, (4, 2)),
         )
     for number, jump in enumerate(analysis.jumps):
         named = "jump" if number == 0 else None
-        axes.axvline(jump.frequency_hz, color=TERMINAL, linestyle=":", linewidth=1.0, label=named)
+        axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=named)
     ends = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
     axes.set_xlim(*ends)
-    magnitude_axis(axes)
+    style.magnitude_axis(axes)
     axes.set_ylabel(label)
 
 

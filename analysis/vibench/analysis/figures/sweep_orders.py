@@ -7,17 +7,7 @@ from matplotlib.figure import Figure
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Table, table
 from ..tones.order_tracking import order_label
-from .style import (
-    COLLIDING,
-    LEVELS,
-    MEASURED,
-    DrawnFigure,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    prefixed,
-    styled,
-)
+from . import style
 
 _HEIGHT_IN = 6.0
 _RANGE_DB = 80.0
@@ -26,16 +16,16 @@ _SHOWN = (0.5, 1.0, 1.5, 2.0, 3.0)
 _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 
-def sweep_orders_figure(analysis: SweepAnalysis) -> DrawnFigure:
+def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
     """Draw the spectrogram of the velocity and the displacement at orders of the drive."""
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))
         _picture(figure, picture, analysis)
         _orders(orders, analysis)
-        legend_above(figure, [orders], columns=6)
+        style.legend_above(figure, [orders], columns=6)
     name = f"orders_{analysis.facts.name}"
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=name,
         title=f"Orders of a sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
         caption=_caption(analysis),
@@ -51,7 +41,7 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
     shown = axes.pcolormesh(
         found.time_s, found.frequency_hz, decibel, cmap="viridis", vmin=-_RANGE_DB, vmax=0, rasterized=True
     )
-    factor, unit = prefixed(top, "m/s")
+    factor, unit = style.prefixed(top, "m/s")
     figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
     axes.set_xlabel("time of the sweep [s]")
     axes.set_ylabel(f"frequency in the\nvelocity of {analysis.facts.mass} [Hz]")
@@ -61,10 +51,12 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
 def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
     response = analysis.response
     for region in analysis.collisions.regions:
-        axes.axvspan(region.low_hz, region.high_hz, color=COLLIDING, zorder=0)
+        axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     shown = response.harmonics.amplitude
-    factor, unit = prefixed(float(shown.max()), "m")
-    for order, colour, line in zip(_SHOWN, (LEVELS[0], MEASURED, *LEVELS[1:4]), _ORDER_STYLES, strict=True):
+    factor, unit = style.prefixed(float(shown.max()), "m")
+    for order, colour, line in zip(
+        _SHOWN, (style.LEVELS[0], style.MEASURED, *style.LEVELS[1:4]), _ORDER_STYLES, strict=True
+    ):
         axes.plot(
             response.harmonics_hz,
             factor * np.abs(response.harmonics.order(order)),
@@ -75,7 +67,7 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
         )
     ends = sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1])))
     axes.set_xlim(*ends)
-    magnitude_axis(axes)
+    style.magnitude_axis(axes)
     axes.set_xlabel("drive frequency [Hz]")
     axes.set_ylabel(f"displacement of {analysis.facts.mass} [{unit}]")
 

@@ -7,13 +7,13 @@ import numpy as np
 from vibench.sim.accuracy_benchmark.curve import CurvePoint
 
 from ..tables import table
-from .style import BOUNDS, LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, new_figure, styled
+from . import style
 
 _LEAST = 1e-14
 """An error below this is rounding."""
 
 
-def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
+def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigure:
     """Draw the error of the responses over time, a panel for each scene and a line for each method.
 
     Parameters
@@ -25,12 +25,16 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
     # Methods beyond the number of colours differ by their markers.
     looks = {
-        method: (LEVELS[place % len(LEVELS)], LEVEL_STYLES[place % len(LEVELS)], place // len(LEVELS))
+        method: (
+            style.LEVELS[place % len(style.LEVELS)],
+            style.LEVEL_STYLES[place % len(style.LEVELS)],
+            place // len(style.LEVELS),
+        )
         for place, method in enumerate(methods)
     }
     columns = min(2, len(curves))
-    with styled():
-        figure = new_figure(4.6 if len(curves) == 1 else 6.6)
+    with style.styled():
+        figure = style.new_figure(4.6 if len(curves) == 1 else 6.6)
         panels = figure.subplots(-(-len(curves) // columns), columns, squeeze=False, sharex=True, sharey=True)
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
             for method, (colour, line, more) in looks.items():
@@ -45,7 +49,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
                     label=method,
                 )
             chosen = [(each.time_s, max(each.error, _LEAST)) for each in points if each.is_chosen]
-            ring = {"color": BOUNDS, "marker": "o", "markersize": 11, "fillstyle": "none"}
+            ring = {"color": style.BOUNDS, "marker": "o", "markersize": 11, "fillstyle": "none"}
             axes.plot(*np.array(chosen).T, linestyle="none", **ring)
             axes.set_xscale("log")
             axes.set_yscale("log")
@@ -55,9 +59,9 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> DrawnFigure:
             axes.set_xlabel("time [s]")
         for axes in panels[:, 0]:
             axes.set_ylabel("relative error of the responses")
-        legend_above(figure, [panels[0, 0]])
+        style.legend_above(figure, [panels[0, 0]])
     rows = [(scene, each) for scene, points in curves.items() for each in points]
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="tradeoff_scene" if len(curves) == 1 else "tradeoff",
         title=f"Speed against accuracy: {'; '.join(curves)}",
         caption=(

@@ -11,6 +11,7 @@ from ..overlay.overlay import TRANSMISSION, NoiseOverlay
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, columns, plus_minus, table
+from . import style
 from .ensemble_band import (
     ModelResonances,
     band_columns,
@@ -21,19 +22,6 @@ from .ensemble_band import (
     run_text,
     simulated_label,
     sines_table,
-)
-from .style import (
-    BOUNDS,
-    LINEAR,
-    MEASURED,
-    PREDICTED,
-    SIMULATED,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    styled,
 )
 
 _HEIGHT_IN = 6.4
@@ -46,11 +34,11 @@ _BELOW = 0.5
 """The axis begins at half the smallest value."""
 
 
-def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> DrawnFigure:
+def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> style.DrawnFigure:
     """Draw the measured transmission with bounds, the simulation, coherence and difference."""
     at = model_resonances(specimen_of(analysis.facts.bench) if laid is None else laid.run.specimen)
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         rows = 3 if laid is None else 4
         panels = figure.subplots(
             rows, 1, sharex=True, height_ratios=(3.6, 1.2, 1.0, 1.0)[:rows], squeeze=False
@@ -63,11 +51,11 @@ def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = Non
             _differences(panels[3, 0], laid, at)
         panels[-1, 0].set_xlabel("frequency [Hz]")
         found = analysis.response.frequency_response.frequency_hz
-        frequency_axis(top, float(found[0]), float(found[-1]))
+        style.frequency_axis(top, float(found[0]), float(found[-1]))
         label_resonances(top, at)
-        legend_above(figure, [top], columns=2)
+        style.legend_above(figure, [top], columns=2)
         figure.align_ylabels()
-    return DrawnFigure(
+    return style.DrawnFigure(
         name=f"transmission_{analysis.facts.name}",
         title=f"Transmission, {analysis.facts.measurement.excitation.amplitude_vpp:g} Vpp noise",
         caption=transmission_caption(analysis, laid),
@@ -87,7 +75,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         measured.frequency_hz,
         view.drawn(low),
         view.drawn(high),
-        color=BOUNDS,
+        color=style.BOUNDS,
         alpha=0.45,
         linewidth=0,
         label=f"{100 * measured.settings.confidence:g} % bounds",
@@ -97,12 +85,12 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
         linear = np.abs(base_transmissibility(laid.run.specimen, fine_hz)[:, 0])
         linear = view.drawn(linear * view.factor(fine_hz))
-        axes.plot(fine_hz, linear, color=LINEAR, linestyle="--", label="without contact")
+        axes.plot(fine_hz, linear, color=style.LINEAR, linestyle="--", label="without contact")
         micrometres = 1e6 * float(sines.amplitude_m[0])
         axes.plot(
             sines.frequency_hz,
             view.drawn(sines.response_i * view.factor(sines.frequency_hz)),
-            color=PREDICTED,
+            color=style.PREDICTED,
             linewidth=0.9,
             label=f"Response I, sines of A0 = {micrometres:.3g} µm",
         )
@@ -113,14 +101,19 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         axes.plot(
             simulated.frequency_hz,
             view.drawn(simulated.magnitude) if middle is None else middle,
-            color=SIMULATED,
+            color=style.SIMULATED,
             linewidth=0.8,
             linestyle=(0, (4, 2)),
             zorder=3.5,
             label=simulated_label(laid.run),
         )
     axes.plot(
-        measured.frequency_hz, view.drawn(size), color=MEASURED, linewidth=1.5, label="measured", zorder=3
+        measured.frequency_hz,
+        view.drawn(size),
+        color=style.MEASURED,
+        linewidth=1.5,
+        label="measured",
+        zorder=3,
     )
     peaks = analysis.response.resonances
     peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
@@ -131,12 +124,12 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         linestyle="none",
         marker="v",
         markersize=5,
-        color=MEASURED,
+        color=style.MEASURED,
         label="resonances found" if peaks else None,
         zorder=4,
     )
     if view.scale is MagnitudeScale.LOG:
-        magnitude_axis(axes)
+        style.magnitude_axis(axes)
     seen = size[np.isfinite(size) & (size > 0)]
     if seen.size:
         axes.set_ylim(bottom=float(view.drawn(np.array([_BELOW * np.min(seen)]))[0]))
@@ -149,18 +142,18 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: 
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
-    axes.fill_between(measured.frequency_hz, low, high, color=BOUNDS, alpha=0.45, linewidth=0)
+    axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45, linewidth=0)
     if laid is not None:
         simulated = view.shown(laid.response.frequency_response)
         axes.plot(
             *_unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad)),
-            color=SIMULATED,
+            color=style.SIMULATED,
             linewidth=0.8,
             linestyle=(0, (4, 2)),
             zorder=3.5,
         )
     axes.plot(
-        *_unbroken(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=MEASURED, linewidth=0.9
+        *_unbroken(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=style.MEASURED, linewidth=0.9
     )
     axes.set_ylim(-_HALF_TURN_DEG, _HALF_TURN_DEG)
     axes.set_yticks([-_HALF_TURN_DEG, 0, _HALF_TURN_DEG])
@@ -176,8 +169,8 @@ def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
 def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None:
     measured = analysis.response.frequency_response
     mark_resonances(axes, at)
-    axes.plot(measured.frequency_hz, measured.coherence, color=MEASURED, linewidth=0.8)
-    axes.axhline(measured.coherence_significance, color=SIMULATED, linewidth=0.9, linestyle="-.")
+    axes.plot(measured.frequency_hz, measured.coherence, color=style.MEASURED, linewidth=0.8)
+    axes.axhline(measured.coherence_significance, color=style.SIMULATED, linewidth=0.9, linestyle="-.")
     axes.set_ylim(0, 1.05)
     axes.set_ylabel("coherence")
 
@@ -185,8 +178,8 @@ def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None
 def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
     mark_resonances(axes, at)
     shown = np.clip(laid.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
-    axes.plot(laid.difference.frequency_hz, shown, color=SIMULATED, linewidth=0.8)
-    axes.axhline(0, color=MEASURED, linewidth=0.6)
+    axes.plot(laid.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
+    axes.axhline(0, color=style.MEASURED, linewidth=0.6)
     reach = max(1.0, float(np.nanmax(np.abs(shown))) * 1.1)
     axes.set_ylim(-reach, reach)
     axes.set_ylabel("meas. − sim.\n[dB]")

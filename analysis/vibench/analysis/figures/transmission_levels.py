@@ -6,28 +6,19 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import MagnitudeScale
 from ..recordings.facts import specimen_of
 from ..tables import table
+from . import style
 from .ensemble_band import label_resonances, mark_resonances, model_resonances
-from .style import (
-    LEVEL_STYLES,
-    LEVELS,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    magnitude_axis,
-    new_figure,
-    styled,
-)
 
 _HEIGHT_IN = 4.0
 
 
-def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure:
+def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.DrawnFigure:
     """Draw the transmissions of several noise levels, weak to strong; at least one is needed."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     view = rising[0].request.view
     at = model_resonances(specimen_of(rising[0].facts.bench))
-    with styled():
-        figure = new_figure(_HEIGHT_IN)
+    with style.styled():
+        figure = style.new_figure(_HEIGHT_IN)
         axes = figure.subplots()
         mark_resonances(axes, at)
         for number, each in enumerate(rising):
@@ -36,25 +27,25 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
             axes.plot(
                 found.frequency_hz,
                 view.drawn(found.magnitude),
-                color=LEVELS[number % len(LEVELS)],
-                linestyle=LEVEL_STYLES[number % len(LEVEL_STYLES)],
+                color=style.LEVELS[number % len(style.LEVELS)],
+                linestyle=style.LEVEL_STYLES[number % len(style.LEVEL_STYLES)],
                 linewidth=1.0,
                 label=f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)",
             )
         if view.scale is MagnitudeScale.LOG:
-            magnitude_axis(axes)
+            style.magnitude_axis(axes)
         axes.set_ylabel(view.label(rising[0].facts.mass))
         axes.set_xlabel("frequency [Hz]")
         lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
         highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
-        frequency_axis(axes, min(lows), max(highs))
+        style.frequency_axis(axes, min(lows), max(highs))
         label_resonances(axes, at)
-        legend_above(figure, [axes], columns=2)
+        style.legend_above(figure, [axes], columns=2)
     columns = {}
     for each in rising:
         columns[f"frequency_hz_{each.facts.name}"] = each.response.frequency_response.frequency_hz
         columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.frequency_response).magnitude
-    return DrawnFigure(
+    return style.DrawnFigure(
         name="transmission_levels",
         title="Transmission at all noise levels",
         caption=transmission_levels_caption(rising),
