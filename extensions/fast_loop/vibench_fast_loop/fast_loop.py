@@ -96,11 +96,8 @@ def fast_loop(rig: Rig) -> FastLoop:
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     """Refuse a branch that the loop does not hold according to the model.
 
-    Raises
-    ------
-    LimitExceeded
-        With the largest multiplier and the range that would be held, or why they are unknown. Nothing was
-        played.
+    Raises LimitExceeded with the largest multiplier and the range that would be held, or why they are
+    unknown. Nothing was played.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "whether the fast loop holds the branch is not known: "

@@ -86,10 +86,7 @@ class Attempts:
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Make one valid recording of a point; ``tell`` is called after every block.
 
-        Raises
-        ------
-        AcquisitionError
-            What the last attempt failed with; it stands in the journal.
+        Raises AcquisitionError: what the last attempt failed with; it stands in the journal.
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)

@@ -159,15 +159,12 @@ resonance holds a light table back to about a fifth."""
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
     """Raise LimitExceeded when the base hardly moves, so that the run ramps down.
 
+    Raises LimitExceeded: the run then ramps down.
+
     Parameters
     ----------
     acceleration
         Amplitude of the base's fundamental, as measured [m/s2].
-
-    Raises
-    ------
-    LimitExceeded
-        The run then ramps down.
     """
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:

@@ -241,10 +241,8 @@ class DaqmxDigitizer:
     def open(cls, rig: Rig) -> Self:
         """Reserve the converter of a rig with all its inputs, and read back its rate.
 
-        Raises
-        ------
-        InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError, SettingRefused
-            As `_daqmx_errors` assigns them. Nothing stays reserved then.
+        Raises InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError or SettingRefused as
+        `_daqmx_errors` assigns them. Nothing stays reserved then.
         """
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
         with ExitStack() as undo:

@@ -114,10 +114,7 @@ def _period(
 def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None:
     """Refuse a band whose first image is too near; images below half the playback rate cannot be filtered.
 
-    Raises
-    ------
-    ConfigurationError
-        Which says what would be allowed.
+    Raises ConfigurationError, which says what would be allowed.
     """
     image_hz = points * repetition_hz - stop_hz
     if image_hz < NEAREST_IMAGE_RATIO * stop_hz:

@@ -49,10 +49,7 @@ _LOCKED_OTHERWISE = "file locking flag values don't match"
 def open_hdf5(path: Path) -> h5py.File:
     """Open a recording for reading; it may still be growing.
 
-    Raises
-    ------
-    RecordingError
-        One sentence for each way in which it is not a readable recording.
+    Raises RecordingError: one sentence for each way in which it is not a readable recording.
     """
     _require_file(path)
     try:

@@ -392,15 +392,12 @@ def opened(uri: str) -> sqlite3.Connection:
 def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
     """Close a new connection if its first use fails: Windows lets nobody move or delete an open file.
 
+    Raises sqlite3.Error: whatever the first use raised, after closing.
+
     Parameters
     ----------
     connection
         New connection.
-
-    Raises
-    ------
-    sqlite3.Error
-        Whatever the first use raised, after closing.
     """
     try:
         yield connection

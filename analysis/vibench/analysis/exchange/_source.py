@@ -77,12 +77,8 @@ MOST_CHANNELS = 4096
 def opened_source(path: Path) -> Iterator[Source]:
     """Open a file by its suffix. Nothing in it is ever executed: no pickles, no macros.
 
-    Raises
-    ------
-    InvalidRequest
-        When there is no such file, or no reader for its suffix.
-    UnusableData
-        When it is damaged, or contains no channel.
+    Raises InvalidRequest when there is no such file, or no reader for its suffix; UnusableData when it is
+    damaged, or contains no channel.
     """
     if not path.is_file():
         raise InvalidRequest(f"{path} does not exist, or is no file; give the path of a file to import")

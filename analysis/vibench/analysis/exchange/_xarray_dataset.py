@@ -33,6 +33,9 @@ def xarray_dataset(
     attribute ``segments_json`` describes them. Open a finished file larger than memory directly:
     ``xarray.open_dataset(path, engine="h5netcdf")``.
 
+    Raises InvalidRequest when xarray is not installed, or the stretch lies outside the recording;
+    UnusableData when the recording is not as it was sealed.
+
     Parameters
     ----------
     recording
@@ -41,13 +44,6 @@ def xarray_dataset(
         Channels; by default all.
     from_s, to_s
         Stretch of time [s]; by default the whole recording.
-
-    Raises
-    ------
-    InvalidRequest
-        When xarray is not installed, or the stretch lies outside the recording.
-    UnusableData
-        When the recording is not as it was sealed.
     """
     try:
         import xarray  # noqa: PLC0415 - an optional extra

@@ -205,6 +205,9 @@ class LiveTwin:
     ) -> None:
         """Begin.
 
+        Raises InvalidRequest when its stops cannot be tracked; UnusableData when the bench lacks one of the
+        two channels.
+
         Parameters
         ----------
         rig
@@ -217,13 +220,6 @@ class LiveTwin:
             Description of the specimen.
         known
             Parameters of its baseline, which replace the described ones.
-
-        Raises
-        ------
-        InvalidRequest
-            When its stops cannot be tracked.
-        UnusableData
-            When the bench lacks one of the two channels.
         """
         channels = {each.role.value: each for each in channels_of(rig)}
         require_channels(rig.name, tuple(channels))

@@ -112,6 +112,9 @@ def similarity(
 ) -> Similarity:
     """Compare a model's response curve with the reference's (Gong et al. 2025, eqs. 6 and 7).
 
+    Raises InvalidRequest when the frequencies differ, or a setting has no meaning; NotEnoughData when no
+    point has a value in both curves.
+
     Parameters
     ----------
     reference, model
@@ -124,13 +127,6 @@ def similarity(
         Largest difference of a similar point.
     seed
         Seed of the bootstrap (circular blocks; Politis and Romano 1992).
-
-    Raises
-    ------
-    InvalidRequest
-        When the frequencies differ, or a setting has no meaning.
-    NotEnoughData
-        When no point has a value in both curves.
     """
     if not np.array_equal(reference.frequency_hz, model.frequency_hz):
         raise InvalidRequest(

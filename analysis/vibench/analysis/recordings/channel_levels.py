@@ -162,10 +162,7 @@ _CLIPPED_SHARE = 0.2
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
     """Refuse unusable channels; ``response`` is the analysed channel.
 
-    Raises
-    ------
-    UnusableData
-        One sentence that names every such channel and what to look at.
+    Raises UnusableData: one sentence that names every such channel and what to look at.
     """
     used = (DRIVE, BASE, response)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]

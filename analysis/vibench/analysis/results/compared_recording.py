@@ -88,12 +88,8 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 def recorded_response(path: Path) -> RecordedLevel:
     """Return the drive level of a stepped sine or a sweep and its measured Response I, as a line on a map.
 
-    Raises
-    ------
-    NotEnoughData
-        When the recording is of another kind, or of one frequency.
-    RecordingError
-        When the file is no recording.
+    Raises NotEnoughData when the recording is of another kind, or of one frequency; RecordingError when the
+    file is no recording.
     """
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [

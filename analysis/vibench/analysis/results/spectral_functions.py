@@ -36,19 +36,15 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
     Noise also has the frequency response from base to m0 and its coherence, of the whole recording as in
     `analyse`.
 
+    Raises NotEnoughData when the excerpt contains no segment of excitation, or its analysis finds nothing;
+    UnusableData when the recording was changed after it was sealed.
+
     Parameters
     ----------
     excerpt
         Part of an open recording.
     request
         Estimator and quantities of the frequency response.
-
-    Raises
-    ------
-    NotEnoughData
-        When the excerpt contains no segment of excitation, or its analysis finds nothing.
-    UnusableData
-        When the recording was changed after it was sealed.
     """
     require_checked(excerpt.recording)
     played = _played_parts(excerpt)

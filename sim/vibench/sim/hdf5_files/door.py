@@ -69,19 +69,14 @@ def allow_external_data() -> Iterator[None]:
 def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
     """Open a file for reading, and check everything in it except the data.
 
+    Raises OSError when HDF5 cannot open it; UnsafeHdf5 when it points outside itself, or its sizes cannot be.
+
     Parameters
     ----------
     path
         Of the file.
     locking
         As of ``h5py.File``: HDF5's own choice if None.
-
-    Raises
-    ------
-    OSError
-        When HDF5 cannot open it.
-    UnsafeHdf5
-        When it points outside itself, or its sizes cannot be.
     """
     file = h5py.File(path, "r", locking=locking)
     try:

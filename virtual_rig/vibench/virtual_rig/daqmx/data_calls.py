@@ -41,10 +41,7 @@ class Reading:
 def read(task: Task, samples: int, deadline_s: float) -> Reading:
     """Read ``samples`` per channel, starting the task if necessary; a negative number reads all.
 
-    Raises
-    ------
-    DaqmxRefusal
-        -200279 for lost samples, -200278 past the end, -200284 if no sample came in time.
+    Raises DaqmxRefusal: -200279 for lost samples, -200278 past the end, -200284 if no sample came in time.
     """
     require_inputs(task)
     check_memory(samples, len(task.inputs))
@@ -173,11 +170,8 @@ def _await_samples(task: Task, acquisition: Acquisition, end: int, deadline_s: f
 def write(task: Task, volts: NDArray[np.float64], start: StartsItself, deadline_s: float) -> int:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
-    Raises
-    ------
-    DaqmxRefusal
-        -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full buffer,
-        -200290 after an underflow.
+    Raises DaqmxRefusal: -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full
+    buffer, -200290 after an underflow.
     """
     require_outputs(task)
     for row, channel in enumerate(task.outputs):
