@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from . import scpi_message as scpi
 from .channel_output import (
     MODULATIONS,
     OPEN_AMPLITUDE_RANGE_VPP,
@@ -40,27 +41,6 @@ from .scpi_instrument import (
     only,
     report,
     switch,
-)
-from .scpi_message import (
-    AMPLITUDE_UNITS,
-    EDIT_MEMORY,
-    FREQUENCY_UNITS,
-    NO_UNITS,
-    PERCENT_UNITS,
-    RESISTANCE_UNITS,
-    VOLTAGE_UNITS,
-    ArbitraryMemory,
-    ErrorCode,
-    ScpiError,
-    as_block,
-    as_number,
-    big_endian,
-    block,
-    boolean,
-    integer,
-    memory_name,
-    number_and_unit,
-    text,
 )
 from .terminal_voltage import Relay, Terminal
 
@@ -104,8 +84,8 @@ class AFG1022(ScpiInstrument):
     def _table(self, quirks: Quirks) -> tuple[Command, ...]:
         return (*COMMANDS, LOAD) if quirks.panel_load_ohm is None else COMMANDS
 
-    def _new_memory(self) -> ArbitraryMemory:
-        return ArbitraryMemory()
+    def _new_memory(self) -> scpi.ArbitraryMemory:
+        return scpi.ArbitraryMemory()
 
     def _power_on(self) -> ChannelSettings:
         return ChannelSettings(declared_load_ohm=self.quirks.panel_load_ohm or 50.0)
@@ -154,7 +134,7 @@ class AFG1022(ScpiInstrument):
     def memory_changed(self) -> None:
         """Apply a changed waveform at once if it is playing."""
         sounding = self._channels[SOUNDING_CHANNEL]
-        if memory_name(sounding.shape) is not None:
+        if scpi.memory_name(sounding.shape) is not None:
             self._replace(SOUNDING_CHANNEL, sounding)
 
     def reset(self) -> None:
@@ -220,7 +200,7 @@ def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Channel
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
     """Return settings without a mode that is not simulated: it can be switched off, but not on (-241)."""
     if wanted:
-        raise ScpiError(ErrorCode.HARDWARE_MISSING)
+        raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)
 
 
@@ -238,10 +218,10 @@ class _FrequencyMode(Enum):
 
 
 def _shape_name(parameter: bytes) -> str:
-    word = text(parameter)
-    name = standard_shape(word) or memory_name(word)
+    word = scpi.text(parameter)
+    name = standard_shape(word) or scpi.memory_name(word)
     if name is None:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return name
 
 
@@ -260,12 +240,12 @@ def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> byte
 def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
     """Parse ``31DEG`` or radians; the phase is truncated to degrees, a negative one is refused."""
     full_turn_deg = 360.0
-    angle, unit = number_and_unit(only(parameters))
+    angle, unit = scpi.number_and_unit(only(parameters))
     if unit not in ("", "RAD", "DEG"):
-        raise ScpiError(ErrorCode.INVALID_SUFFIX)
+        raise scpi.ScpiError(scpi.ErrorCode.INVALID_SUFFIX)
     angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
-        raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
     # A small margin prevents truncation of 31 degrees, sent in radians, to 30.
     whole = math.floor(angle_deg + 1e-9)
     generator.configure(channel, replace(generator.settings(channel), phase_deg=whole))
@@ -273,35 +253,35 @@ def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> No
 
 def _ask_phase(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
     none(parameters)
-    return as_number(math.radians(generator.settings(channel).phase_deg))
+    return scpi.as_number(math.radians(generator.settings(channel).phase_deg))
 
 
 def _write_lock(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    generator.lock_frequencies(channel, locked=boolean(only(parameters)))
+    generator.lock_frequencies(channel, locked=scpi.boolean(only(parameters)))
 
 
 def _memory(parameter: bytes) -> str:
-    name = memory_name(text(parameter))
+    name = scpi.memory_name(scpi.text(parameter))
     if name is None:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return name
 
 
 def _load_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
     target, data = exactly(parameters, 2)
-    generator.memory.load(_memory(target), block(data))
+    generator.memory.load(_memory(target), scpi.block(data))
     generator.memory_changed()
 
 
 def _read_memory(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
-    return as_block(big_endian(generator.memory.codes(_memory(only(parameters)))))
+    return scpi.as_block(scpi.big_endian(generator.memory.codes(_memory(only(parameters)))))
 
 
 def _define_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
     target, points = exactly(parameters, 2)
-    if _memory(target) != EDIT_MEMORY:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    generator.memory.define(integer(points))
+    if _memory(target) != scpi.EDIT_MEMORY:
+        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
+    generator.memory.define(scpi.integer(points))
     generator.memory_changed()
 
 
@@ -322,7 +302,7 @@ def _catalogue(generator: AFG1022) -> bytes:
 def load_command(header: str) -> Command:
     """Return the command of the declared load; high impedance is infinite."""
     row = number(
-        header, "IVI; drivers contradict each other", "declared_load_ohm", RESISTANCE_UNITS,
+        header, "IVI; drivers contradict each other", "declared_load_ohm", scpi.RESISTANCE_UNITS,
         lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,
     )  # fmt: skip
 
@@ -341,7 +321,7 @@ def _share(settings: ChannelSettings) -> float:
 
 
 _DUTY = number(
-    "[SOURce#:]PULSe:DCYCle", "drivers, AFG1062; range assumed", "duty_percent", PERCENT_UNITS,
+    "[SOURce#:]PULSe:DCYCle", "drivers, AFG1062; range assumed", "duty_percent", scpi.PERCENT_UNITS,
     lambda _: (0.1, 99.9), default=50.0, decimals=1,
 )  # fmt: skip
 
@@ -350,13 +330,13 @@ def _write_duty(generator: AFG1022, channel: int, parameters: Parameters) -> Non
     """Set the duty cycle and queue an error, as the instrument does."""
     assert _DUTY.write is not None
     _DUTY.write(generator, channel, parameters)
-    raise ScpiError(ErrorCode.SYNTAX_ERROR)
+    raise scpi.ScpiError(scpi.ErrorCode.SYNTAX_ERROR)
 
 
 def burst_cycles(most: int, channels: int) -> Command:
     """Return the command of the number of burst periods."""
     return number(
-        "[SOURce#:]BURSt:NCYCles", "IVI, drivers", "burst_cycles", NO_UNITS, lambda _: (1, most),
+        "[SOURce#:]BURSt:NCYCles", "IVI, drivers", "burst_cycles", scpi.NO_UNITS, lambda _: (1, most),
         default=5, decimals=0, channels=channels, largest=math.inf,
     )  # fmt: skip
 
@@ -367,12 +347,12 @@ SHARED_COMMANDS = (
     switch("OUTPut#[:STATe]", "IVI",
         lambda s: s.relay is Relay.CLOSED,
         lambda s, on: replace(s, relay=Relay.CLOSED if on else Relay.OPEN)),
-    number("[SOURce#:]FREQuency[:FIXed]", "IVI", "frequency_hz", FREQUENCY_UNITS,
+    number("[SOURce#:]FREQuency[:FIXed]", "IVI", "frequency_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
-    number("[SOURce#:]VOLTage[:LEVel][:IMMediate][:AMPLitude]", "IVI", "amplitude_vpp", AMPLITUDE_UNITS,
+    number("[SOURce#:]VOLTage[:LEVel][:IMMediate][:AMPLitude]", "IVI", "amplitude_vpp", scpi.AMPLITUDE_UNITS,
         lambda s: (OPEN_AMPLITUDE_RANGE_VPP[0] * _share(s), OPEN_AMPLITUDE_RANGE_VPP[1] * _share(s)),
         default=1.0, decimals=4, scale=_share),
-    number("[SOURce#:]VOLTage[:LEVel][:IMMediate]:OFFSet", "IVI", "offset_v", VOLTAGE_UNITS,
+    number("[SOURce#:]VOLTage[:LEVel][:IMMediate]:OFFSet", "IVI", "offset_v", scpi.VOLTAGE_UNITS,
         lambda s: (-OPEN_PEAK_V * _share(s), OPEN_PEAK_V * _share(s)), default=0.0, decimals=4, scale=_share),
 )
 COMMANDS = (

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import scpi_message as scpi
 from .afg1022 import (
     AFG1022,
     SHARED_COMMANDS,
@@ -24,20 +25,6 @@ from .afg1022 import (
 from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
 from .phase_course import Spacing
 from .scpi_instrument import Command, Parameters, Quirks, choice, none, number, only, switch
-from .scpi_message import (
-    EDIT_MEMORY,
-    FREQUENCY_UNITS,
-    NO_UNITS,
-    ArbitraryMemory,
-    Codes,
-    ErrorCode,
-    ScpiError,
-    as_number,
-    block,
-    integer,
-    number as value_of,
-    text,
-)
 
 TOP_CODE = 65_534
 """Codes -32767 to 32767, with an offset to start at zero."""
@@ -91,11 +78,11 @@ class Keysight33500B(AFG1022):
 
     def __init__(self, *arguments: object, **options: object) -> None:
         super().__init__(*arguments, **{"serial": DEFAULT_SERIAL, **options, "quirks": _QUIRKS})  # type: ignore[arg-type]
-        self.waveforms: dict[str, Codes] = {}
+        self.waveforms: dict[str, scpi.Codes] = {}
         self.selected = ""
 
-    def _new_memory(self) -> ArbitraryMemory:
-        return ArbitraryMemory(POINTS[1], TOP_CODE)
+    def _new_memory(self) -> scpi.ArbitraryMemory:
+        return scpi.ArbitraryMemory(POINTS[1], TOP_CODE)
 
     def _power_on(self) -> ChannelSettings:
         return _Settings()
@@ -106,21 +93,21 @@ class Keysight33500B(AFG1022):
 
 
 def _name(parameter: bytes) -> str:
-    return text(parameter).strip('"').upper()
+    return scpi.text(parameter).strip('"').upper()
 
 
 def _write_dac(own: Keysight33500B, _: int, parameters: Parameters) -> None:
     """Store a waveform from a binary block of 16-bit numbers, or from a list."""
     if len(parameters) < 2:
-        raise ScpiError(ErrorCode.MISSING_PARAMETER)
+        raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
     name = _name(parameters[0])
     if name in own.waveforms:
-        raise ScpiError(ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
+        raise scpi.ScpiError(scpi.ErrorCode.SETTINGS_CONFLICT)  # 786, "Specified arb waveform already exists"
     values = _numbers(own, parameters[1:])
     if not POINTS[0] <= values.size <= POINTS[1] or np.any(np.abs(values) > _MIDDLE):
-        raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
     if sum(map(len, own.waveforms.values())) + values.size > POINTS[1]:
-        raise ScpiError(ErrorCode.OUT_OF_MEMORY)
+        raise scpi.ScpiError(scpi.ErrorCode.OUT_OF_MEMORY)
     own.waveforms[name] = (values + _MIDDLE).astype(np.uint16)
 
 
@@ -128,18 +115,18 @@ def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]
     if parameters[0].startswith(b"#"):
         settings: Any = own.settings(1)
         order = ">i2" if settings.order is _Order.NORMAL else "<i2"
-        data = block(parameters[0])
+        data = scpi.block(parameters[0])
         if len(data) % 2:
-            raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
+            raise scpi.ScpiError(scpi.ErrorCode.INVALID_BLOCK_DATA)
         return np.frombuffer(data, dtype=order).astype(np.float64)
-    return np.array([float(integer(each)) for each in parameters])
+    return np.array([float(scpi.integer(each)) for each in parameters])
 
 
 def _stored(own: Keysight33500B, parameters: Parameters) -> str:
     """Return the name of a stored waveform."""
     name = _name(only(parameters))
     if name not in own.waveforms:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return name
 
 
@@ -149,40 +136,40 @@ def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     own.selected = name
     own.memory.hold(own.waveforms[name])
     own.memory_changed()
-    if own.settings(channel).shape == EDIT_MEMORY:
+    if own.settings(channel).shape == scpi.EDIT_MEMORY:
         _set_rate(own, channel, rate_hz)
 
 
 def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     none(parameters)
-    if own.settings(channel).shape == EDIT_MEMORY:
+    if own.settings(channel).shape == scpi.EDIT_MEMORY:
         own.configure(channel, replace(own.settings(channel), shape=SINE))
     own.waveforms.clear()
     own.selected = ""
 
 
-def _attribute(node: str, of: Callable[[Codes], float]) -> Command:
+def _attribute(node: str, of: Callable[[scpi.Codes], float]) -> Command:
     """Return the query of a number of a stored waveform."""
 
     def ask(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
-        return as_number(of(own.waveforms[_stored(own, parameters)]))
+        return scpi.as_number(of(own.waveforms[_stored(own, parameters)]))
 
     return Command(f"[SOURce#:]DATA:ATTRibute:{node}", _GUIDE, None, ask)
 
 
 def _rate_hz(own: Keysight33500B, channel: int) -> float:
-    return own.settings(channel).frequency_hz * len(own.memory.codes(EDIT_MEMORY))
+    return own.settings(channel).frequency_hz * len(own.memory.codes(scpi.EDIT_MEMORY))
 
 
 def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
-    points = len(own.memory.codes(EDIT_MEMORY))
+    points = len(own.memory.codes(scpi.EDIT_MEMORY))
     own.configure(channel, replace(own.settings(channel), frequency_hz=rate_hz / points))
 
 
 def _write_rate(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    rate_hz = value_of(only(parameters), NO_UNITS)
+    rate_hz = scpi.number(only(parameters), scpi.NO_UNITS)
     if not 0 < rate_hz <= HIGHEST_RATE_HZ:
-        raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
     _set_rate(own, channel, rate_hz)
 
 
@@ -199,11 +186,11 @@ _SECONDS = {"": 1.0, "S": 1.0, "MS": 1e-3}
 _COMMANDS = (
     load_command("OUTPut#:LOAD"),
     choice("[SOURce#:]FUNCtion", _GUIDE, _Shape,
-        lambda s: _Shape.ARBITRARY if s.shape == EDIT_MEMORY else _Shape.SINE,
-        lambda s, word: replace(s, shape=SINE if word is _Shape.SINE else EDIT_MEMORY)),
+        lambda s: _Shape.ARBITRARY if s.shape == scpi.EDIT_MEMORY else _Shape.SINE,
+        lambda s, word: replace(s, shape=SINE if word is _Shape.SINE else scpi.EDIT_MEMORY)),
     Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, *_: own.selected.encode()),
     Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
-        lambda own, channel, _: as_number(_rate_hz(own, channel))),
+        lambda own, channel, _: scpi.as_number(_rate_hz(own, channel))),
     choice("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, _Filter,
         lambda s: s.filter, lambda s, word: replace(s, filter=word)),
     Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, None),
@@ -212,9 +199,9 @@ _COMMANDS = (
     _attribute("AVERage", lambda codes: float(np.mean(codes)) / _MIDDLE - 1),
     choice("FORMat:BORDer", _GUIDE, _Order, lambda s: s.order, lambda s, word: replace(s, order=word)),
     choice("[SOURce#:]VOLTage:UNIT", _GUIDE, _Unit, lambda _: _Unit.VPP, lambda s, _: s),
-    number("[SOURce#:]FREQuency:STARt", _GUIDE, "sweep_start_hz", FREQUENCY_UNITS,
+    number("[SOURce#:]FREQuency:STARt", _GUIDE, "sweep_start_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=100e3, decimals=6),
-    number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", FREQUENCY_UNITS,
+    number("[SOURce#:]FREQuency:STOP", _GUIDE, "sweep_stop_hz", scpi.FREQUENCY_UNITS,
         lambda s: s.frequency_range_hz, default=1e6, decimals=6),
     switch("[SOURce#:]SWEep:STATe", _GUIDE, lambda s: s.mode is RunMode.SWEEP, _sweeping),
     number("[SOURce#:]SWEep:TIME", _GUIDE, "sweep_s", _SECONDS, lambda _: SWEEP_S, default=1.0, decimals=6),

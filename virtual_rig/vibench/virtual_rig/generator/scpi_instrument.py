@@ -9,25 +9,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Protocol
 
+from . import scpi_message as scpi
 from .channel_output import ChannelSettings
-from .scpi_message import (
-    BYTE,
-    INFINITE,
-    LONGEST_MESSAGE,
-    ErrorCode,
-    ScpiError,
-    Status,
-    Unit,
-    as_number,
-    boolean,
-    header_pattern,
-    message_end,
-    mnemonic_matches,
-    number as value_of,
-    short_form,
-    text,
-    units,
-)
 
 CHANNELS = 2
 _RANGE_ROUNDING = 1e-9
@@ -71,23 +54,23 @@ def number(
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
         settings = generator.settings(channel)
-        shown = value_of(only(parameters), units)
+        shown = scpi.number(only(parameters), units)
         low, high = limits(settings)
-        if shown >= INFINITE and not math.isnan(largest):
+        if shown >= scpi.INFINITE and not math.isnan(largest):
             shown = largest
         elif low - _RANGE_ROUNDING * abs(low) <= shown <= high + _RANGE_ROUNDING * abs(high):
             shown = round(shown, decimals)
         elif generator.quirks.out_of_range_becomes_default:
             shown = min(max(default, low), high)
         else:
-            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+            raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
         generator.configure(channel, replace(settings, **{field: shown / scale(settings)}))
 
     def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         none(parameters)
         settings = generator.settings(channel)
         shown = getattr(settings, field) * scale(settings)
-        return as_number(INFINITE if math.isinf(shown) else shown)
+        return scpi.as_number(scpi.INFINITE if math.isinf(shown) else shown)
 
     return Command(header, source, write, ask, channels)
 
@@ -103,16 +86,16 @@ def choice(
     """Return the command of a setting whose values are the words of an enum."""
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
-        word = text(only(parameters))
+        word = scpi.text(only(parameters))
         for candidate in words:
-            if mnemonic_matches(word, candidate.value):
+            if scpi.mnemonic_matches(word, candidate.value):
                 generator.configure(channel, put(generator.settings(channel), candidate))
                 return
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+        raise scpi.ScpiError(scpi.ErrorCode.ILLEGAL_PARAMETER_VALUE)
 
     def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         none(parameters)
-        return short_form(get(generator.settings(channel)).value).encode("ascii")
+        return scpi.short_form(get(generator.settings(channel)).value).encode("ascii")
 
     return Command(header, source, write, ask, channels)
 
@@ -127,7 +110,7 @@ def switch(
     """Return the command of an on/off setting."""
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
-        generator.configure(channel, put(generator.settings(channel), boolean(only(parameters))))
+        generator.configure(channel, put(generator.settings(channel), scpi.boolean(only(parameters))))
 
     def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         none(parameters)
@@ -159,9 +142,9 @@ def report(header: str, source: str, tell: Callable[[Any], bytes]) -> Command:
 def exactly(parameters: Parameters, count: int) -> Parameters:
     """Return the parameters if their number is correct; -109 or -108 otherwise."""
     if len(parameters) < count or not all(parameters):
-        raise ScpiError(ErrorCode.MISSING_PARAMETER)
+        raise scpi.ScpiError(scpi.ErrorCode.MISSING_PARAMETER)
     if len(parameters) > count:
-        raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
+        raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
     return parameters
 
 
@@ -173,7 +156,7 @@ def only(parameters: Parameters) -> bytes:
 def none(parameters: Parameters) -> None:
     """Refuse parameters of a command that takes none."""
     if parameters:
-        raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
+        raise scpi.ScpiError(scpi.ErrorCode.PARAMETER_NOT_ALLOWED)
 
 
 LONGEST_REPLY = 1 << 20
@@ -226,13 +209,13 @@ class ScpiInstrument:
         self, clock: Callable[[], float], identity: str, quirks: Quirks, commands: tuple[Command, ...]
     ) -> None:
         self.quirks = quirks
-        self.status = Status()
+        self.status = scpi.Status()
         self.lock = threading.RLock()
         self.now_s = 0.0
         """Arrival time of the current message."""
         self.clock = clock
         self.commands = (*commands, *COMMON_COMMANDS)
-        self._patterns = [(header_pattern(command.header), command) for command in self.commands]
+        self._patterns = [(scpi.header_pattern(command.header), command) for command in self.commands]
         self._identity = identity
         self._identity_is_due_empty = False
         self._next_delay_s = 0.0
@@ -253,7 +236,7 @@ class ScpiInstrument:
                 data = _spoil(data)
             return Reply(data, delay_s)
 
-    def report(self, code: ErrorCode) -> None:
+    def report(self, code: scpi.ErrorCode) -> None:
         """Queue an error of the interface: an unread reply, or a read without a query."""
         with self.lock:
             self.status.report(code)
@@ -289,7 +272,7 @@ class ScpiInstrument:
         prefix = ""  # position in the command tree, to which headers are relative (SCPI-1999, 1, 6.2.4)
         answers: list[bytes] = []
         room = LONGEST_REPLY
-        for unit in units(message):
+        for unit in scpi.units(message):
             if unit.header.startswith("*"):
                 header = unit.header
             else:
@@ -300,25 +283,25 @@ class ScpiInstrument:
                 continue
             try:
                 answers.extend(found := self._obey(header, unit))
-            except ScpiError as error:
+            except scpi.ScpiError as error:
                 self.status.report(error.code)
                 continue
             room -= sum(map(len, found))
             if found and room < 0:  # no reader takes them meanwhile (IEEE 488.2, 6.3.1.7)
                 answers.clear()
-                self.status.report(ErrorCode.QUERY_DEADLOCKED)
+                self.status.report(scpi.ErrorCode.QUERY_DEADLOCKED)
         return answers
 
-    def _obey(self, header: str, unit: Unit) -> list[bytes]:
+    def _obey(self, header: str, unit: scpi.Unit) -> list[bytes]:
         command, suffix = self._find(header)
         if command is None or (command.ask if unit.asks else command.write) is None:
             # Refuse an unknown header as the firmware does.
             if not self.quirks.unknown_is_syntax_error:
-                raise ScpiError(ErrorCode.UNDEFINED_HEADER)
-            self.status.report(ErrorCode.SYNTAX_ERROR)
+                raise scpi.ScpiError(scpi.ErrorCode.UNDEFINED_HEADER)
+            self.status.report(scpi.ErrorCode.SYNTAX_ERROR)
             return [b""] if unit.asks else []
         if not 1 <= suffix <= command.channels:
-            raise ScpiError(ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
+            raise scpi.ScpiError(scpi.ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
         if unit.asks and command.ask is not None:
             return [command.ask(self, suffix, unit.parameters)]
         if command.write is not None:
@@ -335,7 +318,9 @@ class ScpiInstrument:
 
 def _spoil(reply: bytes) -> bytes:
     """Invert every second byte, from the first on, except the final newline."""
-    return bytes(byte if place % 2 else byte ^ BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
+    return (
+        bytes(byte if place % 2 else byte ^ scpi.BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
+    )
 
 
 def _decimal(value: int) -> bytes:
@@ -431,7 +416,9 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
         def handle(self) -> None:
             """Serve until the client disconnects or exceeds the message length."""
             pending = b""
-            while len(pending) < LONGEST_MESSAGE:  # a client that sends no end of message is disconnected
+            while (
+                len(pending) < scpi.LONGEST_MESSAGE
+            ):  # a client that sends no end of message is disconnected
                 try:
                     received = self.request.recv(_RECEIVE_BYTES)
                 except ConnectionError:
@@ -439,7 +426,7 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
                 if not received:
                     return
                 pending += received
-                while (end := message_end(pending)) is not None:
+                while (end := scpi.message_end(pending)) is not None:
                     message, pending = pending[:end], pending[end:]
                     self._answer(message)
 
