@@ -22,16 +22,6 @@ from ..hdf5_files.writing import open_hdf5_to_write
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _grid as layout
 from ._errors import StudyError
-from ._grid import (
-    COORDINATE,
-    COORDINATES,
-    FOUND_MOTION,
-    MOST_FOUND,
-    SESSION,
-    Column,
-    GridPlan,
-    StudyAxis,
-)
 from ._results import places_of, read_arrays, read_plan
 from ._software import software
 from ._store import Arrays, PointAnswer, put
@@ -70,10 +60,10 @@ MAKING_SUFFIX = ".making"
 _COMPONENTS = {
     axis.name: axis
     for axis in (
-        StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"),
-        StudyAxis(
-            FOUND_MOTION,
-            tuple(float(k) for k in range(MOST_FOUND)),
+        layout.StudyAxis(layout.COORDINATE, layout.COORDINATES, "", "x, y, z and their velocities"),
+        layout.StudyAxis(
+            layout.FOUND_MOTION,
+            tuple(float(k) for k in range(layout.MOST_FOUND)),
             "1",
             "motions of an ensemble, by their share",
         ),
@@ -84,7 +74,7 @@ HEAD_BYTES = 2_000_000
 """Upper bound of the size of sessions, axes and attributes."""
 
 
-def make_file(path: Path, plan: GridPlan) -> None:
+def make_file(path: Path, plan: layout.GridPlan) -> None:
     """Create a plan's file, all points missing, or leave nothing.
 
     Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
@@ -114,7 +104,7 @@ def make_file(path: Path, plan: GridPlan) -> None:
         raise
 
 
-def _require_room(path: Path, plan: GridPlan) -> None:
+def _require_room(path: Path, plan: layout.GridPlan) -> None:
     needed_bytes = HEAD_BYTES + plan.grid.size * sum(
         np.dtype(column.dtype).itemsize * column.components for column in plan.columns
     )
@@ -126,7 +116,7 @@ def _require_room(path: Path, plan: GridPlan) -> None:
         )
 
 
-def _fill(file: h5py.File, plan: GridPlan) -> None:
+def _fill(file: h5py.File, plan: layout.GridPlan) -> None:
     _attach(
         file,
         {
@@ -144,7 +134,7 @@ def _fill(file: h5py.File, plan: GridPlan) -> None:
         dataset = _column(file, column, plan.grid.shape)
         if column.components > 1 and column.along not in last:
             numbers = tuple(float(each) for each in range(column.components))
-            numbered = StudyAxis(column.along, numbers, "1", column.along)
+            numbered = layout.StudyAxis(column.along, numbers, "1", column.along)
             last[column.along] = _scale(file, _COMPONENTS.get(column.along, numbered))
         along = [last[column.along]] if column.components > 1 else []
         for index, scale in enumerate([*scales, *along]):
@@ -156,7 +146,7 @@ def _fill(file: h5py.File, plan: GridPlan) -> None:
     sessions.create_dataset(layout.N_SESSIONS, data=np.zeros(1, dtype=layout.COUNTER_DTYPE))
 
 
-def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
+def _scale(file: h5py.File, axis: layout.StudyAxis) -> h5py.Dataset:
     match axis.values[0]:
         case str():
             raw = [str(value).encode() for value in axis.values]
@@ -170,7 +160,7 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
     return dataset
 
 
-def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dataset:
+def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h5py.Dataset:
     """Create a contiguous dataset in its place, filled with what stands for missing."""
     whole = shape if column.components == 1 else (*shape, column.components)
     kind = np.dtype(column.dtype)
@@ -207,7 +197,9 @@ class FileStore:
     file.
     """
 
-    def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], OpenFile] = sole_writer) -> None:
+    def __init__(
+        self, path: Path, plan: layout.GridPlan, opened: Callable[[Path], OpenFile] = sole_writer
+    ) -> None:
         self._path = path
         self._columns = plan.columns
         self._disk = opened(path)
@@ -222,7 +214,7 @@ class FileStore:
         self._session = 0
 
     @classmethod
-    def created(cls, path: Path, plan: GridPlan) -> Self:
+    def created(cls, path: Path, plan: layout.GridPlan) -> Self:
         """Create the file first; refuses a name that is taken."""
         make_file(path, plan)
         return cls(path, plan)
@@ -245,7 +237,7 @@ class FileStore:
         Raises StudyError when the disk refuses; what was committed before is kept.
         """
         for answer in answers:
-            cells = {**answer.cells, SESSION: self._session}
+            cells = {**answer.cells, layout.SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
             for column, raw in put(self.arrays, self._columns, kept):
                 self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
@@ -294,7 +286,7 @@ class FileStore:
         )
 
 
-def _require_same(path: Path, kept: GridPlan, asked: GridPlan) -> None:
+def _require_same(path: Path, kept: layout.GridPlan, asked: layout.GridPlan) -> None:
     differing = asked.differences(kept)
     if differing:
         raise StudyError(
@@ -308,7 +300,7 @@ SHOWN = 60
 """Characters of a value that a message shows."""
 
 
-def _difference(name: str, kept: GridPlan, asked: GridPlan) -> str:
+def _difference(name: str, kept: layout.GridPlan, asked: layout.GridPlan) -> str:
     """Return how one field of two plans differs; for long lists, the first difference."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
     match there, here:

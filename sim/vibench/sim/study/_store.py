@@ -14,28 +14,6 @@ from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.outcome import Outcome
 from ..specimen.stops import chosen
 from . import _grid as layout
-from ._grid import (
-    ENDED,
-    ENSEMBLE_NUMBERS,
-    ESCAPE_NUMBERS,
-    FINAL_STATE,
-    FOUND_KIND,
-    FOUND_NUMBERS,
-    FOUND_SHARE,
-    MEMORY,
-    METHOD,
-    MOST_FOUND,
-    MOTION,
-    NUMBERS,
-    OUTCOME,
-    STARTS,
-    TEXT_BYTES,
-    Cell,
-    Column,
-    Grid,
-    GridPlan,
-    PointState,
-)
 
 Arrays = dict[str, NDArray[np.generic]]
 
@@ -45,14 +23,14 @@ class PointAnswer:
     """Stored results of one point."""
 
     number: int
-    state: PointState
-    cells: dict[str, Cell]
+    state: layout.PointState
+    cells: dict[str, layout.Cell]
     """Values by column; others stay missing."""
     taken_s: float = math.nan
     """Processor time, where it is known."""
 
 
-def empty_arrays(plan: GridPlan) -> Arrays:
+def empty_arrays(plan: layout.GridPlan) -> Arrays:
     """Make arrays in which every point is missing, shape (points,) or (points, components)."""
     return {
         column.name: np.full(_shape(column, plan.grid), column.missing, column.dtype)
@@ -60,7 +38,9 @@ def empty_arrays(plan: GridPlan) -> Arrays:
     }
 
 
-def put(arrays: Arrays, columns: Sequence[Column], answer: PointAnswer) -> Iterator[tuple[Column, bytes]]:
+def put(
+    arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
+) -> Iterator[tuple[layout.Column, bytes]]:
     """Write an answer's cells into the arrays; each comes back as the bytes of the file.
 
     The state is not among them: it is written when the cells are safe.
@@ -73,13 +53,13 @@ def put(arrays: Arrays, columns: Sequence[Column], answer: PointAnswer) -> Itera
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
-def _shape(column: Column, grid: Grid) -> tuple[int, ...]:
+def _shape(column: layout.Column, grid: layout.Grid) -> tuple[int, ...]:
     return (grid.size,) if column.components == 1 else (grid.size, column.components)
 
 
-def is_failed(state: NDArray[np.uint8] | PointState) -> NDArray[np.bool_]:
+def is_failed(state: NDArray[np.uint8] | layout.PointState) -> NDArray[np.bool_]:
     """Return whether there is an error instead of a result, or the run did not reach its end."""
-    return np.isin(state, (PointState.STOPPED, PointState.FAILED))
+    return np.isin(state, (layout.PointState.STOPPED, layout.PointState.FAILED))
 
 
 def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
@@ -107,7 +87,7 @@ class Store(Protocol):
 class MemoryStore:
     """Store in memory."""
 
-    def __init__(self, plan: GridPlan) -> None:
+    def __init__(self, plan: layout.GridPlan) -> None:
         self.arrays, self._columns = empty_arrays(plan), plan.columns
 
     def begin(self, executor: str) -> None:
@@ -127,67 +107,75 @@ class MemoryStore:
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
 
 
-def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
+def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
     """Convert a prediction to cells; values not requested or not found stay missing."""
     return {
-        **_cells_of(prediction, NUMBERS),
+        **_cells_of(prediction, layout.NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),
-        MOTION: list(MotionKind).index(prediction.motion),
-        MEMORY: list(StartMemory).index(prediction.memory),
-        METHOD: list(Method).index(prediction.method),
-        OUTCOME: int(prediction.outcome),
-        ENDED: cut_text(prediction.ended),
-        FINAL_STATE: prediction.final_state,
+        layout.MOTION: list(MotionKind).index(prediction.motion),
+        layout.MEMORY: list(StartMemory).index(prediction.memory),
+        layout.METHOD: list(Method).index(prediction.method),
+        layout.OUTCOME: int(prediction.outcome),
+        layout.ENDED: cut_text(prediction.ended),
+        layout.FINAL_STATE: prediction.final_state,
     }
 
 
-def _cells_of(value: object, columns: Mapping[str, Column]) -> dict[str, Cell]:
+def _cells_of(value: object, columns: Mapping[str, layout.Column]) -> dict[str, layout.Cell]:
     numbers = {column.name: getattr(value, field) for field, column in columns.items()}
     return {name: number for name, number in numbers.items() if number is not None}
 
 
-def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, Cell]:
+def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
     """Cells of an ensemble; those of its motions have a place for each."""
     if ensemble is None:
         return {}
-    kept = ensemble.motions[:MOST_FOUND]
-    cells = _cells_of(ensemble, ENSEMBLE_NUMBERS)
+    kept = ensemble.motions[: layout.MOST_FOUND]
+    cells = _cells_of(ensemble, layout.ENSEMBLE_NUMBERS)
     if ensemble.escape is not None:
-        cells |= _cells_of(ensemble.escape, ESCAPE_NUMBERS)
-    cells[FOUND_KIND.name] = _fill_places(FOUND_KIND, [list(MotionKind).index(each.motion) for each in kept])
-    for field, column in FOUND_NUMBERS.items():
+        cells |= _cells_of(ensemble.escape, layout.ESCAPE_NUMBERS)
+    cells[layout.FOUND_KIND.name] = _fill_places(
+        layout.FOUND_KIND, [list(MotionKind).index(each.motion) for each in kept]
+    )
+    for field, column in layout.FOUND_NUMBERS.items():
         cells[column.name] = _fill_places(column, [getattr(each, field) for each in kept])
-    for field, column in FOUND_SHARE.items():
+    for field, column in layout.FOUND_SHARE.items():
         cells[column.name] = _fill_places(column, [getattr(each.share, field) for each in kept])
     return cells
 
 
-def _fill_places(column: Column, values: list[float | None]) -> Cell:
+def _fill_places(column: layout.Column, values: list[float | None]) -> layout.Cell:
     """Fill the places of a column, those of absent values and of absent motions with what is missing."""
     filled = [column.missing if value is None else value for value in values]
-    return tuple(filled + [column.missing] * (MOST_FOUND - len(filled)))  # type: ignore[arg-type]
+    return tuple(filled + [column.missing] * (layout.MOST_FOUND - len(filled)))  # type: ignore[arg-type]
 
 
 def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
     """Make the ensemble of a point from its cells; None where it has none."""
-    if _number(arrays[STARTS][number]) is None:
+    if _number(arrays[layout.STARTS][number]) is None:
         return None
-    ensemble = {field: _number(arrays[column.name][number]) for field, column in ENSEMBLE_NUMBERS.items()}
-    escape = {field: _number(arrays[column.name][number]) for field, column in ESCAPE_NUMBERS.items()}
-    kinds = arrays[FOUND_KIND.name][number]
+    ensemble = {
+        field: _number(arrays[column.name][number]) for field, column in layout.ENSEMBLE_NUMBERS.items()
+    }
+    escape = {field: _number(arrays[column.name][number]) for field, column in layout.ESCAPE_NUMBERS.items()}
+    kinds = arrays[layout.FOUND_KIND.name][number]
     return Ensemble(
         **ensemble,  # type: ignore[arg-type]
-        motions=tuple(_motion_at(arrays, number, k) for k in range(MOST_FOUND) if int(kinds[k]) >= 0),
+        motions=tuple(_motion_at(arrays, number, k) for k in range(layout.MOST_FOUND) if int(kinds[k]) >= 0),
         escape=None if escape["chaotic_s"] is None else EscapeRate(**escape),  # type: ignore[arg-type]
     )
 
 
 def _motion_at(arrays: Arrays, number: int, place: int) -> FoundMotion:
-    found = {field: _number(arrays[column.name][number, place]) for field, column in FOUND_NUMBERS.items()}
-    share = {field: _number(arrays[column.name][number, place]) for field, column in FOUND_SHARE.items()}
+    found = {
+        field: _number(arrays[column.name][number, place]) for field, column in layout.FOUND_NUMBERS.items()
+    }
+    share = {
+        field: _number(arrays[column.name][number, place]) for field, column in layout.FOUND_SHARE.items()
+    }
     return FoundMotion(
         **found,  # type: ignore[arg-type]
-        motion=list(MotionKind)[int(arrays[FOUND_KIND.name][number, place])],
+        motion=list(MotionKind)[int(arrays[layout.FOUND_KIND.name][number, place])],
         share=Share(**share),  # type: ignore[arg-type]
     )
 
@@ -211,19 +199,19 @@ def prediction_at(
     frequency_hz, amplitude_m, accuracy, start
         Values of the study at this point.
     """
-    numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
-    x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))
+    numbers = {field: _number(arrays[column.name][number]) for field, column in layout.NUMBERS.items()}
+    x, y, z, vx, vy, vz = (float(value) for value in arrays[layout.FINAL_STATE][number].astype(np.float64))
     return ScenePrediction(
         **numbers,  # type: ignore[arg-type]
         frequency_hz=frequency_hz,
         amplitude_m=amplitude_m,
-        motion=list(MotionKind)[int(arrays[MOTION][number])],
-        method=list(Method)[int(arrays[METHOD][number])],
-        outcome=Outcome(int(arrays[OUTCOME][number])),
-        ended=bytes(arrays[ENDED][number]).decode(),
+        motion=list(MotionKind)[int(arrays[layout.MOTION][number])],
+        method=list(Method)[int(arrays[layout.METHOD][number])],
+        outcome=Outcome(int(arrays[layout.OUTCOME][number])),
+        ended=bytes(arrays[layout.ENDED][number]).decode(),
         final_state=(x, y, z, vx, vy, vz),
         start=start,
-        memory=list(StartMemory)[int(arrays[MEMORY][number])],
+        memory=list(StartMemory)[int(arrays[layout.MEMORY][number])],
         ensemble=_ensemble_at(arrays, number),
         accuracy=chosen(Accuracy, accuracy).value,
     )
@@ -231,7 +219,7 @@ def prediction_at(
 
 def cut_text(text: str) -> bytes:
     """UTF-8 bytes of a text, as many as a column holds, cut between characters."""
-    return text.encode()[:TEXT_BYTES].decode(errors="ignore").encode()
+    return text.encode()[: layout.TEXT_BYTES].decode(errors="ignore").encode()
 
 
 def _number(cell: np.generic) -> float | int | None:
