@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -15,19 +15,21 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import (
     BUDGET_S,
+    Ensemble,
+    FoundMotion,
     Observable,
     Outcome,
     Rest,
     Scene,
     ScenePlan,
     ScenePrediction,
+    StartMemory,
     number_of,
     solve_scene,
 )
 from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
-from .found_motions import forgetting_text, motions_table, share_text
 from .interruption import watch_interrupt
 from .options import Fields, RequestOptions, option, option_name
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
@@ -187,7 +189,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
         alike = list(run)
         each = [(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]
         passages.append(_passage(each, has_target=study.target is not None))
-    return "\n".join(filter(None, [*passages, forgetting_text(points)]))
+    return "\n".join(filter(None, [*passages, _forgetting_text(points)]))
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
@@ -226,12 +228,12 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
         *responses, exponent = ("" if value is None else f"{value:.4g}" for value in numbers)
         error = "" if each.error_estimate is None else f"{each.error_estimate:.1g}"
         cells = (f"{each.frequency_hz:g}", *responses, str(each.impacts), str(each.motion), error)
-        rows.add_row(*cells, share_text(each), *[exponent] * has_exponents)
+        rows.add_row(*cells, _share_text(each), *[exponent] * has_exponents)
     if points:
         print_table(rows)
     if step > 1:
         console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
-    motions = motions_table(points)
+    motions = _motions_table(points)
     if motions is not None:
         print_table(motions)
 
@@ -242,3 +244,62 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
     elif error is not None:
         met = sum(each.error_estimate is not None and each.error_estimate <= error for each in points)
         console.print(f"{met} of {len(points)} points reached an error of {100.0 * error:g} %")
+
+
+def _share_text(point: ScenePrediction) -> str:
+    """Return the share of starts that settled on a point's motion; empty if all starts give the same."""
+    match point:
+        case ScenePrediction(ensemble=Ensemble() as ensemble):
+            return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
+        case ScenePrediction(memory=StartMemory.LOST):
+            return "forgotten"
+        case _:
+            return ""
+
+
+def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
+    """Return a table of the motions at points with more than one; None without such a point."""
+    several = list(_several(points))
+    if not several:
+        return None
+    rows = Table(
+        title="Motions with sensitive dependence on the start: starts differ by a millionth of a gap",
+        caption=f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None,
+    )
+    for heading in ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"):
+        rows.add_column(heading, justify="right")
+    for point, motion in several[:_SHOWN]:
+        responses = (motion.response_i, motion.response_ii, motion.relative_i, motion.relative_ii)
+        rows.add_row(
+            f"{point.frequency_hz:g}",
+            *("" if value is None else f"{value:.4g}" for value in responses),
+            str(motion.motion) if motion.period is None else f"{motion.motion}, {motion.period}",
+            "" if motion.error_estimate is None else f"{motion.error_estimate:.1g}",
+            f"{motion.share.share:.0%} ({100 * motion.share.low:.0f}-{100 * motion.share.high:.0f}%)",
+        )
+    return rows
+
+
+def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
+    """Return where motions depended sensitively on the start, and the cost of the additional starts."""
+    lost = [point for point in points if point.memory is StartMemory.LOST]
+    if not lost:
+        return ""
+    ensembles = [point.ensemble for point in lost if point.ensemble is not None]
+    starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
+    where = f"At {len(lost)} of {len(points)} points"
+    said = f"{where} the motion depends sensitively on the start, or did not settle."
+    if not ensembles:
+        averaged = sum(point.target.starts for point in lost if point.target is not None)
+        return f"{said} There the answer is a mean over starts, {averaged} in all." if averaged else said
+    return (
+        f"{said} There {starts} starts were simulated for {followed_s:.0f} s in all; "
+        f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
+    )
+
+
+def _several(points: Sequence[ScenePrediction]) -> Iterator[tuple[ScenePrediction, FoundMotion]]:
+    for point in points:
+        if point.ensemble is not None and point.is_one_of_several:
+            for motion in point.ensemble.motions:
+                yield point, motion

@@ -1,12 +1,14 @@
 """Base class of all plots: labelled axes that follow the data in steps, and a legend."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
 from math import isfinite, log10
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPalette, QResizeEvent
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from vibench.acquisition import printable
 
@@ -14,7 +16,6 @@ from ..widgets.boxes import paint_hint
 from ..widgets.theme import Theme
 from ..widgets.units import UNITS
 from .axis import AxisItem, Blankness, Grid, PlotAxis, Scale
-from .legend import LegendEntry, LegendLine
 from .line_style import SIGNS, Band, LineStyle, LogicalLine, curve_pen, shade_of, straight_pen
 from .plot_actions import add_actions
 from .reading import Reading
@@ -53,6 +54,54 @@ OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6
 """Right margin for half of the last number."""
+_MARGIN = 4
+"""Margin above and below the legend [pixels]."""
+
+
+@dataclass(frozen=True)
+class LegendEntry:
+    """A curve's name, with the colour and sign of its line."""
+
+    sign: str
+    """The line style as text: ``━━``, ``╍╍``, ``●``."""
+    colour: str
+    name: str
+
+
+class LegendLine(QLabel):
+    """Entries side by side in as many lines as the width requires; entries are never broken."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._of = parent
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setTextFormat(Qt.TextFormat.RichText)
+        self.setWordWrap(True)
+        self.setBackgroundRole(QPalette.ColorRole.Base)
+        self.setAutoFillBackground(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self.follow_font()
+
+    def follow_font(self) -> None:
+        """Use a slightly smaller font than the window."""
+        font = QFont(self._of.font())
+        font.setPointSizeF(0.85 * font.pointSizeF())
+        self.setFont(font)
+
+    def show_entries(self, entries: tuple[LegendEntry, ...]) -> None:
+        """Show the names of these curves."""
+        text = "&nbsp;&nbsp;&nbsp; ".join(
+            f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
+            f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
+            for each in entries
+        )
+        if text != self.text():
+            self.setText(text)
+            self.setAccessibleName("Legend: " + ", ".join(printable(each.name) for each in entries))
+
+    def height_for(self, width: int) -> int:
+        """Return the height of the entries; zero without entries."""
+        return self.heightForWidth(width) + 2 * _MARGIN if self.text() else 0
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
