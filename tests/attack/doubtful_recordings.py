@@ -78,7 +78,7 @@ def near_a_mode(rng: np.random.Generator, specimen: Specimen) -> float:
         return float(rng.uniform(60, 520))
     mode = int(rng.integers(3))
     middle_hz, damping = specimen.natural_frequencies_hz[mode], specimen.damping_ratios[mode]
-    return float(middle_hz * (1 + rng.choice((-1, 1)) * damping * 10 ** rng.uniform(-1, 2)))
+    return max(40.0, float(middle_hz * (1 + rng.choice((-1, 1)) * damping * 10 ** rng.uniform(-1, 2))))
 
 
 def sensor_noise(rng: np.random.Generator, samples: int, size: float) -> tuple[str, np.ndarray]:

@@ -121,7 +121,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
         said.append("; one realisation cannot show distortion.")
     else:
         # Neighbouring lines do not follow a narrow mode that moves: some of the drift is left.
-        most = "at most " if found.drift and found.drift.frequency_share else ""
+        most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
         said.append(f", distortion {most}{_percent(found.distortion_share)}.")
     if periodic.drift is not None:
         said.append(f" The {periodic.drift.text}; this is not distortion.")

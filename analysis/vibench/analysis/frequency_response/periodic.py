@@ -145,6 +145,8 @@ _MOST = 0.5
 
 _SMALL = 0.03
 """Largest deviation of a line used to find a drift; near narrow modes it is larger."""
+_OFTEN = 3.0
+"""The same, over the median line, where most lines deviate by more."""
 
 
 class Scatter(StrEnum):
@@ -160,18 +162,25 @@ class Scatter(StrEnum):
 class Drift:
     """Common changes of all lines between realisations, which are no distortion."""
 
-    OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1"}
+    OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1", "common_share": "1"}
 
     gain_share: float
     """Relative standard deviation of the gain among realisations."""
     frequency_share: float
     """Relative standard deviation of all frequencies among realisations."""
+    common_share: float
+    """Other changes that all lines follow together, as damping or a delay; median relative standard deviation
+    of the lines."""
 
     @property
     def text(self) -> str:
         """Description of the drift."""
-        drifts = (("gain of the channels", self.gain_share), ("specimen's frequencies", self.frequency_share))
-        shares = " and ".join(f"the {what} by {100 * share:.2g} %" for what, share in drifts if share)
+        drifts = {
+            "the gain of the channels": self.gain_share,
+            "the specimen's frequencies": self.frequency_share,
+            "all lines together": self.common_share,
+        }
+        shares = " and ".join(f"{what} by {100 * share:.2g} %" for what, share in drifts.items() if share)
         return f"realisations differ by a drift of {shares}"
 
 
@@ -283,13 +292,15 @@ def _without_drift(
     value, frequency_hz, noise_variance, sd
         Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
     """
-    count, lines = off.shape
+    count = len(off)
     # The ratio of displacements shifts with the modes; velocity over acceleration also has 1 / frequency.
     moved = value * frequency_hz
     stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
     shapes, target = np.stack((np.ones_like(stretch), stretch), axis=1)[known], off[:, known].T
-    weight = np.all(np.abs(target) < _SMALL, axis=1, keepdims=True) / sd[known, None]
+    largest = np.abs(target).max(axis=1, initial=0.0)
+    is_small = largest < max(_SMALL, _OFTEN * float(np.median(largest)))
+    weight, lines = is_small[:, None] / sd[known, None], max(1, np.count_nonzero(is_small))
     by_noise = (noise_variance / np.abs(value) ** 2)[known, None]
     excess = float(np.sum(np.abs(weight * target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
     left, shares = target, np.zeros(2)
@@ -301,11 +312,47 @@ def _without_drift(
             left, excess = rest, excess - (before - after)
             shares[:] = 0.0
             shares[used] = np.sqrt(np.sum(np.abs(factors) ** 2, axis=1) / (count - 1))
-    if not np.any(shares):
+    left, common_share = _without_common(left, by_noise)
+    if not np.any(shares) and common_share == 0.0:
         return None, off
     off = off.copy()
     off[:, known] = left.T
-    return Drift(*shares.tolist()), off
+    return Drift(*shares.tolist(), common_share), off
+
+
+_TOGETHER = 0.8
+"""Least share of the scatter in courses that all lines follow."""
+_BEYOND_CHANCE = 1.25
+"""The same over its largest expected value for independent lines."""
+
+
+def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
+    """Remove what all lines follow in one or two courses over the realisations; return its share too.
+
+    Singular values of independent lines have a known largest size (Marchenko and Pastur, Math. USSR-Sbornik 1
+    (1967) 457).
+
+    Parameters
+    ----------
+    off
+        Relative deviations, shape (lines, realisations).
+    by_noise
+        Relative complex variance by noise, shape (lines, 1).
+    """
+    freedom = off.shape[1] - 1
+    variance = np.maximum(np.sum(np.abs(off) ** 2, axis=1, keepdims=True) / freedom, 1e-300)
+    weight = np.sqrt(np.maximum(1.0 - by_noise / variance, 0.0) / variance)
+    rows = np.concatenate([(weight * off).real, (weight * off).imag])
+    _, sizes, courses = np.linalg.svd(rows, full_matrices=False)
+    total = max(float(np.sum(sizes**2)), 1e-300)
+    by_chance = (1.0 + np.sqrt(freedom / max(np.count_nonzero(weight), 1) / 2)) ** 2 / freedom
+    for used in (1, 2):
+        least = max(_TOGETHER, _BEYOND_CHANCE * used * by_chance)
+        if least < 1.0 and np.sum(sizes[:used] ** 2) > least * total:
+            common = off @ courses[:used].T @ courses[:used]
+            moved = np.sqrt(np.sum(np.abs(common) ** 2, axis=1) / freedom)
+            return (off - common) * np.sqrt(freedom / (freedom - used)), float(np.median(moved))
+    return off, 0.0
 
 
 def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
