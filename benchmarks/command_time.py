@@ -60,7 +60,7 @@ def excess_cycles(path: Path, excitation: SineSweep) -> float:
     return played - excitation.cycles(excitation.duration_s)
 
 
-def told(name: str, settle_s: float, step_s: float | None) -> str:
+def report(name: str, settle_s: float, step_s: float | None) -> str:
     """Say what came of one sweep."""
     plan = sweep(step_s)
     with tempfile.TemporaryDirectory() as folder:
@@ -88,7 +88,7 @@ def main() -> None:
     print("| settle_s \\ step_s | " + " | ".join(titles) + " |")
     print("|" + "---|" * (len(steps) + 1))
     for settle_s in given.settle:
-        cells = [told(given.bench, settle_s, step_s) for step_s in steps]
+        cells = [report(given.bench, settle_s, step_s) for step_s in steps]
         print(f"| {settle_s:g} s | " + " | ".join(cells) + " |", flush=True)
 
 

@@ -125,7 +125,7 @@ def solve_in_a_batch(scene):
     return solve_scenes([scene])[0].prediction
 
 
-def judged(scene, truth, level, solve):
+def solve_and_measure(scene, truth, level, solve):
     """Answer a scene at a level; gives plain values for the table."""
     began = time.process_time()
     asked = Scene(scene.specimen, scene.drive, scene.observe, level, scene.duration, scene.start)
@@ -181,7 +181,7 @@ def described(scene, index):
     }
 
 
-def told(rows):
+def report(rows):
     """Print coverage by level and kind of question, and every scene that was far off."""
     groups = defaultdict(list)
     for row in rows:
@@ -227,7 +227,7 @@ def main():
     parser.add_argument("--tell", type=Path, nargs="+", help="say what is in such files, and compute nothing")
     arguments = parser.parse_args()
     if arguments.tell:
-        told([json.loads(line) for path in arguments.tell for line in path.read_text().splitlines()])
+        report([json.loads(line) for path in arguments.tell for line in path.read_text().splitlines()])
         return
     solve = solve_in_a_batch if arguments.lanes else solve_scene
     shard, shards = (int(part) for part in arguments.shard.split("/"))
@@ -241,14 +241,14 @@ def main():
             print(f"scene {index}: the independent code gave up", file=sys.stderr)
             continue
         for level in arguments.levels.split(","):
-            said = described(scene, index) | judged(scene, truth, Accuracy(level), solve)
+            said = described(scene, index) | solve_and_measure(scene, truth, Accuracy(level), solve)
             rows.append(said | {"kind": truth.kind, "true_period": truth.period, "own": truth.own.tolist()})
             if arguments.out is not None:
                 with arguments.out.open("a") as file:
                     file.write(json.dumps(rows[-1]) + "\n")
             if arguments.only is not None:
                 print(json.dumps(rows[-1], indent=1))
-    told(rows)
+    report(rows)
     if given_up:
         print(f"{given_up} scenes were given up by the independent code and are not counted")
 

@@ -118,7 +118,7 @@ def truth_of(scene, found):
     return mean, 1.96 * values.std(axis=0, ddof=1) / math.sqrt(len(drawn)) / mean, None
 
 
-def judged(scene, time_s):
+def solve_and_measure(scene, time_s):
     """Answer a scene for every error and for the 30 s default; returns plain values."""
     began = time.process_time()
     default = solve_scene(scene)
@@ -217,7 +217,7 @@ def costs_of(rows):
     yield f"On periodic motion 1e-6 costs {np.median(ratios):.2f} times 1e-2 (median of {len(ratios)})."
 
 
-def told(rows):
+def report(rows):
     """Print what a campaign found."""
     refused = sum("refusal" in each for row in rows for each in row["targets"])
     print(f"{len(rows)} scenes, {refused} targets refused in a sentence")
@@ -280,7 +280,7 @@ def main():
     given = parser.parse_args()
     if given.sum:
         rows = [json.loads(line) for path in given.sum for line in path.read_text().splitlines()]
-        told(rows)
+        report(rows)
         if given.markdown is not None:
             write_section(given.markdown, rows, given.time)
         return
@@ -294,13 +294,13 @@ def main():
         if index in done or time.monotonic() > end_s:
             continue
         law, scene = drawn_scene(given.seed, index)
-        rows.append({"scene": index, "law": law, **judged(scene, given.time)})
+        rows.append({"scene": index, "law": law, **solve_and_measure(scene, given.time)})
         if given.save is not None:
             with given.save.open("a") as file:
                 file.write(json.dumps(rows[-1]) + "\n")
         if given.only is not None:
             print(json.dumps(rows[-1], indent=1))
-    told(rows)
+    report(rows)
 
 
 if __name__ == "__main__":

@@ -87,7 +87,7 @@ def fast_sweep(number: int, seed: int = 1) -> FastSweep:
     return FastSweep(specimen, start_hz, stop_hz, duration_s, level_m, number, is_logarithmic)
 
 
-def judged(sweep: FastSweep, contact: str, known: Specimen | None) -> Outcome:
+def simulate_and_analyse(sweep: FastSweep, contact: str, known: Specimen | None) -> Outcome:
     """Simulate a sweep after a settled sine, and analyse it, with the specimen that is known of it."""
     lead, tail = round(LEAD_S * RATE_HZ), round(TAIL_S * RATE_HZ)
     time_s = np.arange(lead + round(sweep.duration_s * RATE_HZ) + tail) / RATE_HZ
@@ -180,7 +180,7 @@ def main() -> None:
                 said = (
                     recorded(sweep, contact, Path(folder) / "fast.h5")
                     if asked.rig
-                    else judged(sweep, contact, None if asked.unknown else sweep.specimen)
+                    else simulate_and_analyse(sweep, contact, None if asked.unknown else sweep.specimen)
                 )
             found[name] = asdict(said) | {"is_wrong": said.is_wrong}
             if said.is_wrong:

@@ -334,7 +334,7 @@ def uneven_gaps(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
     at_hz, level_vpp = float(np.round(rng.uniform(250, 272), 1)), float(rng.uniform(1.2, 3.0))
     dwell = Dwell(amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=1.0, duration_s=2.0)
     found = recorded(true, described, [weak_noise(rng), dwell])
-    told = () if found.collisions is None else found.collisions.told
+    told = () if found.collisions is None else found.collisions.determined
     gaps = [each for each in told if each.what in {Hidden.LOWER_GAP, Hidden.UPPER_GAP} and each.is_determined]
     sds = [each.half_width / 1.96 for each in gaps]
     return found, len(sds) == 2 and all(_is_told(10e-6, sd) for sd in sds)

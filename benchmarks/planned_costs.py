@@ -55,7 +55,7 @@ def ratios(ledger, rows):
     return np.array(found)
 
 
-def told(name, values):
+def report(name, values):
     """Print how good plans were."""
     within = np.mean((values > 0.5) & (values < 2.0))
     print(f"{name}: {len(values)} plans, median {np.median(values):.2f}, within a factor of 2 {within:.0%}")
@@ -81,10 +81,10 @@ def main():
         path = Path(folder) / "costs.json"
         ledger = CostLedger(path)
         ratios(ledger, rows[:first])
-        told("learned", ratios(ledger, rows[first:]))
+        report("learned", ratios(ledger, rows[first:]))
         ledger.save()
         double(path)
-        told("after doubling", ratios(CostLedger(path), rows[first:]))
+        report("after doubling", ratios(CostLedger(path), rows[first:]))
     for kind in ("touching", "free"):
         own = [row["is_lost"] for row in rows if f"/{kind}" in row["kind"]]
         print(f"{kind}: {sum(own)} of {len(own)} forgot their start")

@@ -217,7 +217,7 @@ class Cause:
     within_s: float
 
 
-def told(level: StopLevel) -> Callable[[Laboratory], None]:
+def stop_by_command(level: StopLevel) -> Callable[[Laboratory], None]:
     """Stop as the command does."""
 
     def stop(laboratory: Laboratory) -> None:
@@ -239,9 +239,9 @@ def lose_samples(laboratory: Laboratory) -> None:
 MARGIN_S = 1.0
 """Commands over the cable, the watchdog's round, and a computer that has other things to do."""
 CAUSES = {
-    "stop --level ramp": Cause(told(StopLevel.RAMP), BLOCK_S + RAMP_S + MARGIN_S),
-    "stop --level abort": Cause(told(StopLevel.ABORT), BLOCK_S + ABORT_S + MARGIN_S),
-    "stop --level off": Cause(told(StopLevel.OFF), BLOCK_S + MARGIN_S),
+    "stop --level ramp": Cause(stop_by_command(StopLevel.RAMP), BLOCK_S + RAMP_S + MARGIN_S),
+    "stop --level abort": Cause(stop_by_command(StopLevel.ABORT), BLOCK_S + ABORT_S + MARGIN_S),
+    "stop --level off": Cause(stop_by_command(StopLevel.OFF), BLOCK_S + MARGIN_S),
     "viewer gone": Cause(Laboratory.forget_viewer, 0.55 + BLOCK_S + ABORT_S + MARGIN_S),
     "limit passed": Cause(
         lambda laboratory: laboratory.virtual.faults.turn_amplifier_gain(40.0),

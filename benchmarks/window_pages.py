@@ -70,7 +70,7 @@ def files(context: AppContext, path: Path) -> None:
     _, end_s = page.time_histories.view_s
     for span_s in (each for each in SPANS_S if each <= end_s):
         starts_s = iter(rng.uniform(0, end_s - span_s + 1e-9, 1 + TRIES))
-        told(f"Files: zoom to {span_s:g} s", partial(zoom, page, starts_s, span_s))
+        report(f"Files: zoom to {span_s:g} s", partial(zoom, page, starts_s, span_s))
     page.close()
 
 
@@ -106,7 +106,7 @@ def compare(context: AppContext) -> None:
             values,
             np.full(4000, 0.02),
         )
-        told(
+        report(
             f"Compare: curve {number + 1} of 4000 points", lambda c=curve: page.add_prediction((c,)), tries=1
         )
     page.close()
@@ -124,11 +124,11 @@ def simulate(context: AppContext) -> None:
                 SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(500)
             )
         )
-    told("Simulate: draw 2 x 500 points", lambda: page.plots.show_progress(progress))
+    report("Simulate: draw 2 x 500 points", lambda: page.plots.show_progress(progress))
     page.close()
 
 
-def told(name: str, act: Callable[[], object], tries: int = TRIES) -> None:
+def report(name: str, act: Callable[[], object], tries: int = TRIES) -> None:
     """Print how long an act and the drawing after it keep the thread busy."""
     if tries > 1:
         busy(act)

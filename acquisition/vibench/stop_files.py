@@ -40,7 +40,7 @@ def taken_path(stop: str) -> str:
     return ".taken-".join(stop.rsplit(".stop-", 1))
 
 
-def put_down(stop: str, reason: str) -> None:
+def write_stop_file(stop: str, reason: str) -> None:
     """Write a stop file, completely or not at all; raises OSError when the folder has no room for it."""
     coming = f"{stop}-{os.getpid()}-{time.monotonic_ns()}"
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)

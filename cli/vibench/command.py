@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from vibench.stop_files import SWITCH_OFF, Fate, fate_of, put_down, stop_path
+from vibench.stop_files import SWITCH_OFF, Fate, fate_of, stop_path, write_stop_file
 
 LEVELS = ("ramp", "abort", "off")
 
@@ -75,7 +75,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
         living = [each for each in programs if each.is_alive]
         stops = [stop_path(os.path.dirname(each.path), each.pid, each.start, level) for each in living]  # noqa: PTH120
         for stop in stops:
-            put_down(stop, reason)
+            write_stop_file(stop, reason)
     except OSError:
         return None
     if not programs or any(fate_of(stop) is not Fate.SILENT for stop in stops):

@@ -86,7 +86,7 @@ def numbers_of(path: Path) -> str:
     return hashlib.sha256(pickle.dumps(content)).hexdigest()
 
 
-def judged(path: Path) -> tuple[str, float, int]:
+def verdict_of_file(path: Path) -> tuple[str, float, int]:
     """Say in a process of its own what a file's numbers are, and what processor time and memory it took."""
     reading, writing = os.pipe()
     before_bytes = resident_bytes()
@@ -143,14 +143,14 @@ def attack(shard: Shard) -> Tally:
             path.write_bytes(content)
             if name in FINISHED:
                 numbers_of(path)  # what is imported and compiled here is there in every fork
-                expected[name] = judged(path)[0]
+                expected[name] = verdict_of_file(path)[0]
                 if expected[name].startswith(("refused", "traceback", "died")):
                     raise RuntimeError(f"{name} should be good, and was {expected[name]}")
         for number, chance in shard.chances(tally):
             name, place, content = flipped(number, chance)
             path = Path(folder, name)
             path.write_bytes(content)
-            said, took_s, peak_bytes = judged(path)
+            said, took_s, peak_bytes = verdict_of_file(path)
             kind = "noticed" if said.startswith("refused") else "same numbers"
             if found := faults(said, expected[name], took_s, peak_bytes):
                 kind = "found"

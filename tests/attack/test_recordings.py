@@ -33,9 +33,9 @@ def test_good_recordings_of_every_sort_give_numbers(tmp_path):
     for name in ("dwell.h5", "with_result.h5"):
         path = tmp_path / name
         path.write_bytes(good_recordings()[name])
-        said, _, _ = recordings_flips.judged(path)
+        said, _, _ = recordings_flips.verdict_of_file(path)
         assert len(said) == 64, said
-        assert recordings_flips.judged(path)[0] == said
+        assert recordings_flips.verdict_of_file(path)[0] == said
 
 
 def test_a_flip_that_changed_numbers_unnoticed_would_be_found():

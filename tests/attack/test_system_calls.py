@@ -33,9 +33,9 @@ with new_file(folder / "file") as path:
     arm()
 """
 STOP = """
-from vibench.stop_files import put_down
+from vibench.stop_files import write_stop_file
 arm()
-put_down(str(folder / "file"), "all of it")
+write_stop_file(str(folder / "file"), "all of it")
 """
 ANNOUNCEMENT = """
 from vibench.sim.operating_system.this import rename

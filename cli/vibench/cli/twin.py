@@ -130,7 +130,7 @@ class _Following:
         newest = self.live.newest
         step = max(1, round(SHOWN_S * rate_hz / SHOWN_POINTS))
         shown = newest.p[-round(SHOWN_S * rate_hz) :][::-1][::step][::-1]
-        forecast, error = _worth(newest, step)
+        forecast, error = _useful_forecast(newest, step)
         used_s = time.process_time() - self.busy_s
         return TwinStatus(
             pid=os.getpid(),
@@ -151,7 +151,7 @@ class _Following:
         )
 
 
-def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the useful part of a forecast and its errors; empty before the first one was checked."""
     if newest.forecast is None:
         return (), ()

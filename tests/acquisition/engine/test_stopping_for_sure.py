@@ -35,7 +35,7 @@ from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.program import engines_folder
 from vibench.sim.operating_system.this import process_start
-from vibench.stop_files import put_down, stop_path
+from vibench.stop_files import stop_path, write_stop_file
 
 from .conftest import ROOT, campaign, until, until_state, until_there
 
@@ -190,7 +190,7 @@ class TestNoDescriptorIsLeft:
 
     def test_a_stop_is_obeyed_that_was_only_put_down(self, running, tmp_path):
         with without_descriptors(running):
-            put_down(
+            write_stop_file(
                 stop_path(str(engines_folder()), running.pid, process_start(running.pid), "abort"), "put down"
             )
             until_there(tmp_path / "run.h5")

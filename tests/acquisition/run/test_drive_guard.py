@@ -32,7 +32,7 @@ from vibench.acquisition.stopping.program import (
 )
 from vibench.acquisition.stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopRequest
 from vibench.sim.operating_system.this import process_start
-from vibench.stop_files import Fate, fate_of, put_down, stop_path, taken_path
+from vibench.stop_files import Fate, fate_of, stop_path, taken_path, write_stop_file
 
 PLAN = Measurement(
     name="run",
@@ -122,7 +122,7 @@ def own_state(tmp_path, monkeypatch):
 
 def stopped(level="abort"):
     stop = stop_path(str(engines_folder()), *own_process(), level)
-    put_down(stop, "smoke")
+    write_stop_file(stop, "smoke")
     return stop
 
 

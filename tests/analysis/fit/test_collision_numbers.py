@@ -31,7 +31,7 @@ def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(colli
     assert upper.low <= 55e-6 <= upper.high
     assert updated.specimen.gaps_m == (lower.value, upper.value)
     assert updated.description.gap_m == (lower.value, upper.value)
-    told = {each.what: each for each in updated.collisions.told}
+    told = {each.what: each for each in updated.collisions.determined}
     assert told[Hidden.M1].low <= TRUE.masses[1] <= told[Hidden.M1].high
     assert not updated.fits
     (suspect,) = updated.suspects

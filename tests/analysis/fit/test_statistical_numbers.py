@@ -119,7 +119,7 @@ def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_h
 @pytest.mark.timeout(900)
 def test_a_fit_tells_numbers_of_a_motion_that_noise_hides_from_tracking(buried):
     updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
-    gap = {each.what: each for each in updated.collisions.told}[Hidden.MEAN_GAP]
+    gap = {each.what: each for each in updated.collisions.determined}[Hidden.MEAN_GAP]
     assert holds(gap, 51e-6)
     assert updated.specimen.gaps_m == pytest.approx((gap.value, gap.value))
     assert any(each.startswith("From statistics, mean gap: (") for each in updated.sentences)

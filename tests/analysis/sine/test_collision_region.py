@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.fast_sweeps import FastSweep, fast_sweep, judged
+from benchmarks.fast_sweeps import FastSweep, fast_sweep, simulate_and_analyse
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Measurement, SineSweep
@@ -155,7 +155,7 @@ def test_without_a_specimen_ringing_and_weak_impacts_are_not_distinguished():
 def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact):
     """Drawn so that `benchmarks/fast_sweeps.py` does the same for hours."""
     scene = fast_sweep(seed)
-    outcome = judged(scene, contact, scene.specimen)
+    outcome = simulate_and_analyse(scene, contact, scene.specimen)
     assert not outcome.is_wrong, outcome
 
 
@@ -163,7 +163,7 @@ def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact
 def test_a_mode_that_rings_on_at_twice_the_drive_is_no_collision(is_known):
     """Collisions from 46 to 39 Hz were reported of a specimen without stops, whose mode at 82 Hz rang on."""
     specimen = gong2025(damping_time_s=3.5e-6)
-    outcome = judged(
+    outcome = simulate_and_analyse(
         FastSweep(specimen, 125.0, 40.0, 12.0, 1e-5, 1), "linear", specimen if is_known else None
     )
     assert outcome.colliding == 0
@@ -173,14 +173,14 @@ def test_what_rings_louder_than_the_drive_is_no_collision_of_an_unknown_specimen
     """Collisions from 97 to 118 Hz were reported of a specimen without stops, which rings."""
     specimen = gong2025(damping_time_s=4e-7)
     sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
-    assert judged(sweep, "linear", None).colliding == 0
+    assert simulate_and_analyse(sweep, "linear", None).colliding == 0
 
 
 @pytest.mark.parametrize(("damping_time_s", "is_stated"), [(3e-6, True), (2e-7, False)])
 def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(damping_time_s, is_stated):
     """32 % too much was stated where the specimen still rang of what was before the recording."""
     specimen = gong2025(damping_time_s=damping_time_s)
-    outcome = judged(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)
+    outcome = simulate_and_analyse(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)
     if is_stated:
         found = outcome.largest_ii * outcome.steady_over_swept
         assert found == pytest.approx(outcome.steady_ii, rel=0.03)
@@ -189,7 +189,7 @@ def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(d
 
 def test_steady_sines_reach_as_far_as_the_linear_specimen_states():
     """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
-    outcome = judged(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
+    outcome = simulate_and_analyse(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))
     assert outcome.largest_ii < 0.98 * steady
     assert outcome.largest_ii * outcome.steady_over_swept == pytest.approx(steady, rel=2e-3)

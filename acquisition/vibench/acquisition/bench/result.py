@@ -57,7 +57,7 @@ class Bounds:
         return Verdict.WARN if deviation <= self.fail else Verdict.FAIL
 
 
-def judged(
+def finding_of(
     name: str,
     number: float,
     unit: str,

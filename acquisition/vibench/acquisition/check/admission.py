@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..bench.bench import Bench, BenchKind
-from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest
+from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, finding_of, rig_digest
 from ..errors import CheckFailed, RecordingError
 from ..rig import Rig
 from ..stopping.stop import StopSwitch
@@ -142,7 +142,7 @@ def _change(now: Finding, before: Finding, since: str) -> Finding | None:
 
 
 def _change_finding(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
-    finding = judged(
+    finding = finding_of(
         f"{name} since last time",
         change,
         unit,

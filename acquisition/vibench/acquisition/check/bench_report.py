@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bench.bench import Bench
-from ..bench.result import BenchReport, Bounds, Finding, Verdict, judged
+from ..bench.result import BenchReport, Bounds, Finding, Verdict, finding_of
 from ..errors import CheckStopped, ConfigurationError, DataLost, RunStalled
 from ..excitation.dwell import Dwell
 from ..excitation.steps import Tone
@@ -194,7 +194,7 @@ def _room(bench: Bench, folder: Path) -> Finding:
     bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
     there = next(each for each in (folder, *folder.resolve().parents) if each.exists())
     hours = shutil.disk_usage(there).free / bytes_per_s / _SECONDS_PER_HOUR
-    return judged(
+    return finding_of(
         "room on the disk",
         hours,
         "h",
@@ -220,7 +220,7 @@ def _latency(bench: Bench) -> Finding:
     latency_s = bench.generator.measured_latency_s()
     verdict = LATENCY_S.verdict(latency_s)
     advice = "shorten generator.settle_s, or look for what keeps the bus busy: a stop takes as long"
-    return judged("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
+    return finding_of("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
 
 
 def _noise(channel: Channel, row: Samples) -> Finding:
@@ -239,7 +239,7 @@ def _noise(channel: Channel, row: Samples) -> Finding:
             "a living input is never quite still: see whether it is sampled at all",
         )
     expected = f"{NOISE_SHARE.well * channel.full_scale_v:.3g} V or less"
-    return judged(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
+    return finding_of(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
 
 
 def _offset(channel: Channel, row: Samples) -> Finding:
@@ -247,4 +247,4 @@ def _offset(channel: Channel, row: Samples) -> Finding:
     verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
     advice = "look for an open input, a sensor's bias on DC coupling, or a shaker off its centre"
     expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
-    return judged(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)
+    return finding_of(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

@@ -8,7 +8,7 @@ from math import hypot, inf, log10, pi, sqrt
 import numpy as np
 
 from ..bench.bench import Bench
-from ..bench.result import Bounds, Finding, Verdict, judged
+from ..bench.result import Bounds, Finding, Verdict, finding_of
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
 from ..rig import RESPONSE_ROLES, BaseQuantity, ComplexArray, RigModel, Role
@@ -103,7 +103,7 @@ BASE_ACCELERATION = "base acceleration"
 DRIVE_LEFT = "drive left after stop"
 
 
-def hears_name(role: Role) -> str:
+def detection_name(role: Role) -> str:
     """Return the name of the finding on whether a channel detects the sine."""
     return f"{role.value} hears the sine"
 
@@ -122,7 +122,7 @@ LASTING: Mapping[str, Lasting] = {
     DRIVE_CLOCK: Lasting.CLOCK,
     DRIVE_OVER_SETTING: Lasting.LEVEL,
     BASE_ACCELERATION: Lasting.LEVEL,
-    **{hears_name(role): Lasting.LEVEL for role in Role},
+    **{detection_name(role): Lasting.LEVEL for role in Role},
 }
 """By the name of the finding."""
 
@@ -181,7 +181,7 @@ class LoopCheck:
             "acceleration": "see whether the accelerometer is plugged in and its current on",
         }.get(role.quantity, "see whether the sensor is plugged in, in range, and its supply on")
         return Finding(
-            name=hears_name(role),
+            name=detection_name(role),
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
             expected=f"more than {DETECTED:g} times its uncertainty",
             verdict=Verdict.OK if is_detected else Verdict.FAIL,
@@ -202,7 +202,7 @@ class LoopCheck:
                     f"a factor of {wrong:g} is a wrong load: compare the load on the generator's panel with "
                     "generator.load_ohm (or the divider with daq.channels.attenuation)"
                 )
-        return judged(
+        return finding_of(
             DRIVE_OVER_SETTING, ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
             fit.uncertainty / self._terminal_v,
         )  # fmt: skip
@@ -211,7 +211,7 @@ class LoopCheck:
         volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
         left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
         advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
-        return judged(
+        return finding_of(
             DRIVE_LEFT,
             left,
             "",
@@ -225,7 +225,7 @@ class LoopCheck:
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
         advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
         expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
-        return judged(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
+        return finding_of(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 
     def _gain(self) -> Finding:
         drive, output = self._fit(Role.DRIVE_VOLTAGE), self._fit(Role.AMPLIFIER_VOLTAGE)
@@ -237,7 +237,7 @@ class LoopCheck:
         verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
         advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
         expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
-        return judged(AMPLIFIER_GAIN, gain_db, "dB", expected, verdict, advice, _db(1 + relative))
+        return finding_of(AMPLIFIER_GAIN, gain_db, "dB", expected, verdict, advice, _db(1 + relative))
 
     def _base(self) -> Finding:
         fit = self._fit(Role.BASE_ACCELERATION)
@@ -245,7 +245,9 @@ class LoopCheck:
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
         advice = "check the accelerometer's sensitivity, fixture, specimen, the amplifier's power and gain"
-        return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
+        return finding_of(
+            BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty
+        )
 
     def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
         """Compare a channel's phase relative to the drive with the model's: 180 degrees mean a wrong sign."""
@@ -262,7 +264,7 @@ class LoopCheck:
         )
         expected = f"0 deg within {bounds.well:g} deg"
         verdict = bounds.verdict(abs(off_deg))
-        return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
+        return finding_of(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
 
 
 def _db(ratio: float) -> float:

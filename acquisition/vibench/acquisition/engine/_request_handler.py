@@ -310,7 +310,7 @@ class RequestHandler:
             self._act_alone(f"nobody has looked for {self._still_s:.1f} s: the window stands still")
 
     @property
-    def goes_on_alone(self) -> bool:
+    def continues_unattended(self) -> bool:
         """Whether a run continues that was meant to be left alone."""
         return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
 
@@ -320,10 +320,10 @@ class RequestHandler:
 
         This is a campaign that was left alone; after it, the engine remains while somebody attends it.
         """
-        if self.goes_on_alone and not self._is_orphan:
+        if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
             self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer of the last requests has gone
-        return self.goes_on_alone or (self._is_orphan and self._is_looked_after)
+        return self.continues_unattended or (self._is_orphan and self._is_looked_after)
 
     @property
     def _is_looked_after(self) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Event
 from time import monotonic
 
-from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, put_down, stop_path
+from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, stop_path, write_stop_file
 
 from ..host.beside import ClosedOnLeaving
 from ..host.chosen import chosen
@@ -186,7 +186,7 @@ def stop_engine(
         return StopDelivery.TOLD
     stop = stop_path(str(engines_folder()), engine.pid, engine.process_start, level)
     try:
-        put_down(stop, reason)
+        write_stop_file(stop, reason)
     except OSError as error:
         if isinstance(engine, Announcement):
             return _tell(engine, level, reason)

@@ -221,9 +221,9 @@ class PhaseRunner:
         self._enter(phase.state)
         pace, commanded = self._pace_of(phase), phase
         if pace is _Pace.OF_THE_PLAN:
-            commanded = self._made_up(phase, self._require_pace(phase))
+            commanded = self._with_lost_cycles(phase, self._require_pace(phase))
         else:
-            self._tell_lost_cycles()
+            self._note_lost_cycles()
             yield from self._read(0.0)
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
@@ -237,7 +237,7 @@ class PhaseRunner:
             yield from self._catch_up()
         self.loop.enter(phase.segment)
         self._play = phase.play
-        heard = self._heard(phase) if into is None else into
+        heard = self._drive_checks(phase) if into is None else into
         while wait_s is not None:
             yield from self._read(wait_s, heard, self._lead_s if phase.state is RunState.RECORDING else 0.0)
             if pace is _Pace.OF_THE_COMMANDS:
@@ -246,7 +246,7 @@ class PhaseRunner:
         if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
-    def _heard(self, phase: Phase) -> Heard | None:
+    def _drive_checks(self, phase: Phase) -> Heard | None:
         """Return the consumers of the blocks of a phase whose drive is checked against the plan."""
         if not self._may_glide(phase):
             return None
@@ -267,7 +267,7 @@ class PhaseRunner:
             return _Pace.OF_THE_PLAN
         return _Pace.AFTER_THE_COMMAND
 
-    def _made_up(self, phase: Phase, late_s: float) -> Phase:
+    def _with_lost_cycles(self, phase: Phase, late_s: float) -> Phase:
         """Return the phase with its frequency corrected for the cycles lost before it.
 
         While a command is late, the previous tone continues, and the drive loses the difference of the two
@@ -285,7 +285,7 @@ class PhaseRunner:
         self._planned_hz, self._glided_hz = planned_hz, planned_hz + more_hz
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
 
-    def _tell_lost_cycles(self) -> None:
+    def _note_lost_cycles(self) -> None:
         """Note any deviation of the recorded drive from its plan at the end of a glide."""
         more, self._lost_cycles = self._glide.more_cycles, 0.0
         self._glide.begin()
@@ -326,7 +326,7 @@ class PhaseRunner:
         for block in self.loop.catch_up():
             if into is not None:
                 into.append(block)
-            yield self._told(block)
+            yield self._report_progress(block)
             self._look(block)
 
     def ramp_down_early(
@@ -368,7 +368,7 @@ class PhaseRunner:
         for block in self.loop.read_for(duration_s, lead_s):
             if into is not None:
                 into.append(block)
-            yield self._told(block)
+            yield self._report_progress(block)
             self._look(block)
             if self._switch.is_holding and self._look == self._go_on:
                 yield from self._held()
@@ -392,7 +392,7 @@ class PhaseRunner:
                 reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
                 raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
             block = self.loop.linger(BLOCK_S)
-            yield self._told(block)
+            yield self._report_progress(block)
             self._look(block)
         self._enter(before)
 
@@ -402,7 +402,7 @@ class PhaseRunner:
         if (request := self._switch.request) is not None:
             raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
 
-    def _told(self, block: Block) -> Progress:
+    def _report_progress(self, block: Block) -> Progress:
         """Add requested events, and return the progress."""
         loop = self.loop
         for text in self._switch.take_marks():

@@ -60,19 +60,19 @@ class CollisionNumbers:
     """Mean squared innovation of the track, or squared distance of the statistics; about 1."""
 
     @property
-    def told(self) -> tuple[FoundParameter, ...]:
+    def determined(self) -> tuple[FoundParameter, ...]:
         """Parameters that the motion determines."""
         return tuple(each for each in self.parameters if each.is_determined)
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
         """Lower and upper gap; empty unless both are determined."""
-        found = tuple(each for each in self.told if each.what in _SIDES)
+        found = tuple(each for each in self.determined if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
         """Return the specimen with the determined gaps; a more accurate mean keeps their ratio."""
-        mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
+        mean = next((each for each in self.determined if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
         elif self.gaps:
@@ -91,14 +91,14 @@ class CollisionNumbers:
     @property
     def gap_fields(self) -> tuple[str, ...]:
         """Sentences on the gaps."""
-        return tuple(each.what.value for each in self.told if each.what in (*_SIDES, Hidden.MEAN_GAP))
+        return tuple(each.what.value for each in self.determined if each.what in (*_SIDES, Hidden.MEAN_GAP))
 
     @property
     def contradicted(self) -> tuple[str, ...]:
         """Return described values that lie outside the bounds by more than their width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
-            for each in self.told
+            for each in self.determined
             if each.what in _JUDGED
         ]
         surely = sorted((each for each in apart if each[0] > 1.0), reverse=True)
@@ -160,7 +160,7 @@ def numbers_from_statistics(
             why.setdefault(str(error), []).append(each.name)
             continue
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
-        if numbers.told:
+        if numbers.determined:
             return numbers, ""
         why.setdefault("its statistics determine nothing better than the description", []).append(each.name)
     return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())

@@ -75,11 +75,11 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
         Whether realisations scatter beyond noise; None if unknown.
     """
     tried = []
-    for assumption, allowed, told in _ways(lines, is_nonlinear=is_nonlinear):
+    for assumption, allowed, describe in _ways(lines, is_nonlinear=is_nonlinear):
         found = fit_lines_further(lines, allowed, usual)
         parameters = len(allowed.parameters) + len(allowed.low)
         freedom = lines.freedom - parameters
-        sentence = told(found.specimen, found.further)
+        sentence = describe(found.specimen, found.further)
         if sentence and np.isfinite(found.chi_square):
             tried.append((assumption, sentence, found.chi_square, parameters, freedom))
     if not tried:
@@ -151,22 +151,22 @@ def _otherwise(nominal: Specimen, parameter: Parameter) -> _Told:
     name, factor, unit = SHOWN[parameter]
     was = parameter_value(nominal, parameter)
 
-    def told(specimen: Specimen, _: Reals) -> str:
+    def describe(specimen: Specimen, _: Reals) -> str:
         value = parameter_value(specimen, parameter)
         change = f"{100 * (value / was - 1):+.3g} %" if was else "none was described"
         return f"{name} of {factor * value:.4g} {unit} instead of {factor * was:.4g} ({change})"
 
-    return told
+    return describe
 
 
 def _rubs(nominal: Specimen, damper: Parameter) -> _Told:
     link, was = damper.value[1], parameter_value(nominal, damper)
 
-    def told(specimen: Specimen, _: Reals) -> str:
+    def describe(specimen: Specimen, _: Reals) -> str:
         more = parameter_value(specimen, damper) - was
         return f"friction in link {link}, which at this level damps by {more:.3g} N s/m" if more > 0 else ""
 
-    return told
+    return describe
 
 
 def _response(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
@@ -207,7 +207,7 @@ def _under_foot(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Comp
 
 
 def _resonates(where: str) -> _Told:
-    def told(_: Specimen, further: Reals) -> str:
+    def describe(_: Specimen, further: Reals) -> str:
         return f"a further mode {where} near {np.exp(further[0]):.3g} Hz"
 
-    return told
+    return describe

@@ -163,7 +163,7 @@ class UpdatedSpecimen(Labelled):
     def to_dict(self) -> dict[str, Any]:
         """Return the results as JSON."""
         values = {each.parameter: each for each in self.values}
-        told = {key: value for way in Way for key, value in self._told(way).items()}
+        told = {key: value for way in Way for key, value in self._collision_results(way).items()}
         linear = columns(
             self,
             "lines=linear.lines reduced_chi_square=linear.reduced_chi_square chi_square_limit=linear.limit "
@@ -180,14 +180,14 @@ class UpdatedSpecimen(Labelled):
         }
         return dict(plain(document))
 
-    def _told(self, way: Way) -> dict[str, object]:
+    def _collision_results(self, way: Way) -> dict[str, object]:
         """Return parameters from collisions by one method."""
         found = self.collisions if self.collisions is not None and self.collisions.way is way else None
         return {
             f"{way}_from": None if found is None else found.recording,
             f"{way}": {
                 each.what: columns(each, "value low high bench=described")
-                for each in (() if found is None else found.told)
+                for each in (() if found is None else found.determined)
             },
         }
 
@@ -220,11 +220,11 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     named = ", or ".join(alike)
     if not best.mends:
         return (
-            "no single assumption that was tried mends it; the nearest, which leaves chi² at "
+            "no single changed assumption makes it fit; the nearest, which leaves chi² at "
             f"{best.reduced_chi_square:.3g}, is {named}"
         )
-    choice = "either of these would mend it, and the data do not tell them apart: " if len(alike) > 1 else ""
-    return f"{choice}{named}" if choice else f"what would mend it is {named}"
+    choice = "it fits with either of these, and the data do not distinguish them: " if len(alike) > 1 else ""
+    return f"{choice}{named}" if choice else f"it fits with {named}"
 
 
 def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ...]:

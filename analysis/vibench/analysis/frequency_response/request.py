@@ -188,7 +188,7 @@ class FrequencyResponseRequest:
 
         Raises NotEnoughData when the record is shorter than two segments of the requested length.
         """
-        wished = self._wished(samples, sample_rate_hz)
+        wished = self._requested_samples(samples, sample_rate_hz)
         # Compare before rounding: infinity cannot be rounded to an integer.
         if samples < wished or samples < wished + hop_samples(int(wished), self.overlap):
             raise NotEnoughData(
@@ -197,7 +197,7 @@ class FrequencyResponseRequest:
             )
         return int(wished)
 
-    def _wished(self, samples: int, sample_rate_hz: float) -> float:
+    def _requested_samples(self, samples: int, sample_rate_hz: float) -> float:
         if self.resolution_hz is not None:
             lines = float(_bandwidth_lines(self.window))
             return max(2.0, float(np.ceil(lines * sample_rate_hz / self.resolution_hz)))

@@ -368,7 +368,7 @@ class LiveTwin:
             if motion.first_sample + motion.samples < self._block_end:
                 return
             self._block_end += self._block
-            self._judge(said)
+            self._check_block(said)
 
     def _acquire(self) -> None:
         motion = self._motion
@@ -414,7 +414,7 @@ class LiveTwin:
         longest = round(_LONGEST_PAUSE_S * self._rate)
         self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
 
-    def _judge(self, said: list[str]) -> None:
+    def _check_block(self, said: list[str]) -> None:
         """Compare the finished block with the usual level."""
         squares = np.concatenate(self._squares or [np.empty(0)])
         self._squares = []

@@ -213,11 +213,11 @@ def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
 
 
 def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
-    for up, down in _there_and_back(sweeps):
+    for up, down in _opposite_sweeps(sweeps):
         yield hysteresis_figure(up.analysis, down.analysis)
 
 
-def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
+def _opposite_sweeps(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
     """Pair each upward sweep with the first downward sweep of the same level that overlaps its band."""
     for up in sweeps:
         plan = up.analysis.excitation

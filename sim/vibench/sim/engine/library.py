@@ -162,7 +162,7 @@ class Engine:
         assert isinstance(structure, _Lending)
         structure.lent |= fields
         for field, value in fields.items():
-            structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
+            structure[field] = _pointer(value) if isinstance(value, np.ndarray) else value
 
     def call(self, function: str, structure: Structure) -> int:
         """Call a function of native/api.cpp with one structure; return its result.
@@ -255,7 +255,7 @@ class Engine:
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
-def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
+def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
     """Return the address of an array; a structure unchanged."""
     if numbers.dtype.names:
         return numbers

@@ -136,7 +136,7 @@ class _Sketch:
                 return missing
             self.compute(wanted)
             # A filled cell beside a different one may differ too: regions can be thinner than the lattice.
-            beside = self._beside_others(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
+            beside = self._has_other_neighbour(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
             wanted = beside
@@ -167,7 +167,7 @@ class _Sketch:
         spread = sizes.max(axis=1) - sizes.min(axis=1)
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
-    def _beside_others(self, fine: int) -> Mask:
+    def _has_other_neighbour(self, fine: int) -> Mask:
         """Return whether one of the eight neighbours has another motion, shape (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)

@@ -460,7 +460,7 @@ class _Refinement:
         starts: list[_Start] = []
         wanted, windows = FIRST_STARTS, 1
         while len(starts) < MOST_STARTS:
-            is_over = not self._goes_on(starts, wanted, windows, begins_s) or self._clock.is_over
+            is_over = not self._observe_more(starts, wanted, windows, begins_s) or self._clock.is_over
             is_due = not self._has_answered and self._clock.taken_s > self._due_s
             is_complete = len(starts) == wanted and _windows_of(starts) == windows
             if len(starts) > 1 and (is_complete or is_due or is_over):
@@ -477,7 +477,7 @@ class _Refinement:
             if is_complete:
                 wanted, windows = self._next_size(starts, begins_s)
 
-    def _goes_on(self, starts: list[_Start], wanted: int, windows: int, begins_s: float) -> bool:
+    def _observe_more(self, starts: list[_Start], wanted: int, windows: int, begins_s: float) -> bool:
         """Observe one more window of a start, or a new start; return False if time has run out."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:

@@ -71,7 +71,7 @@ def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 6)) * scale
 
 
-def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
+def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     """Return whether a slightly displaced start diverged from the path of a motion.
 
     Parameters
@@ -461,7 +461,7 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
         return StartMemory.LOST
     if scene.budget_s == 0.0 or seen.path[-1].outcome is not Outcome.REACHED_END:
         return StartMemory.UNKNOWN
-    return StartMemory.LOST if forgets_its_start(begin, seen.path) else StartMemory.KEPT
+    return StartMemory.LOST if is_sensitive_to_start(begin, seen.path) else StartMemory.KEPT
 
 
 def ensemble_beside(

@@ -196,7 +196,7 @@ class SpecimenDescription(_Described):
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
 
     @model_validator(mode="after")
-    def _says_each_thing_once(self) -> Self:
+    def _alternatives_exclude(self) -> Self:
         for pair in ALTERNATIVES:
             said = [key for key in pair if getattr(self, key) is not None]
             if len(said) != 1:
