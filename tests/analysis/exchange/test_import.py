@@ -110,7 +110,7 @@ def test_a_file_in_volts_is_scaled_by_the_sensitivity_of_the_sensor(tmp_path):
     _, values = imported(tmp_path / "a.h5", mapping(tmp_path, *channels))
     assert_same(values, [98.0665 * volts[0], 0.25 * volts[1], 20.0 * volts[0]])
     scaled = mapping(tmp_path, ("other", "base_acceleration", 'scale = "100 mV/g"'))
-    with pytest.raises(InvalidRequest, match=r"other is in 'm s-2'.* for a file in volts"):
+    with pytest.raises(InvalidRequest, match=r"acceleration is in 'm s-2'.* for a file in volts"):
         import_recording(tmp_path / "a.h5", scaled, tmp_path / "second.h5")
 
 
@@ -127,9 +127,42 @@ def test_values_that_are_no_numbers_are_lost_samples(tmp_path):
     assert_same(values, expected)
 
 
+@pytest.mark.parametrize(
+    ("said", "more", "factor"),
+    [
+        ("mm/s", "", 1e-3),
+        ("mm/s", "scale = 1e-3", 1e-3),
+        ("mm/s", "scale = -0.00102", -0.00102),
+        ("mm/s", 'file_unit = "in/s"', 0.0254),
+        ("", 'file_unit = "um/s"', 1e-6),
+        ("m s^-1", "", 1.0),
+        ("mV", 'scale = "250 mm/s/V"', 0.25e-3),
+        ("V", "scale = 0.5", 0.5),
+        ("knots", "scale = 0.514444", 0.514444),
+        ("mm/s", "scale = 1.0", "leave scale out"),
+        ("mm/s", 'scale = "250 mm/s/V"', "for a file in volts"),
+        ("um", "scale = 1.0", "choose another channel"),
+        ("g", "", "choose another channel"),
+        ("V", "", "sensitivity of its sensor"),
+        ("knots", "", "as a number of 'm s-1' per 'knots'"),
+    ],
+)
+def test_a_unit_in_the_file_gives_the_scale_or_refuses_another(tmp_path, said, more, factor):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["u"], file["v"] = signals()
+        file["v"].attrs["units"] = said
+    meaning = mapping(tmp_path, ("u", "drive_voltage", ""), ("v", "m0_velocity", more))
+    if isinstance(factor, str):
+        with pytest.raises(InvalidRequest, match=factor):
+            imported(tmp_path / "a.h5", meaning)
+        return
+    _, values = imported(tmp_path / "a.h5", meaning)
+    assert_same(values, [signals()[0], factor * signals()[1]])
+
+
 def test_a_tdms_file_brings_its_rate_and_its_values(tmp_path):
     nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
-    about = {"wf_increment": 1 / RATE_HZ, "unit_string": "m/s"}
+    about = {"wf_increment": 1 / RATE_HZ, "unit_string": "V"}
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
         for piece in np.split(signals(), 3, axis=1):
             writer.write_segment(
@@ -140,12 +173,12 @@ def test_a_tdms_file_brings_its_rate_and_its_values(tmp_path):
             )
     with opened_source(tmp_path / "a.tdms") as source:
         assert [(each.name, each.unit) for each in source.channels] == [
-            ("Measured/Base", "m/s"),
-            ("Measured/Laser", "m/s"),
+            ("Measured/Base", "V"),
+            ("Measured/Laser", "V"),
         ]
     head = DWELL.replace("sample_rate_hz = 8000.0\n", "")
     meaning = mapping(
-        tmp_path, ("Base", "drive_voltage", ""), ("Measured/Laser", "m0_velocity", ""), head=head
+        tmp_path, ("Base", "drive_voltage", ""), ("Measured/Laser", "m0_velocity", "scale = 1.0"), head=head
     )
     recording, values = imported(tmp_path / "a.tdms", meaning)
     assert recording.sample_rate_hz == pytest.approx(RATE_HZ, rel=1e-12)
@@ -638,11 +671,11 @@ def test_anything_that_was_exported_as_matlab_or_text_comes_back(known, known_va
 
 
 def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
-    field = {"data": signals()[0], "units": "m/s"}
+    field = {"data": signals()[0], "units": "V"}
     savemat(tmp_path / "a.mat", {"run": {"vib": field}, "table": signals().T, "name": "text", "n": 3.0})
     with opened_source(tmp_path / "a.mat") as source:
         assert {each.name: each.unit for each in source.channels} == {
-            "run.vib.data": "m/s",
+            "run.vib.data": "V",
             "table#1": "",
             "table#2": "",
         }

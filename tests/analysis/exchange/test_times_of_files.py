@@ -9,6 +9,7 @@ from vibench.acquisition import open_recording, validated
 from vibench.analysis import InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.exchange import ImportMapping, import_recording
+from vibench.analysis.recordings.channel_levels import channel_levels
 from vibench.analysis.recordings.checks import Verdict
 
 nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
@@ -315,6 +316,26 @@ def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, 
     else:
         assert check.verdict is Verdict.NOTE
         assert ("m0_velocity is not known" in check.text) == (not full_scale)
+
+
+@pytest.mark.parametrize("cycles", [4, 8, 10, 16, 20, 25, 40])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
+def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, noise):
+    """It takes few values, the same ones in each period, and may spend most samples at the highest."""
+    phase = 2 * np.pi * np.arange(20_000) / cycles
+    rng = np.random.default_rng(cycles)
+    wave = [np.cos(phase + at) + noise * rng.standard_normal(phase.size) for at in (0.3, np.pi / cycles, 0.8)]
+    meaning = dwell_at(tmp_path / "a.csv", *wave)
+    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
+        assert [each.flat_tops for each in channel_levels(recording)] == [(), (), ()]
+
+
+def test_falling_times_are_refused(tmp_path):
+    meaning = dwell_at(tmp_path / "a.csv", *np.random.default_rng(1).standard_normal((3, 9000)))
+    heading, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "a.csv").write_text("\n".join((heading, *reversed(rows))))
+    with pytest.raises(InvalidRequest, match="sort its rows by time"):
+        import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")
 
 
 def restarted_tdms(path, more, at):

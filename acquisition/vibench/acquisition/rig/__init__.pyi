@@ -60,5 +60,6 @@ from ._sensors import (
     TransducerConfig as TransducerConfig,
     VibrometerConfig as VibrometerConfig,
     sensor_table as sensor_table,
+    size_of_unit as size_of_unit,
     volts_per_unit as volts_per_unit,
 )

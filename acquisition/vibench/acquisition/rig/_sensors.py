@@ -17,8 +17,18 @@ _VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
 _STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
 """By definition (NIST SP 811)."""
 _UNITS = {
-    "m s-2": {"m/s2": 1.0, "m s-2": 1.0, "ms-2": 1.0, "g": _STANDARD_GRAVITY, "gn": _STANDARD_GRAVITY},
-    "m s-1": {"m/s": 1.0, "m s-1": 1.0, "mm/s": 1e-3, "mm s-1": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+    "m s-2": {
+        **dict.fromkeys(("m/s2", "m s-2", "ms-2"), 1.0),
+        **dict.fromkeys(("g", "gn"), _STANDARD_GRAVITY),
+        "mm/s2": 1e-3,
+        "in/s2": 0.0254,
+    },
+    "m s-1": {
+        **dict.fromkeys(("m/s", "m s-1"), 1.0),
+        **dict.fromkeys(("mm/s", "mm s-1"), 1e-3),
+        "um/s": 1e-6,
+        "in/s": 0.0254,
+    },
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
@@ -63,6 +73,15 @@ def volts_per_unit(text: str, unit: str) -> float:
     raise ValueError(
         f"{text!r} is not a sensitivity for {unit!r}; give a number above 0 with a unit, such as {example}"
     )
+
+
+def size_of_unit(name: str, unit: str) -> float | None:
+    """Return the size of a unit in another: 9.80665 for ``"g"`` in ``"m s-2"``.
+
+    None if it is a unit of another quantity, or one of the two is not known.
+    """
+    volts = _VOLTS | dict.fromkeys(("v", "volt", "volts", "Volt", "Volts"), 1.0)
+    return {**_UNITS, "V": volts}.get(unit, {}).get(_plain(name))
 
 
 def _plain(unit: str) -> str:

@@ -132,6 +132,9 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or said in _NO_UNITS else None
     is_named = found is not None and said in SECONDS
+    if is_named and _begin(-first) is not None:
+        trouble = "has times that fall; sort its rows by time"
+        return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
     if scan is None or not (is_named or (first.size >= _LEAST_RISING and not scan.is_coarse)):
         return None
     for block in chain((first,), iterator):

@@ -211,18 +211,17 @@ def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> 
 def _header(source: Source, each: _Wanted) -> ChannelHeader:
     mapped, found = each.mapped, each.source
     quantity, unit = mapped.kind
-    if isinstance(mapped.scale, str) and found.unit not in {"", "V"}:
-        raise InvalidRequest(
-            f"{found.name} is in {found.unit!r}, but scale = {mapped.scale!r} is for a file in volts; give "
-            f"scale as a number of {unit!r} per {found.unit!r}"
-        )
+    try:
+        factor = mapped.factor(found.unit)
+    except ValueError as error:
+        raise InvalidRequest(str(error)) from error
     full_scale = mapped.full_scale or found.full_scale
     return ChannelHeader(
         role=mapped.role,
         physical_channel=found.name,
         quantity=quantity,
         unit=unit,
-        physical_per_volt=mapped.factor,
+        physical_per_volt=factor,
         physical_offset=mapped.offset,
         range_v=_power_of_two_above(_peak(source, found)) if full_scale is None else full_scale,
         volts_per_count=found.step,

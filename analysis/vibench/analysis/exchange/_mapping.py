@@ -7,7 +7,7 @@ from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, Posi
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import ROLE_PATTERN, Origin
-from vibench.acquisition.rig import volts_per_unit
+from vibench.acquisition.rig import size_of_unit, volts_per_unit
 from vibench.sim import FrozenModel, SpecimenTable
 
 from ..recordings.channels import BASE, DRIVE
@@ -24,6 +24,17 @@ KNOWN_ROLES = {
 """Quantity and unit of these channels in the analysis."""
 
 
+_NO_UNIT = {"", "-", "1", "none", "None"}
+"""Units in a file that state none."""
+_LARGEST_CORRECTION = 0.2
+"""Largest relative difference of a scale from the unit in the file that may be a calibration."""
+
+
+def _is_another_quantity(file_unit: str) -> bool:
+    """Return whether a unit is that of a motion or force, so that no scale gives another one."""
+    return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
+
+
 class ChannelMapping(FrozenModel):
     """One channel: ``value = factor * number in the file + offset``, in ``unit``."""
 
@@ -35,8 +46,11 @@ class ChannelMapping(FrozenModel):
     quantity: str = ""
     unit: str = ""
     """UDUNITS text of the value; known for the channels that an analysis needs."""
-    scale: float | str = 1.0
-    """Unit per number in the file; of a file in volts, or the sensor's sensitivity: ``"100 mV/g"``."""
+    file_unit: str = ""
+    """Unit of the numbers in the file, if missing or wrong there: ``"g"``, ``"mm/s"``, ``"V"``."""
+    scale: float | str | None = None
+    """Unit per number in the file; by default from the unit in the file, else 1. For a file in volts, the
+    sensor's sensitivity: ``"100 mV/g"``."""
     offset: float = 0.0
     full_scale: PositiveFloat | None = None
     """Full scale of the input, as a number in the file; values near it are marked as overloads."""
@@ -66,21 +80,45 @@ class ChannelMapping(FrozenModel):
 
     @model_validator(mode="after")
     def _has_a_scale(self) -> Self:
-        if self.factor == 0:
+        if self.scale == 0:
             raise ValueError(
                 f"the scale of {self.role} is 0, which leaves nothing of it; give unit per number"
             )
+        if isinstance(self.scale, str):
+            self.factor("V")
         return self
 
-    @property
-    def factor(self) -> float:
-        """Unit per number in the file."""
-        if not isinstance(self.scale, str):
-            return self.scale
-        unit = self.kind[1]
-        if unit == "V":
-            raise ValueError(f"scale = {self.scale!r} was given for {self.role}, a voltage; give a number")
-        return 1.0 / volts_per_unit(self.scale, unit)
+    def factor(self, file_unit: str) -> float:
+        """Return the unit per number of a file in ``file_unit``; empty if the file states none.
+
+        Raises ValueError when the scale contradicts the unit, or is needed and missing.
+        """
+        file_unit, unit, scale = self.file_unit or file_unit, self.kind[1], self.scale
+        said = f"{self.role} is in {file_unit!r} in the file"
+        size, volts = size_of_unit(file_unit, unit), size_of_unit(file_unit, "V")
+        if isinstance(scale, str):
+            if unit == "V":
+                raise ValueError(f"scale = {scale!r} was given for {self.role}, a voltage; give a number")
+            if volts is None and file_unit not in _NO_UNIT:
+                raise ValueError(
+                    f"{said}, but scale = {scale!r} is for a file in volts; give scale as a number of "
+                    f'{unit!r} per {file_unit!r}, or file_unit = "V" if the file is wrong'
+                )
+            return (volts or 1.0) / volts_per_unit(scale, unit)
+        is_known = size_of_unit(unit, unit) is not None and file_unit not in _NO_UNIT
+        if size is not None and scale is not None and abs(abs(scale) / size - 1) > _LARGEST_CORRECTION:
+            raise ValueError(
+                f"{said}, which is {size:g} {unit}, but scale = {scale:g} was given; leave scale out, or "
+                "give file_unit if the file is wrong"
+            )
+        if is_known and size is None and (scale is None or _is_another_quantity(file_unit)):
+            raise ValueError(
+                f"{said}, and the recording needs {unit!r}; give scale as a number of {unit!r} per "
+                f"{file_unit!r}, choose another channel, or give file_unit if the file is wrong"
+                if volts is None
+                else f"{said}; give the sensitivity of its sensor as scale, such as '50 mV/({unit})'"
+            )
+        return (1.0 if size is None else size) if scale is None else scale
 
     @property
     def kind(self) -> tuple[str, str]:

@@ -68,6 +68,7 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
     full_scale = np.array([[abs(each.physical_per_volt) * each.range_v] for each in recording.channels])
     parts, cut = [], np.zeros(len(recording.channels), dtype=np.int64)
     counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
+    lasting = np.zeros((len(recording.channels), 2), dtype=np.int64)
     for each in recording.blocks(recording.roles, block):
         parts.append(_extremes(each.values, length))
         # Lost samples (NaN) do not count as clipped.
@@ -75,6 +76,7 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
         for row, shares in enumerate((each.values - offset) / full_scale):
             bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) / 2 * (_COUNTED - 1))
             counts[row] += np.bincount(bins.astype(np.int64), minlength=_COUNTED)
+            lasting[row] = np.maximum(lasting[row], _lasting(bins))
         on_read(each.first_sample + each.values.shape[1], recording.samples)
     lower, upper, power = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
     if np.isnan(lower).all():
@@ -91,8 +93,8 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
             share_at_full_scale=int(cut[row]) / recording.samples,
             flat_tops=tuple(
                 float(offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0])
-                for side in (1, -1)
-                if (top := _flat_top(counts[row, ::side], header, full_scale[row, 0])) is not None
+                for side, highest in zip((1, -1), lasting[row], strict=True)
+                if (top := _flat_top(counts[row, ::side], highest, header, full_scale[row, 0])) is not None
             ),
         )
         for row, header in enumerate(recording.channels)
@@ -110,32 +112,52 @@ _FLAT_VALUE = 0.4
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
 """Steps of the converter to a peak: a sine of 16 of them has 0.42 of its samples at two values."""
+_GAP, _GAP_IN_TOP = 0.01, 0.15
+"""Largest range without samples, relative to the peak and to a top, where samples cover a smooth peak."""
+_AS_FREQUENT = 0.4
+"""A value below a clipped peak is less frequent than this, relative to the clipped samples."""
 
 
-def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int | None:
-    """Return the value at which the upper peaks are clipped; None if they are not."""
+def _lasting(bins: Reals) -> tuple[int, int]:
+    """Return the highest bin that three successive samples reach, from below and from above."""
+    if bins.size < 3:
+        return 0, 0
+    three = np.stack((bins[:-2], bins[1:-1], bins[2:]))
+    return int(three.min(axis=0).max()), int(_COUNTED - 1 - three.max(axis=0).min())
+
+
+def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
+    """Return the value at which the upper peaks are clipped; None if they are not, or it is not known.
+
+    A sample clock locked to the drive takes the same few values in every period. If a range without samples
+    separates the highest values from what ``lasting`` successive samples reach, a smooth peak has such a
+    histogram too.
+    """
     filled = np.flatnonzero(counts)
     if filled.size < 2:
         return None
     total = np.cumsum(counts)
     top, middle = int(filled[-1]), int(np.searchsorted(total, total[-1] / 2))
-    height = top - middle
+    height, at_top = top - middle, int(counts[top - 1 :].sum())
 
     def above(value: float) -> int:
         return int(total[-1] - total[max(0, int(value))])
 
-    if height < _LEAST_HEIGHT * (top - filled[0]) or counts[top - 1 :].sum() == total[-1]:
+    if height < _LEAST_HEIGHT * (top - filled[0]) or at_top == total[-1]:
         return None
     step = 0.0 if header.volts_per_count is None else header.volts_per_count * abs(header.physical_per_volt)
     resolution = max(1.0, step / full_scale * _COUNTED / 2)
-    if height > _FEWEST_STEPS * resolution and counts[top - 1 :].sum() >= max(
+    gap = max(0, int(np.diff(filled[filled >= lasting]).max(initial=0)) - resolution)
+    if height > _FEWEST_STEPS * resolution and at_top >= max(
         _FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)
     ):
-        return top
+        other = int(counts[middle + 1 : top - 1].max(initial=0))
+        if gap <= _GAP * height or 0 < other <= _AS_FREQUENT * at_top:
+            return top
     for share in _TOPS:
         whole = above(top - share * height)
         values = int(np.count_nonzero(counts[int(top - share * height) :]))
-        is_resolved = share * height > _FEWEST_VALUES * resolution
+        is_resolved = share * height > _FEWEST_VALUES * resolution and gap <= _GAP_IN_TOP * share * height
         is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
         if is_resolved and is_counted and above(top - share * height / 2) > _FLAT * whole:
             return top
