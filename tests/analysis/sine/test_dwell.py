@@ -38,6 +38,18 @@ def test_both_responses_of_a_linear_motion_are_its_amplitude_over_the_bases():
     assert result.drive.distortion < 1e-9
 
 
+@pytest.mark.parametrize("per_s", [0.1, 10.0])
+def test_a_drifting_sensor_does_not_change_the_responses(per_s):
+    """A straight line over the window leaks into every order: 10 times the amplitude a second, by 0.1 %."""
+    drive, base, velocity = dwell(4, {1: 15e-6 * np.exp(-0.7j)})
+    line = per_s * np.linspace(0.0, 4.0, drive.size)
+    drifting = (base + np.max(base) * line, velocity - np.max(velocity) * line)
+    result = dwell_response(drive, *drifting, RATE, near_hz=260, window_s=3)
+    assert result.response_ii == pytest.approx(3, rel=1e-8)
+    assert result.phase_rad == pytest.approx(-0.7, abs=1e-8)
+    assert result.drive.amplitude_m == pytest.approx(5e-6, rel=1e-8)
+
+
 def test_other_orders_do_not_leak_into_response_ii():
     """The window is no whole number of subharmonic periods; a one-term estimate would be off by 1e-4."""
     parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}

@@ -81,8 +81,8 @@ def tracked_together(
     """Fit all orders at once to each interval of signals, by least squares.
 
     One order at a time would be biased by the others whenever an interval is not a whole number of
-    *subharmonic* periods. A constant and a linear change of order 1 are fitted too, so that a sweep
-    through a resonance leaves no residual.
+    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too, so that a
+    drifting sensor or a sweep through a resonance leaves no residual.
 
     Parameters
     ----------
@@ -141,11 +141,12 @@ def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Compl
     """Fit signals of shape (intervals, samples, signals); results have shape (signals, ..., intervals)."""
     samples, count = signals.shape[1], len(orders)
     *turned, first = order_turns(phase, (*orders, 1.0))
-    changing = np.linspace(-1.0, 1.0, samples) * first
-    basis = np.empty((len(phase), 2 * count + 3, samples))
+    rising = np.linspace(-1.0, 1.0, samples)
+    changing = rising * first
+    basis = np.empty((len(phase), 2 * count + 4, samples))
     for place, turn in enumerate(turned):
         basis[:, place], basis[:, count + place] = turn.real, turn.imag
-    basis[:, -3], basis[:, -2], basis[:, -1] = changing.real, changing.imag, 1.0
+    basis[:, -4], basis[:, -3], basis[:, -2], basis[:, -1] = changing.real, changing.imag, rising, 1.0
     normal = basis @ basis.transpose(0, 2, 1)
     try:
         inverse = np.linalg.inv(normal)

@@ -108,7 +108,9 @@ class FittedSine:
 
 
 def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
-    """Fit a sine and an offset by least squares, frequency included (IEEE Std 1057, four parameters).
+    """Fit a sine and a straight line by least squares, frequency included (IEEE Std 1057, four parameters).
+
+    The line takes the drift of a sensor, which is not in the standard.
 
     Raises UnusableData when no line stands above the noise there.
 
@@ -135,20 +137,20 @@ def _kept_sine(recorded: bytes, sample_rate_hz: float, near_hz: float) -> Fitted
     omega = 2 * np.pi * found[0].frequency_hz
     for _ in range(_ITERATIONS):
         cosine, sine = np.cos(omega * time), np.sin(omega * time)
-        basis = np.stack((cosine, sine, np.ones_like(time)))
-        a, b, _offset = np.linalg.solve(basis @ basis.T, basis @ samples)
+        basis = np.stack((cosine, sine, np.ones_like(time), time))
+        a, b, *_line = np.linalg.solve(basis @ basis.T, basis @ samples)
         slope = time * (b * cosine - a * sine)
         full = np.concatenate((basis, slope[np.newaxis]))
         solution = np.linalg.solve(full @ full.T, full @ samples)
-        omega += solution[3]
-        if abs(solution[3]) < _CONVERGED * omega:
+        omega += solution[-1]
+        if abs(solution[-1]) < _CONVERGED * omega:
             break
     a, b = solution[0], solution[1]
     residual = samples - solution @ full
-    variance = float(residual @ residual) / max(1, samples.size - 4)
+    variance = float(residual @ residual) / max(1, samples.size - 5)
     covariance = variance * np.linalg.inv(full @ full.T)
     amplitude = float(np.hypot(a, b))
-    sd_omega = float(np.sqrt(covariance[3, 3]))
+    sd_omega = float(np.sqrt(covariance[-1, -1]))
     sd_middle = float(np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2))
     to_start = float(time[0])
     return FittedSine(
