@@ -13,6 +13,7 @@ from math import inf
 from pathlib import Path
 
 from . import (
+    altered_recordings,
     doubtful_recordings,
     engine_messages,
     imported_files,
@@ -31,6 +32,7 @@ TARGETS: dict[str, Attack] = {
     "engine": engine_messages.attack,
     "instruments": instrument_messages.attack,
     "replies": instrument_replies.attack,
+    "altered": altered_recordings.attack,
     "recordings": recordings_mutants.attack,
     "flips": recordings_flips.attack,
     "kills": recordings_kills.attack,

@@ -75,7 +75,6 @@ CALLS = (
     "GetChanAttributeDoubleArray", "GetChanAttributeDouble", "CfgSampClkTiming", "GetTimingAttributeDouble",
     "TaskControl", "StartTask", "ReadBinaryI32", "ReadBinaryI32", "ReadBinaryI32", "ReadBinaryI32",
     "StopTask", "GetReadAttributeUInt32", "GetReadAttributeBool", "ClearTask", "GetSystemInfoAttributeString",
-    "GetDeviceAttributeStringArray",
 )  # fmt: skip
 OUTPUT_CALLS = (
     "CreateAOVoltageChan", "WriteAnalogF64", "WriteAnalogF64", "WaitUntilTaskDone", "GetTrigAttributeString",

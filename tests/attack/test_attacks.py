@@ -5,7 +5,14 @@ More of them, with other seeds and for hours: ``python -m tests.attack --help``.
 
 import pytest
 
-from . import engine_messages, imported_files, instrument_messages, toml_files
+from . import (
+    altered_recordings,
+    engine_messages,
+    imported_files,
+    instrument_messages,
+    instrument_replies,
+    toml_files,
+)
 from .tally import Shard
 
 SEED = 2025
@@ -20,8 +27,10 @@ SEED = 2025
         (imported_files.attack, 100),
         (engine_messages.attack, 250),
         (instrument_messages.attack, 750),
+        (instrument_replies.attack, 12),
+        (altered_recordings.attack, 12),
     ],
-    ids=["toml", "imports", "engine", "instruments"],
+    ids=["toml", "imports", "engine", "instruments", "replies", "altered"],
 )
 def test_nothing_that_is_broken_does_what_none_may_do(attack, count):
     tally = attack(Shard(SEED, count))

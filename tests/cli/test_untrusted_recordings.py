@@ -7,14 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition import load_toml, open_recording, shipped
-from vibench.acquisition.campaign import JournalPointState, ReasonCode
-from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, journal_path
-from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.recording import _seal
-from vibench.acquisition.rig import Rig
 
+from ..attack.altered_recordings import noted
 from ..attack.recordings_corpus import good_recordings
 
 LICENCE = ("--license", "https://creativecommons.org/licenses/by/4.0/")
@@ -28,21 +23,6 @@ def folder(tmp_path):
     for name in ("dwell.h5", "noise.h5"):
         (folder / name).write_bytes(good_recordings()[name])
     return folder
-
-
-def noted(folder):
-    plans, seals = [], {}
-    for name in ("dwell", "noise"):
-        with open_recording(folder / f"{name}.h5") as recording:
-            plans.append(Measurement.model_validate(recording.plan))
-            seals[name] = recording.seal
-    rig = load_toml(shipped("hardware_configs/virtual_rig.toml"), Rig)
-    identity = BenchIdentity(rig=rig, instruments={}, knobs={})
-    campaign = Campaign(name="night", measurements=tuple(plans))
-    with Journal.begin(journal_path(folder, "night"), campaign, identity) as journal:
-        for name, seal in seals.items():
-            journal.start(name, f"{name}.h5")
-            journal.end(name, JournalPointState.DONE, ReasonCode.CARRIED_OUT, "so it was", seal)
 
 
 def halved(file):
@@ -143,7 +123,7 @@ def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, fold
 @pytest.mark.thorough
 @pytest.mark.parametrize("how", ["copied over", "sealed anew"])
 def test_another_recording_under_the_name_is_refused_by_every_command(vibench_here, folder, how):
-    noted(folder)
+    noted(folder, ("dwell", "noise"))
     assert {code for code, _ in said_by_all(vibench_here, folder).values()} == {0}
     if how == "copied over":
         shutil.copy(folder / "noise.h5", folder / "dwell.h5")

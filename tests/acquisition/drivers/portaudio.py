@@ -107,6 +107,10 @@ class PortAudio:
     def Pa_GetErrorText(self, error):
         return self.text
 
+    def Pa_GetLastHostErrorInfo(self):
+        fields = {"hostApiType": 1, "errorCode": -5, "errorText": self.text}
+        return self.kept.setdefault("error", self.ffi.new("PaHostErrorInfo*", fields))
+
     def Pa_GetDeviceCount(self):
         return int(self.plugged)
 

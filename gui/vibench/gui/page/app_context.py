@@ -45,6 +45,17 @@ class Settings:
     def __init__(self, path: Path) -> None:
         self._store = QSettings(str(path), QSettings.Format.IniFormat)
 
+    @property
+    def complaint(self) -> str:
+        """The sentence that says that the file cannot be written; empty if everything is in it."""
+        self._store.sync()
+        if self._store.status() is QSettings.Status.NoError:
+            return ""
+        return (
+            f"{self._store.fileName()} could not be written: the last test, campaign and layout are not "
+            "kept. Make room, or name another file with --settings"
+        )
+
     def text(self, key: SettingKey, otherwise: str = "") -> str:
         """Return a stored text, or ``otherwise``."""
         value = self._store.value(key.value)

@@ -28,9 +28,7 @@ class UserActions(QObject):
         """Check the bench; with ``new_reference``, store the result as the reference of later checks."""
         if not self._may("check the bench", EngineState.READY):
             return
-        folder = self._context.folder
-        folder.mkdir(parents=True, exist_ok=True)
-        self._context.bridge.order(EngineClient.check, folder, new_reference=new_reference)
+        self._context.bridge.order(EngineClient.check, self._context.folder, new_reference=new_reference)
 
     def arm_test(self) -> None:
         """Arm the test of the Test page, under an unused name."""

@@ -14,6 +14,8 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QLabel, QStyleFactory
 
+from vibench.acquisition import printable
+
 from ..page.app_context import AppContext, SettingKey, Settings, default_settings_path
 from .window import PAGES, Window
 
@@ -61,7 +63,15 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     QTimer.singleShot(0, window.context.background.prepare)
     QTimer.singleShot(0, window.look_for_left_campaign)
     QTimer.singleShot(0, Thread(target=load_ahead).start)
-    return app.exec()
+    code = app.exec()
+    if complaint := stored.complaint:
+        sys.stderr.write(f"{printable(complaint)}\n")
+        return code or NOT_KEPT
+    return code
+
+
+NOT_KEPT = 1
+"""Exit code where the settings could not be written."""
 
 
 def load_ahead() -> None:

@@ -1,0 +1,100 @@
+"""What the window saves on a full disk: one sentence, and every file is as it was."""
+
+from contextlib import contextmanager
+
+import pytest
+from PySide6.QtWidgets import QFileDialog, QMessageBox
+
+from vibench.acquisition.plan import Campaign
+from vibench.analysis.errors import AnalysisError
+from vibench.gui.page.app_context import SettingKey, Settings
+from vibench.gui.pages.files.recording_table import add_note, export_recording
+from vibench.gui.plots import plot_actions
+from vibench.gui.plots.plot import Plot
+from vibench.gui.widgets.notice import QUEUE, TEST
+
+from ...attack.recordings_corpus import good_recordings
+
+resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
+
+
+@contextmanager
+def full_disk():
+    """Refuse every byte beyond the first twenty of a file."""
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, usual[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def own(tmp_path):
+    folder = tmp_path / "own"
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.parametrize("page", [TEST, QUEUE])
+def test_a_test_or_a_campaign_that_finds_no_room_is_one_notice(window, own, monkeypatch, page):
+    measurement = window.context.selection.measurement
+    window.context.selection.choose_campaign(Campaign(name="night", measurements=(measurement,)))
+    (own / "mine.toml").write_text("older")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(own / "mine.toml"), ""))
+    before, known = content(own), len(window.strip.notices)
+    with full_disk():
+        window.pages[page]._save()
+    (notice,) = window.strip.notices[known:]
+    assert "mine.toml: cannot be written" in notice.what
+    assert "save it elsewhere" in notice.what
+    assert content(own) == before
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "csv"])
+def test_a_plot_that_finds_no_room_is_one_box(window, own, monkeypatch, ending):
+    said = []
+    monkeypatch.setattr(plot_actions, "new_path", lambda *_: own / f"plot.{ending}")
+    monkeypatch.setattr(QMessageBox, "warning", lambda *given: said.append(given[-1]))
+    with full_disk():
+        plot_actions.save_plot(window.findChildren(Plot)[0])
+    assert len(said) == 1
+    assert "was not written: File too large" in said[0]
+    assert content(own) == {}
+
+
+@pytest.mark.parametrize("ending", ["csv", "uff", "mat", "nxs", "note"])
+def test_an_export_or_a_note_that_finds_no_room_is_one_sentence(own, ending):
+    path = own / "dwell.h5"
+    path.write_bytes(good_recordings()["dwell.h5"])
+    before = content(own)
+    with full_disk(), pytest.raises((AnalysisError, OSError), match="dwell") as refused:
+        add_note(path, "glue") if ending == "note" else export_recording(path, own / f"dwell.{ending}")
+    assert "\n" not in str(refused.value)
+    assert content(own) == before
+
+
+def test_settings_that_find_no_room_are_reported_and_the_older_ones_are_kept(qapp, own):
+    settings = Settings(own / "window.ini")
+    settings.keep_text(SettingKey.TEST, "older")
+    assert settings.complaint == ""
+    before = content(own)
+    with full_disk():
+        settings.keep_text(SettingKey.TEST, "newer" * 100)
+        assert "window.ini could not be written" in settings.complaint
+    assert content(own) == before
+
+
+def test_a_check_does_not_need_the_folder_of_recordings(window, own, monkeypatch):
+    """A folder that cannot be made raised in the window, before the engine could report it."""
+    orders = []
+    (own / "file").touch()
+    window.context.choose_folder(own / "file" / "recordings")
+    monkeypatch.setattr(type(window.user_actions), "_may", lambda *_: True)
+    monkeypatch.setattr(window.context.bridge, "order", lambda *given, **_: orders.append(given))
+    window.user_actions.check()
+    assert orders[0][1] == own / "file" / "recordings"
