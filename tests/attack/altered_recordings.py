@@ -179,14 +179,15 @@ def _change_journal(path: Path, chance: random.Random) -> str:
         table: [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
         for (table,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
     }
-    table = next(name for name, columns in tables.items() if {"seal", "file"} <= set(columns))
+    noting = [name for name, columns in tables.items() if {"seal", "file"} <= set(columns)]
     new = "0" * 64
     if seals == "another":
         (new,) = connection.execute(
-            f"SELECT seal FROM {table} WHERE file != ?",
+            f"SELECT seal FROM {noting[0]} WHERE file != ?",
             (path.name,),
         ).fetchone()
-    connection.execute(f"UPDATE {table} SET seal = ? WHERE file = ?", (new, path.name))
+    for table in noting:
+        connection.execute(f"UPDATE {table} SET seal = ? WHERE file = ?", (new, path.name))
     connection.commit()
     connection.close()
     return f"journal, {seals} seal"
@@ -238,7 +239,7 @@ def taken(folder: Path, name: str) -> list[str]:
         if code == -1 or not (code == 1 or is_warned):
             found.append(f"{word}: {code} {text[:300]}")
     code, text = _said(folder, "catalogue", ".")
-    if code or not any(line.startswith(name) and "good" not in line for line in text.splitlines()):
+    if code == -1 or not any(line.startswith(name) and "good" not in line for line in text.splitlines()):
         found.append(f"catalogue: {code} {text[:300]}")
     try:
         check = whole_check(folder / name)

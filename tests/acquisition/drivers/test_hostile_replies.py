@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Block, InstrumentError, open_bench
-from vibench.acquisition.drivers import AFG1022X
+from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
 from vibench.acquisition.drivers._daqmx import linear_step_v
 from vibench.acquisition.drivers._scpi import ScpiInstrument
 from vibench.acquisition.drivers._visa_link import open_link
 from vibench.acquisition.instruments import Overload, read_block
+from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.daqmx.data_calls import DATA_CALLS
 from vibench.virtual_rig.generator.scpi_instrument import Reply
 
@@ -134,6 +135,17 @@ def test_another_number_of_samples_than_requested_is_an_error(rig, monkeypatch, 
         bench.digitizer.start()
         with pytest.raises(InstrumentError, match=r"were requested|reply cannot be used"):
             bench.digitizer.read(64)
+
+
+def test_a_failed_call_whose_code_says_success_is_an_error(rig):
+    with VirtualRig(rig) as virtual:
+        virtual.faults.fail_daq("StartTask", 0)
+        connected = rig.daq.model_copy(update={"server": virtual.daq_address})
+        digitizer = DaqmxDigitizer.open(rig.model_copy(update={"daq": connected}))
+        with pytest.raises(InstrumentError, match="reply cannot be used"):
+            digitizer.start()
+        virtual.faults.heal()
+        digitizer.close()
 
 
 class Converter:

@@ -134,8 +134,8 @@ def daqmx_call(doing: str) -> Iterator[None]:
             f"{doing} failed: this computer has no NI-DAQmx driver ({error}). Install the driver, or set "
             "daq.server to the address of a device server"
         ) from error
-    except (AssertionError, ArithmeticError, LookupError, TypeError, ValueError) as error:
-        # The client assumes that a reply has the requested size and known values.
+    except (AssertionError, ArithmeticError, LookupError, NameError, TypeError, ValueError) as error:
+        # The client assumes that a reply has the requested size, known values, and an error code if it fails.
         raise InstrumentError(
             f"{doing} failed: the driver's reply cannot be used ({type(error).__name__}: {error}). Use "
             "versions of client, driver and device server that belong together, then open the bench again"
