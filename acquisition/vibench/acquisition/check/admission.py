@@ -54,10 +54,7 @@ def archive_path(rig_name: str, *, passed: bool = False) -> Path:
 def last_check(rig_name: str) -> CheckResult | None:
     """Return the last check of a rig; None if it is missing or unreadable by this version.
 
-    Parameters
-    ----------
-    rig_name
-        As the hardware configuration says it.
+    ``rig_name`` is the name in its hardware configuration.
     """
     return _read(archive_path(rig_name))
 

@@ -40,12 +40,7 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
     """Fit cosine, sine and a constant.
 
     The uncertainty is that of white noise, ``residual * sqrt(2 / n)`` (Kay, Fundamentals of
-    Statistical Signal Processing, vol. 1, example 3.14).
-
-    Parameters
-    ----------
-    volts
-        Shape (samples,), more than one period.
+    Statistical Signal Processing, vol. 1, example 3.14). ``volts`` spans more than one period.
     """
     angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)

@@ -219,10 +219,7 @@ class PhaseSearch:
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
         """Return the zero of a line through the tries near the resonance.
 
-        Parameters
-        ----------
-        sensor_phase_deg
-            Standard uncertainty of the phase that all tries share [degrees].
+        ``sensor_phase_deg`` is the standard uncertainty of the phase that all tries share [degrees].
         """
         nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]

@@ -101,13 +101,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Divides blocks into periods; remaining samples are kept for the next block.
-
-    Parameters
-    ----------
-    drives
-        Periods of the drive in one of the motion.
-    """
+    """Divides blocks into periods of ``drives`` periods of the drive; keeps the rest for the next block."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz
@@ -173,12 +167,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
     """Fourier coefficients over each of the periods that begin at ``starts`` (in samples, not whole).
 
     The integral up to a place between two samples is a cubic through both of its values and slopes,
-    so that a period need not be a whole number of samples.
-
-    Parameters
-    ----------
-    turns
-        Cycles per sample.
+    so that a period need not be a whole number of samples. ``turns`` are cycles per sample.
     """
     sample = np.arange(len(signal))
     low = np.minimum(starts.astype(np.int64), len(signal) - 2)

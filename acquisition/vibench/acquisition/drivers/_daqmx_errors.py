@@ -114,13 +114,7 @@ _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_
 
 @contextmanager
 def daqmx_call(doing: str) -> Iterator[None]:
-    """Turn any failure of the DAQmx client into an error with the action and advice.
-
-    Parameters
-    ----------
-    doing
-        ``"reading cDAQ1Mod1"``: the start of the sentence.
-    """
+    """Turn any failure of the DAQmx client into an error with advice; ``doing`` starts its sentence."""
     try:
         yield
     except AcquisitionError:

@@ -92,12 +92,7 @@ def programs_without_engine() -> tuple[Program, ...]:
 def the_engine(pid: int | None) -> Announcement:
     """Return the engine with this process number, or the only one.
 
-    Raises EngineError when there is none, or more than one and none was named.
-
-    Parameters
-    ----------
-    pid
-        Number of its process; None: the only one.
+    Raises EngineError when there is none, or more than one and ``pid`` is None.
     """
     chosen = [each for each in announced_engines() if pid in (None, each.pid)]
     if chosen:
@@ -118,12 +113,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     themselves.
 
     Those of other containers on this computer are among them; what is left in the state folder reaches
-    them. Raises EngineError when there is none.
-
-    Parameters
-    ----------
-    pid
-        Number of a process; None: all of this computer.
+    them. Raises EngineError when there is none. ``pid`` selects one; None: all of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained)
@@ -142,12 +132,7 @@ def out_of_reach() -> str:
 def require_ended(engine: Announcement) -> None:
     """Refuse to continue after an engine that was killed: nobody has confirmed that its output is off.
 
-    Raises EngineGone when it was killed; the sentence says to switch the amplifier off.
-
-    Parameters
-    ----------
-    engine
-        As it announced itself.
+    Raises EngineGone when the announced ``engine`` was killed, with the advice to switch the amplifier off.
     """
     if engine.was_killed:
         raise EngineGone(f"The engine was killed. {SWITCH_OFF}")

@@ -134,12 +134,8 @@ _PRESENT_WORDS = {word: kind.word for kind in EXCITATION_KINDS.values() for word
 
 
 def present_word(word: str) -> str:
-    """Return the present name of a kind for a name in a file; an unknown name is returned unchanged.
-
-    Parameters
-    ----------
-    word
-        Name of a kind of excitation, of this version or of an earlier one.
+    """Return the present name of a kind of excitation for ``word``, a name of this or an earlier version; an
+    unknown name is returned unchanged.
     """
     return _PRESENT_WORDS.get(word, word)
 

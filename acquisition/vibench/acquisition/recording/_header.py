@@ -304,11 +304,5 @@ def _require_positive(name: str, value: float) -> None:
 
 
 def coupling_cut_hz(coupling: str) -> float:
-    """Return the -3 dB of a converter's coupling, first order [Hz].
-
-    Parameters
-    ----------
-    coupling
-        ``"AC"``, or ``"DC"``: direct voltage passes, and 0 is given.
-    """
+    """Return the -3 dB of a converter's ``coupling``, first order [Hz]; 0 for ``"DC"``."""
     return _AC_CUT_HZ if coupling == "AC" else 0.0

@@ -376,13 +376,7 @@ def noted_seals(path: Path) -> Mapping[str, str]:
 
 
 def opened(uri: str) -> sqlite3.Connection:
-    """Open a database; its transactions are started and ended by hand.
-
-    Parameters
-    ----------
-    uri
-        Address of the file with its mode, as SQLite spells it.
-    """
+    """Open the database at a SQLite ``uri``; its transactions are started and ended by hand."""
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
     return connection

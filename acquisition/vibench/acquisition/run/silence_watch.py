@@ -68,12 +68,8 @@ def check_figures(
 ) -> CheckFigures:
     """Compare the record before and during the sine of the check with expectations.
 
-    Raises CheckFailed with the deviation and advice.
-
-    Parameters
-    ----------
-    quiet, during
-        Volts before, and while, the sine plays: shape (channels, samples) each [V].
+    Raises CheckFailed with the deviation and advice. ``quiet`` and ``during`` are the volts before and while
+    the sine plays, shape (channels, samples) each [V].
     """
     quiet = quiet[:, round(STILL_SHARE * quiet.shape[1]) :]
     drive = _row(channels, Role.DRIVE_VOLTAGE)
@@ -96,10 +92,7 @@ def check_figures(
 def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
     """Amplitude of the sine at a known frequency: least squares beside a constant and a drift.
 
-    Parameters
-    ----------
-    volts
-        Shape (samples,) [V]; any length of more than a period.
+    ``volts`` has shape (samples,), more than a period.
     """
     time_s = np.arange(len(volts)) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s

@@ -66,12 +66,8 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     code = app.exec()
     if complaint := stored.complaint:
         sys.stderr.write(f"{printable(complaint)}\n")
-        return code or NOT_KEPT
+        code = code or 1
     return code
-
-
-NOT_KEPT = 1
-"""Exit code where the settings could not be written."""
 
 
 def load_ahead() -> None:
