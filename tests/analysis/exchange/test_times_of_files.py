@@ -179,7 +179,7 @@ UNITS_OF_TIME = {
     "time (msec)": 1e3,
     "time [ns]": 1e9,
     "Time [h]": 1 / 3600,
-    "Time [d]": 1,
+    "Time [d]": 1 / 86400,
 }
 COUNTS = ("Index", "Scan", "Sample")
 COLUMN_FAULTS = ("sound", "gap", "drop", "repeat", "swap", "restart", "drift", "rate")

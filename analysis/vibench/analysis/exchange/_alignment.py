@@ -353,7 +353,7 @@ def restarts(
 _APART = 0.1
 """Largest offset, in sample intervals, that channels analysed together may have."""
 _IGNORE = 'give time = "even" and sample_rate_hz in the mapping to ignore it'
-_UNITS = ("s", "ms", "us", "ns", "min", "h")
+_UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ SECONDS = {
     **dict.fromkeys(("ns", "nanosecond", "nanoseconds"), 1e-9),
     **dict.fromkeys(("min", "minute", "minutes", "minuten"), 60.0),
     **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
+    **dict.fromkeys(("d", "day", "days", "tage"), 86400.0),
 }
 """Length in seconds of a unit of time, by its text without regard to case."""
 
