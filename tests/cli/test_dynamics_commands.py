@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from vibench.acquisition import shipped
 from vibench.cli.__main__ import app
+from vibench.sim import ArcEnd
 
 
 def run(*arguments):
@@ -32,6 +33,14 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
     names = {each.name for each in (tmp_path / "out").iterdir()}
     assert names >= {"branches.h5", "branches.png", "branches.svg", "branches.csv"}
     assert "ever overwritten" in refused("branches", *options, "--out", tmp_path / "out")
+
+
+def test_branches_end_when_the_requested_time_is_over():
+    result = run("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert not found["is_complete"]
+    assert sum(each["end"] == ArcEnd.OUT_OF_TIME for each in found["branches"]) <= 1
 
 
 def test_branches_along_the_level_are_reported_in_sentences():

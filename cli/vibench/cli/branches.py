@@ -61,6 +61,9 @@ def branches(
     error: Annotated[
         str | None, option("Relative error to reach, as 1%, by a balance; shooting is far more exact.", "E")
     ] = None,
+    time_limit: Annotated[
+        str | None, option("Time to search, as 20s: the branches found by then.", "T", name="--time")
+    ] = None,
     holdable: Annotated[
         Path | None,
         option("Report which unstable motions the feedback of this bench can hold.", "BENCH.toml"),
@@ -74,7 +77,8 @@ def branches(
         if resonance is None
         else _resonance(amplitude, frequency, like, resonance)
     )
-    wish = {} if error is None else {"error": error}
+    wishes = (("error", error), ("time_s", time_limit))
+    wish = {name: value for name, value in wishes if value is not None}
     request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive, **wish)
     if holdable is not None:
         lowest_hz = request.start if request.along is Parameter.FREQUENCY else request.frequency_hz
@@ -96,7 +100,7 @@ def branches(
     lines, elapsed_s, is_complete = compute_parts(branch_lines(request), print_branch)
     diagram = BranchDiagram(request, lines, elapsed_s)
     if as_json:
-        print_answer(diagram.to_dict(), is_complete=is_complete)
+        print_answer(diagram.to_dict(), is_complete=is_complete and diagram.is_complete)
     else:
         console.print(f"{diagram.cost_sentence} {diagram.holding_sentence}".rstrip())
     keep(

@@ -183,10 +183,16 @@ class BranchDiagram(Labelled):
         return float(max(errors, default=float("nan")))
 
     @property
+    def is_complete(self) -> bool:
+        """Whether everything was searched and followed within the requested time."""
+        return self.request.time_s is None or self.elapsed_s < self.request.time_s
+
+    @property
     def cost_sentence(self) -> str:
         """Return a sentence on number, error and cost of the branches."""
+        over = "" if self.is_complete else " The time was over: there may be more branches and motions."
         if not self.lines:
-            return f"{self._none_found}; {self.elapsed_s:.1f} s."
+            return f"{self._none_found}; {self.elapsed_s:.1f} s.{over}"
         isolated = sum(line.is_isolated for line in self.lines)
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
         wanted, reached = self.request.error, ""
@@ -196,7 +202,7 @@ class BranchDiagram(Labelled):
         return (
             f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
             f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the "
-            f"middle of the worst branch, {worst:.1g} at the worst point.{reached}"
+            f"middle of the worst branch, {worst:.1g} at the worst point.{reached}{over}"
         )
 
     @property

@@ -1,5 +1,6 @@
 """Request for branches: a specimen, a range of frequency or level, and a method."""
 
+import math
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Self
@@ -19,7 +20,7 @@ from vibench.sim import (
     RigidStops,
 )
 from vibench.sim.branches import MotionSearch
-from vibench.sim.study import TargetError
+from vibench.sim.study import TargetError, TargetTime
 
 from ..errors import NotEnoughData
 from ..signals.arrays import Reals
@@ -58,6 +59,8 @@ class BranchRequest(SpecimenChoice):
     error: TargetError | None = None
     """Relative error of every motion, 0.01 or "1 %"; by default 1e-4 of the fundamental of p. Shooting
     always reaches 1e-8; a balance uses as many harmonics as needed."""
+    time_s: TargetTime | None = None
+    """Time to search and follow, 20 or "20 s"; the branches found by then are the result."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of a balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
@@ -116,11 +119,11 @@ class BranchRequest(SpecimenChoice):
         if not low_hz < high_hz:
             raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; give the lower first")
         lower, upper = self.shaken.gaps_m
-        followed = self.along, self.method
-        if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING) or lower != upper:
+        followed = self.along, self.method, self.time_s
+        if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
             raise ValueError(
-                "a phase resonance is followed along amplitude, by shooting, between two equal stops; give a "
-                "range of amplitudes, and a specimen with one gap"
+                "a phase resonance is followed along amplitude, by shooting, between two equal stops, to its "
+                "end; give a range of amplitudes, a specimen with one gap, and no time"
             )
 
     @property
@@ -137,7 +140,11 @@ class BranchRequest(SpecimenChoice):
     def search(self) -> MotionSearch:
         """Settings of the search."""
         return MotionSearch(
-            places=self.places, starts=self.starts, most_periods=self.most_periods, seed=self.seed
+            places=self.places,
+            starts=self.starts,
+            most_periods=self.most_periods,
+            seed=self.seed,
+            time_s=math.inf if self.time_s is None else self.time_s,
         )
 
     @property

@@ -1,6 +1,8 @@
 """Branches of harmonic balances, from first-order solutions of a power law or from exact motions."""
 
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 from ..periodic.balance_branch import (
@@ -51,6 +53,7 @@ def balanced_branches(
     ------
     Branches of the drive's own period: subharmonic motions have no such balance.
     """
+    steps = replace(steps, until_s=time.monotonic() + search.time_s)
     structure, spring = structure_of(specimen), spring_of(specimen)
     shape = OrbitShape.MIRRORED if options.kept is HarmonicSet.ODD else OrbitShape.REPEATED
 
@@ -58,12 +61,12 @@ def balanced_branches(
         branch = balance_branch_within(structure, spring, start.motion, path, low, high, options, steps)
         return FoundBranch(branch, shape, periods=1, origin=start.origin, has_twin=False)
 
-    starts = partial(_starts, specimen, options, search)
-    return branches_from(specimen, path, (low, high), search, starts, follow, lambda _: ())
+    starts = partial(_starts, specimen, options, search, steps.until_s)
+    return branches_from(specimen, path, (low, high), search, starts, follow, lambda _: (), steps.until_s)
 
 
 def _starts(
-    specimen: Specimen, options: BalanceOptions, search: MotionSearch, drive: Harmonic
+    specimen: Specimen, options: BalanceOptions, search: MotionSearch, until_s: float, drive: Harmonic
 ) -> Iterator[BranchStart[Balance]]:
     structure, spring = structure_of(specimen), spring_of(specimen)
     where = drive.frequency_hz, drive.amplitude_m
@@ -74,7 +77,7 @@ def _starts(
                 if found.outcome is not BalanceEnd.NO_SOLUTION:
                     yield BranchStart(found, BranchOrigin.FIRST_ORDER, drive, found.state[None, :])
         case _:
-            for orbit in periodic_motions(specimen, drive, search):
+            for orbit in periodic_motions(specimen, drive, search, until_s):
                 if orbit.period_map.periods > 1:
                     continue
                 found = balance(structure, spring, *where, options, orbit_guess(orbit))

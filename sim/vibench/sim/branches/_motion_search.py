@@ -1,5 +1,7 @@
 """Periodic motions at one drive, from many starts: from rest, between the stops, and at random. SI units."""
 
+import math
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -41,6 +43,8 @@ class MotionSearch:
     """Longest period to search, in drive periods."""
     most_branches: int = 60
     seed: int = 1
+    time_s: float = math.inf
+    """Time to search and follow [s]; the branch followed then is left where it is."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -55,7 +59,9 @@ class MotionSearch:
             )
 
 
-def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[PeriodicOrbit]:
+def periodic_motions(
+    specimen: Specimen, drive: Harmonic, search: MotionSearch, until_s: float = math.inf
+) -> Iterator[PeriodicOrbit]:
     """Find periodic motions at one drive, mainly stable ones.
 
     Each start is integrated for ``search.settling_periods``. If it then nearly repeats, Newton's iteration
@@ -67,10 +73,14 @@ def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) 
         The drive's phase must be zero.
     search
         Starts and their seed.
+    until_s
+        Instant of `time.monotonic` after which no start is tried [s].
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []
     for start in _starts(specimen, drive, search):
+        if time.monotonic() > until_s:
+            return
         orbit = _orbit_from(specimen, drive, start, search)
         if orbit is None:
             continue

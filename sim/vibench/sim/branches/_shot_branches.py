@@ -99,14 +99,17 @@ def branches_from(
     starts: Callable[[Harmonic], Iterator[BranchStart[M]]],
     follow: Callable[[BranchStart[M]], FoundBranch],
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
+    until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Follow branches from every start on no known branch, and from their bifurcations."""
+    """Follow branches from every start on no known branch, and from their bifurcations, until an instant."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
         for start in starts(Harmonic(*path.drive(float(value)))):
             fresh = [start]
             while fresh and len(known) < search.most_branches:
+                if time.monotonic() > until_s:
+                    return
                 one = fresh.pop()
                 if any(lies_on(each, specimen, path, one.drive, one.states) for each in known):
                     continue
@@ -158,9 +161,10 @@ def shot_branches(
     Branches with the stability, the events and the error of each point; chaos and quasi-periodic motions
     are none.
     """
+    steps = replace(steps, until_s=time.monotonic() + search.time_s)
 
     def starts(drive: Harmonic) -> Iterator[BranchStart[PeriodicOrbit]]:
-        for orbit in periodic_motions(specimen, drive, search):
+        for orbit in periodic_motions(specimen, drive, search, steps.until_s):
             yield _start(orbit, BranchOrigin.SEARCH)
 
     def leaving(found: FoundBranch) -> Iterator[BranchStart[PeriodicOrbit]]:
@@ -173,7 +177,7 @@ def shot_branches(
         has_twin = lower == upper and shape is OrbitShape.REPEATED and periods % 2 == 1
         return FoundBranch(branch, shape, periods, start.origin, has_twin)
 
-    return branches_from(specimen, path, (low, high), search, starts, follow, leaving)
+    return branches_from(specimen, path, (low, high), search, starts, follow, leaving, steps.until_s)
 
 
 def _start(orbit: PeriodicOrbit, origin: BranchOrigin) -> BranchStart[PeriodicOrbit]:

@@ -287,8 +287,8 @@ def _follow_at(
         # The first point is known already if a finer resolution took over.
         gathered.reports.append(first)
     for here in points:
-        if here.end is ArcEnd.STEP_TOO_SHORT:
-            return None, here
+        if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
+            return (None if here.end is ArcEnd.STEP_TOO_SHORT else here.end), here
         report = family.report(here.point)
         if is_joined(signs, report.signs) and not here.is_fold:
             _add_simpler_end(family, before, here, signs, steps, gathered)

@@ -7,6 +7,7 @@ tangent's last component changes sign. Unknowns and parameter should be scaled t
 """
 
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -42,6 +43,8 @@ class ArcSteps:
     tolerance: float = 1e-10
     """Largest residual of a point on the curve."""
     most_points: int = 2000
+    until_s: float = math.inf
+    """Instant of `time.monotonic` after which a curve is not continued [s]."""
 
 
 class ArcEnd(StrEnum):
@@ -51,6 +54,7 @@ class ArcEnd(StrEnum):
     CLOSED = "the branch closed on itself: an isolated one"
     JOINED = "the motion became one of a shorter period or a higher symmetry, whose branch goes on"
     TOO_MANY_POINTS = "more points than allowed: raise most_points, or lengthen the longest step"
+    OUT_OF_TIME = "the requested time was over"
     STEP_TOO_SHORT = (
         "no solution within the shortest step: a kink or an end of the branch, or too few harmonics"
     )
@@ -155,6 +159,9 @@ def trace(
     yield here
     step, slow, leapt_at = steps.first, 0, -math.inf
     for _ in range(steps.most_points):
+        if time.monotonic() > steps.until_s:
+            yield _arc_end(here, ArcEnd.OUT_OF_TIME)
+            return
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
