@@ -14,7 +14,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.acquisition.rig import channels_of, load_rig, specimen_of
+from vibench.acquisition.rig import Rig, channels_of, load_rig, specimen_of
 from vibench.sim import Specimen
 from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
@@ -87,6 +87,20 @@ def noisy(times, seed, dropouts_per_s=0.0):
     return RIG.model_copy(update={"virtual": virtual})
 
 
+def with_sensor(rig, role):
+    """Give the rig a further sensor in place of the amplifier's wire."""
+    said = rig.model_dump(mode="json")
+    (wire,) = [each for each in said["daq"]["channels"] if each["role"] == "amplifier_voltage"]
+    wire.update(role=role, attenuation=1.0, range_v=5.0)
+    sheets = {"velocity": ("250 mm/s/V", 1e-7), "acceleration": ("10 mV/g", 3e-5)}
+    sensitivity, noise = sheets[role.partition("_")[2]]
+    said["sensors"][role] = {
+        "model": role, "sensitivity": sensitivity, "full_scale_v": 5.0, "calibrated": "2026-02-10",
+        "noise_per_rthz": {"value": noise, "source": "test"},
+    }  # fmt: skip
+    return Rig.model_validate(said)
+
+
 def contacts(p, gaps_m):
     """Find when |p| passed a gap, in grid steps: beginnings and ends in the order of time."""
     found = []
@@ -142,9 +156,12 @@ def shaken(
     dropouts_per_s=0.0,
     rate_hz=51_200.0,
     specimen=None,
+    further=None,
 ):
     """Let the world move a specimen, and write what the converter saw as a recording."""
     rig = noisy(noise, seed, dropouts_per_s)
+    if further is not None:
+        rig = with_sensor(rig, further)
     world = World(rig, Played(drive(kind, level_vpp, duration_s, seed)), specimen)
     world.keep_truth()
     inputs = tuple(

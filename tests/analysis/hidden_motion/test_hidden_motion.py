@@ -10,6 +10,10 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from vibench.analysis.hidden_motion import Hidden, Numbers, hidden_motion
+from vibench.analysis.hidden_motion._hidden_motion import hidden_motion_of
+from vibench.analysis.hidden_motion._measured_masses import measured_masses
+from vibench.analysis.hidden_motion._prepared_motion import prepared_motion
+from vibench.analysis.hidden_motion._tracking_model import tracked_specimen
 from vibench.sim import HuntCrossley, LinearGap, RigidStops, gong2025
 
 SCORED_FROM_S = 0.4
@@ -319,3 +323,38 @@ def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
     assert len(tables["hidden_impacts_shaken"].column("impulse_ns")) == motion.tracked.collisions.count
     free = tables["hidden_impacts_without_contact_model_shaken"]
     assert np.nanmedian(free.column("gap_m")) == pytest.approx(45e-6, abs=0.5e-6)
+
+
+@pytest.mark.parametrize(
+    ("further", "confirms"), [("m2_velocity", True), ("m1_velocity", True), ("m2_acceleration", None)]
+)
+def test_a_sensor_on_another_mass_confirms_a_right_track_or_cannot_tell(world_recording, further, confirms):
+    """Collisions on m2 were taken for drop-outs of its vibrometer, and bridging them took minutes."""
+    motion = told(world_recording(260.0, 1.5, further=further), numbers=Numbers.AS_DESCRIBED)
+    (check,) = motion.mass_checks
+    assert (check.channel, check.confirms) == (further, confirms)
+    assert motion.is_confirmed
+    assert motion.to_dict()["measured_masses"][0]["confirms"] is confirms
+    assert check.sentence in motion.sentences
+    if confirms:
+        assert (check.scale, check.unexplained) == (
+            pytest.approx(1.0, abs=0.005),
+            pytest.approx(0.0, abs=0.01),
+        )
+
+
+@pytest.mark.parametrize(("scale", "late"), [(0.8, 0), (1.0, 40)])
+def test_a_sensor_on_another_mass_refutes_a_track_with_another_amplitude_or_phase(
+    world_recording, scale, late
+):
+    """Nothing then has bounds, since either the track or the sensor is wrong."""
+    recorded = world_recording(260.0, 1.5, further="m2_velocity")
+    with open_recording(recorded.path) as recording:
+        motion = prepared_motion(recording, 0, recording.samples)
+        (mass,) = measured_masses(recording, motion)
+    mass.velocity = scale * np.roll(mass.velocity, late)
+    found = hidden_motion_of(motion, tracked_specimen(recorded.specimen), None, "shaken", masses=(mass,))
+    (check,) = found.mass_checks
+    assert (check.confirms, found.is_confirmed, found.to_dict()["p_sd_m"]) == (False, False, None)
+    assert np.isnan(found.free.p_sd).all()
+    assert any("refutes the track" in each for each in found.sentences)

@@ -1,7 +1,7 @@
 """Hidden motion of one recording, tracked and without a contact model."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -27,6 +27,7 @@ from ._contact_free import (
 )
 from ._filtering import motion_model
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit, without_values
+from ._measured_masses import MassCheck, MeasuredMass, measured_masses
 from ._parameters import Hidden, Numbers
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
 from ._tracking import NotFollowed, TrackedPiece, follow
@@ -61,6 +62,12 @@ class TrackedMotion(Labelled):
         """Share of samples with a track."""
         return float(np.mean(~np.isnan(self.p)))
 
+    @property
+    def median_sd_m(self) -> float | None:
+        """Median standard deviation of p; None without a track, or if a sensor refutes it."""
+        known = self.p_sd[~np.isnan(self.p_sd)]
+        return float(np.median(known)) if known.size else None
+
 
 @dataclass(frozen=True, eq=False)
 class HiddenMotion(Labelled):
@@ -79,6 +86,8 @@ class HiddenMotion(Labelled):
     free: FreeMotion
     free_gaps: tuple[FreeGap | None, FreeGap | None]
     """Lower and upper gap without a contact model."""
+    mass_checks: tuple[MassCheck, ...] = ()
+    """The track against sensors on m1 and m2, if recorded."""
 
     @property
     def time_s(self) -> Reals:
@@ -93,6 +102,8 @@ class HiddenMotion(Labelled):
     @property
     def is_confirmed(self) -> bool:
         """Return whether the parameters were given or found; otherwise results have no bounds."""
+        if any(each.confirms is False for each in self.mass_checks):
+            return False
         return self.found is None or any(each.is_determined for each in self.found.parameters)
 
     @property
@@ -106,7 +117,8 @@ class HiddenMotion(Labelled):
             "share_followed": self.tracked.share_followed,
             "impacts": self.tracked.collisions.count,
             "innovation_level": finite(self.tracked.innovation_level),
-            "p_sd_m": finite(float(np.nanmedian(self.tracked.p_sd))) if self.tracked.share_followed else None,
+            "p_sd_m": self.tracked.median_sd_m,
+            "measured_masses": [{**asdict(each), "confirms": each.confirms} for each in self.mass_checks],
             "not_followed": [
                 {
                     "start_s": (self.first_sample + each.first) / self.sample_rate_hz,
@@ -190,7 +202,8 @@ def hidden_motion(
     if numbers is Numbers.FOUND:
         stage(observer, f"{name}: finding gaps and m1")
         found = found_specimen(described, motion)
-    return hidden_motion_of(motion, described if found is None else found.tracked, found, name, observer)
+    tracked, masses = described if found is None else found.tracked, measured_masses(recording, motion)
+    return hidden_motion_of(motion, tracked, found, name, observer, tuple(masses))
 
 
 def hidden_motion_in_samples(
@@ -242,12 +255,15 @@ def hidden_motion_of(
     found: FoundSpecimen | None,
     name: str,
     observer: Observer = ignore_progress,
+    masses: Sequence[MeasuredMass] = (),
 ) -> HiddenMotion:
-    """Apply both methods to a prepared motion."""
+    """Apply both methods to a prepared motion, and check the track by sensors on other ``masses``."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
-    followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples))
-    why_not = _fault_of_numbers(followed)
+    followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples), masses)
+    found_checks = (each.check(followed.innovation_level) for each in masses)
+    checks = tuple(each for each in found_checks if each is not None)
+    why_not = _fault_of_numbers(followed, checks)
     if found is not None and why_not:
         found = without_values(found, why_not)
     on_free = stage(observer, f"{name}: hidden motion without a contact model")
@@ -262,9 +278,13 @@ def hidden_motion_of(
         followed,
         free,
         free_gaps(free.impacts),
+        checks,
     )
     if found_motion.is_confirmed:
         return found_motion
+    if any(each.confirms is False for each in checks):
+        refuted = replace(followed, p_sd=np.full_like(followed.p_sd, np.nan))
+        found_motion = replace(found_motion, tracked=refuted)
     return replace(found_motion, free=replace(free, p_sd=np.full_like(free.p_sd, np.nan)))
 
 
@@ -279,7 +299,11 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
 
 
 def _tracked_motion(
-    motion: PreparedMotion, tracked: TrackedSpecimen, found: FoundSpecimen | None, told: Callable[[int], None]
+    motion: PreparedMotion,
+    tracked: TrackedSpecimen,
+    found: FoundSpecimen | None,
+    told: Callable[[int], None],
+    masses: Sequence[MeasuredMass],
 ) -> TrackedMotion:
     model = motion_model(tracked, motion)
     # Single precision is enough and halves the memory.
@@ -294,6 +318,8 @@ def _tracked_motion(
                 p[place], rate[place] = part.smoothed.p, part.smoothed.rate
                 sd[place] = np.sqrt(part.smoothed.variances[:, 0])
                 collisions.append(collisions_of(model, motion, part))
+                for each in masses:
+                    each.add(part)
                 here = part.run.squared
                 squared += float(np.nansum(here))
                 used += int(np.count_nonzero(~np.isnan(here)))
@@ -312,8 +338,11 @@ def _tracked_motion(
     )
 
 
-def _fault_of_numbers(tracked: TrackedMotion) -> str:
+def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> str:
     """Return the reason why the parameters cannot be the specimen's, if there is one."""
+    for each in checks:
+        if each.confirms is False:
+            return f"{each.channel} refutes a track with the numbers that were found"
     told = ~np.isnan(tracked.p)
     held = float(np.mean(told[int(np.argmax(told)) :]))
     if held < _LEAST_HELD:
@@ -359,12 +388,13 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
         f"{motion.name}: p was tracked in {100 * tracked.share_followed:.4g} % of "
         f"{tracked.p.size / rate:.3g} s, impacts: {tracked.collisions.count}"
         + (
-            f"; standard deviation of p {MICRO * float(np.nanmedian(tracked.p_sd)):.2g} µm"
-            if tracked.share_followed
-            else ""
+            ""
+            if tracked.median_sd_m is None
+            else f"; standard deviation of p {MICRO * tracked.median_sd_m:.2g} µm"
         )
         + "."
     )
+    yield from (each.sentence for each in motion.mass_checks)
     for reason in dict.fromkeys(each.reason for each in tracked.not_followed):
         total = sum(each.stop - each.first for each in tracked.not_followed if each.reason == reason)
         yield f"Not followed for {total / rate:.3g} s: {reason}."

@@ -20,6 +20,7 @@ RESPONSE_ROLES = tuple(role.value for role in ROLES)
 """Channels of the motion of m0 in the order of preference."""
 ACCELERATION, DISPLACEMENT = "acceleration", "displacement"
 _MOTIONS = ("velocity", ACCELERATION, DISPLACEMENT)
+_COLLIDING = ("m1", "m2")
 LOWEST_INTEGRATED_HZ = 5.0
 """Lowest frequency of exact integration [Hz]; below it, the velocity fades to zero."""
 _HELD_S, _REACH_S = 0.2, 1.0
@@ -123,10 +124,17 @@ class ResponseChannel:
         """Number of samples on either side that a velocity depends on."""
         return self._kernel.size // 2
 
+    @property
+    def noise_gain(self) -> float:
+        """Rms noise of the velocity over that of the channel, if that is white."""
+        return float(np.linalg.norm(self._kernel)) if self._kernel.size else 1.0
+
     def read(self, start: int, stop: int) -> Reals:
         """Return velocities [m/s], shape (samples,); lost samples are NaN, drop-outs are bridged."""
-        if self.quantity not in _CONVERSIONS:
+        if self._may_drop_out:
             return BridgedChannel(self.recording, self.role).read(start, stop)
+        if self.quantity not in _CONVERSIONS:
+            return self.recording.read(self.role, start, stop)
         size = max(_BLOCK_REACHES * self._kernel.size, _LEAST_BLOCK)
         parts = [np.empty(0)]
         for number in range(start // size, -(-stop // size)):
@@ -137,9 +145,14 @@ class ResponseChannel:
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
         """Return the drop-outs in these samples; only vibrometers have them."""
-        if self.quantity in _CONVERSIONS:
+        if not self._may_drop_out:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
+
+    @property
+    def _may_drop_out(self) -> bool:
+        """Whether jumps of the signal are drop-outs: those of m1 and m2 are collisions."""
+        return self.quantity not in _CONVERSIONS and self.role.partition("_")[0] not in _COLLIDING
 
     def _velocities(self, number: int, size: int) -> Reals:
         if self._block is None or self._block[0] != number:
