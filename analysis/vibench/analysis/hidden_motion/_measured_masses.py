@@ -8,6 +8,7 @@ from scipy.ndimage import maximum_filter1d
 
 from vibench.acquisition.recording import Recording
 
+from ..errors import UnusableData
 from ..recordings.channels import BASE
 from ..recordings.response import ResponseChannel, response_roles
 from ..signals.arrays import Reals
@@ -107,7 +108,10 @@ def measured_masses(recording: Recording, motion: PreparedMotion) -> Iterator[Me
     for role in response_roles(recording):
         if role[:2] not in _RATES:
             continue
-        channel = ResponseChannel(recording, role)
+        try:
+            channel = ResponseChannel(recording, role)
+        except UnusableData:  # too short for an integral
+            continue
         weights = sensor_correction(
             recording.bench, recording.channel(BASE), recording.channel(role), rate_hz
         ).velocity
