@@ -203,11 +203,6 @@ def _following(
     if status.bench is None:
         raise EngineError("the bench was closed before the twin could read it; start the twin again")
     roles = [each.role for each in status.bench.channels]
-    if not {"base_acceleration", "m0_velocity"} <= set(roles):
-        raise EngineError(
-            f"the live twin needs base_acceleration and m0_velocity, and the bench has {', '.join(roles)}; "
-            "analyse the recordings instead"
-        )
     known_as = specimen_of(rig) if specimen is None else read_specimen(specimen).specimen()
     baseline = kept_baseline(baseline_path(rig, known_as))
     live = LiveTwin(
