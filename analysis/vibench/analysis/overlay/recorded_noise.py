@@ -106,7 +106,7 @@ def unseen_noise(
         return UnseenNoise(), noise
     volts, base, _ = silence_before(channels)
     cycles = np.fft.rfftfreq(max(volts.size, 1))
-    frequency_hz = cycles * channels.sample_rate_hz
+    frequency_hz: Reals = np.asarray(cycles * channels.sample_rate_hz, dtype=np.float64)
     inside = (frequency_hz >= _HEARD_HZ[0]) & (frequency_hz <= _HEARD_HZ[1]) & (cycles < _BAND[1])
     lines = int(np.sum(inside))
     if lines < _FEWEST_LINES:
@@ -141,5 +141,6 @@ def unseen_noise(
 def _base_over_voltage(rig: DrivenRig, frequency_hz: Reals) -> Complexes:
     """Return the recorded acceleration of the base over the recorded voltage; 0 at 0 Hz."""
     table, above = rig.table, frequency_hz[1:]
-    moved = acceleration_per_volt(table.shaker, 2j * np.pi * above, carried_mass(table.specimen, above))
+    s: Complexes = np.asarray(2j * np.pi * above, dtype=np.complex128)
+    moved = acceleration_per_volt(table.shaker, s, carried_mass(table.specimen, above))
     return np.concatenate(([0.0], table.amplifier.gain * table.base_sensor(above) * moved))
