@@ -136,9 +136,10 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
     said = [
         (
             f"Sweep at {analysis.excitation.amplitude_vpp:g} Vpp from {found.frequency_hz[0]:.0f} to "
-            f"{found.frequency_hz[-1]:.0f} Hz, {analysis.rate_text}; the base moved by A0 = "
+            f"{found.frequency_hz[-1]:.0f} Hz; the base moved by A0 = "
             f"{amplitudes[0]:.3g} µm at the beginning and {amplitudes[-1]:.3g} µm at the end."
         ),
+        f"The frequency was {analysis.rate_text}.",
         f"Grey: {regions_text(analysis.collisions)}.",
         f"Response II has {jumps_text(analysis.jumps)}.",
     ]
