@@ -63,7 +63,7 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
     """Yield curves of the steps up and of the steps down, since they differ between jumps."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
-        return  # several levels at one frequency are no curve
+        return  # several levels at one frequency do not form a curve over frequency
     directions = np.array(found.direction)
     for direction in dict.fromkeys(found.direction):
         at = directions == direction

@@ -60,7 +60,7 @@ def run_text(laid: AbstractOverlay[Any]) -> str:
             f"Simulated under the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
             f"median difference {laid.difference.median_abs_db:.2g} dB, "
             f"{100 * laid.difference.share_within_two:.0f} % of the values within two standard errors. The "
-            "recorded base does not yield to the simulated specimen's blows, so that in chaos the two differ."
+            "simulated impacts do not move the recorded base, so that in chaos the two differ."
         )
     said = [
         (

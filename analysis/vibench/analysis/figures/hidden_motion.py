@@ -109,10 +109,10 @@ def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
         title=f"Collisions of {motion.name}",
         caption=(
             "Above left: impulse of every impact on m1 (tracked; crosses without a contact model). "
-            "Above right: force of a stop against penetration, as tracking measured it, with bounds of 95 % "
-            "where it was told. Below left: energy of relative motion that an impact took, of what it had, "
-            "without a contact model. Below right: gap as each impact measured it without a contact model, "
-            "and the gaps that were tracked with (orange)."
+            "Above right: force of a stop over penetration from tracking, with 95 % bounds where determined. "
+            "Below left: share of the energy of relative motion that each impact dissipated, without a "
+            "contact model. Below right: gap from each impact without a contact model, and the gaps used for "
+            "tracking (orange)."
         ),
         figure=figure,
         tables=(*_impact_tables(motion), *law),

@@ -171,7 +171,7 @@ def regions_text(found: Collisions) -> str:
         start, stop = region.start, region.stop
         middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
         begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
-        # Collisions continue by chance, so that their end in one run is not an edge with bounds.
+        # How long collisions continue is random, so their end in one run has no bounds.
         end = f"{stop.frequency_hz:.1f} Hz in this run"
         first = "the sweep's beginning" if region.reaches_start else begin
         last = "the sweep's end" if region.reaches_stop else end

@@ -124,7 +124,7 @@ def limits(results: CampaignResults) -> Iterator[str]:
         lows_hz = [each.base_band_hz[0] for each in laid if each.base_band_hz is not None]
         yield (
             f"The simulation takes the damping as c = {damping:.3g} s · k and a gap of "
-            f"{gaps} µm. The paper leaves the damping open; other readings of it give "
+            f"{gaps} µm. The paper does not state the damping; other values give "
             "other collision regions."
         )
         if lows_hz:

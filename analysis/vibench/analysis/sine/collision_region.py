@@ -29,7 +29,7 @@ _SMOOTH_AT_MOST = 0.1
 """Residual over order 1 that excludes a smooth motion in any case."""
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
-"""Residual over threshold that is certain."""
+"""Ratio of residual to threshold above which collisions are certain."""
 _VOTE_S = 1.0
 """Length of the neighbourhood that votes on an interval, because collisions last."""
 _MERGE_S = 3.0
