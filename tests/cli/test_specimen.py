@@ -93,7 +93,7 @@ def one_sided(folder):
 
 
 @pytest.mark.timeout(300)
-def test_a_specimen_with_a_stop_on_one_side_goes_every_way(vibench_here, tmp_path):
+def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
     every_way_agrees(vibench_here, tmp_path, one_sided(tmp_path))
 
 

@@ -159,7 +159,7 @@ def test_masses_in_a_ratio_of_a_million_under_the_other_laws_agree_between_accur
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:1", "rigid:0.8", "rigid:1"])
 @pytest.mark.parametrize("frequency_hz", [60.0, 130.0, 300.0])
-def test_a_motion_that_grazes_within_a_hair_strikes_and_one_short_of_it_does_not(contact, frequency_hz):
+def test_a_motion_just_beyond_grazing_strikes_and_one_just_below_does_not(contact, frequency_hz):
     specimen = paper(contact)
     path = base_transmissibility(specimen, frequency_hz)[0, 3]
     omega = 2.0 * math.pi * frequency_hz

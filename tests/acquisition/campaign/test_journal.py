@@ -154,7 +154,7 @@ def test_a_file_that_is_refused_is_let_go(connections, tmp_path, use):
             connection.execute("SELECT 1")
 
 
-def test_a_journal_that_cannot_be_started_is_let_go(journal, connections):
+def test_a_journal_that_cannot_be_started_closes_its_connection(journal, connections):
     with pytest.raises(RecordingError, match="already exists"):
         Journal.begin(journal.path, CAMPAIGN, journal.bench)
     (connection,) = connections

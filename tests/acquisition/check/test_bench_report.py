@@ -148,7 +148,7 @@ def test_a_check_that_stalls_has_failed_and_nobody_has_stopped_it(bench_of, rig,
         bench_report(bench, tmp_path, StalledOnceItSounds(virtual.generator))
 
 
-def test_a_converter_that_hands_over_nothing_ends_the_check_in_silence(bench_of, rig, tmp_path, monkeypatch):
+def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of, rig, tmp_path, monkeypatch):
     with bench_of(rig) as (bench, virtual):
         read, blocks = type(bench.digitizer).read, iter(range(100))
 

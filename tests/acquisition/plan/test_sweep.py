@@ -222,7 +222,7 @@ class TestChains:
         ),
     ],
 )
-def test_a_sweep_that_cannot_be_is_refused_with_what_is_allowed(sweep, said):
+def test_an_invalid_sweep_is_refused_with_the_allowed_values(sweep, said):
     with pytest.raises(ConfigurationError, match=said):
         campaign(**sweep)
 

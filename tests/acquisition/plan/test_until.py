@@ -51,7 +51,7 @@ def test_a_bound_is_a_percentage_or_a_share(said, meant):
 
 
 @pytest.mark.parametrize("said", ["1", "1.2.3 %", "-1 %", "0 %", "100 %", "nan %", True, 0, 1.5, "", "٣ %"])
-def test_anything_that_is_no_bound_is_refused(said):
+def test_an_invalid_bound_is_refused(said):
     with pytest.raises(ValidationError):
         plan("dwell", {"response_i": said})
 

@@ -107,7 +107,7 @@ def test_a_run_that_keeps_every_limit_continues(rig, kept, frequency_hz, peaks, 
     watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
 
 
-def test_a_current_that_is_no_peak_too_high_but_lasts_trips_the_limiters_rms(rig):
+def test_a_lasting_current_below_the_peak_limit_trips_the_rms_limit(rig):
     weak = with_limiter(rig, 1.8)
     trip, _ = trip_of(monitor_of(weak), sine_blocks(weak, 300.0, 6.0, amplifier_voltage=7.0))
     assert trip.quantity == "coil current (rms)"

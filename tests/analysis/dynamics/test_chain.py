@@ -94,7 +94,7 @@ def test_cells_take_turns_and_what_is_replaced_is_replaced_in_all():
         ({"start_hz": 10.0, "stop_hz": 300.0, "step_hz": 1e-3}, "take a larger step"),
     ],
 )
-def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(options, said):
+def test_an_invalid_request_is_refused_in_one_sentence(options, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**options)
 

@@ -76,7 +76,7 @@ def test_under_a_table_too_heavy_to_move_the_multipliers_match_the_branch():
 
 
 @pytest.mark.thorough
-def test_so_they_are_among_stops_whose_contacts_are_shorter_than_a_sample():
+def test_multipliers_match_the_branch_with_contacts_shorter_than_a_sample():
     stops = gong2025()
     found = impact_branch(stops, 1e-6, 97.5, (97.2, 98.7), "above")
     points = np.argsort(np.abs(found.multipliers[:, 0]))[[-1, -10]]

@@ -232,7 +232,7 @@ def actions(window, recording, long_recording, folder):
 @pytest.mark.thorough
 @pytest.mark.timeout(300)  # all that can be done: a minute idle, two with cold kernels beside other work
 @pytest.mark.usefixtures("_without_leftovers")
-def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(
+def test_no_action_on_a_page_blocks_the_event_loop_longer_than_its_bound(
     window, record, long_recording, tmp_path, qtbot, held_up
 ):
     window.context.folder.mkdir()

@@ -104,7 +104,7 @@ def test_a_long_chain_has_no_natural_frequency_within_a_gap():
         assert not np.any(inside)
 
 
-def test_frequencies_that_are_none_are_refused():
+def test_frequencies_below_or_at_zero_are_refused():
     with pytest.raises(ValueError, match=r"^Frequencies must be"):
         chain_transmissibility(chain_of(gong2025(), 2), [-1.0])
     with pytest.raises(ValueError, match=r"^Frequencies must be"):

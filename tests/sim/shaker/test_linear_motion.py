@@ -44,7 +44,7 @@ def followed(specimen, frequency_hz, volts):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_random_specimen_that_touches_nothing_moves_as_followed_in_time(seed):
+def test_without_contact_the_closed_form_equals_the_integration(seed):
     rng = np.random.default_rng(seed)
     specimen, frequency_hz = random_specimen(rng), rng.uniform(40.0, 600.0)
     linear = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)

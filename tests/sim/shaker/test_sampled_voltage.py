@@ -69,7 +69,7 @@ def test_a_long_recording_is_followed_in_pieces_without_a_seam():
     assert rough.max() < 1e-5 * np.abs(motion.base_acceleration).max()
 
 
-def test_sensors_are_seen_through():
+def test_the_response_of_the_sensors_is_included():
     rate_hz, tone_hz = 12_800.0, np.array([150.0])
     time_s = np.arange(round(5 * rate_hz)) / rate_hz
     volts = 1e-3 * np.cos(2 * np.pi * tone_hz[0] * time_s)

@@ -87,7 +87,7 @@ def test_where_the_start_is_kept_batches_answer_what_one_motion_alone_does_withi
     assert kept.count(MotionKind.PERIODIC) >= 3
 
 
-def test_what_batches_do_not_serve_is_answered_as_without_them():
+def test_scenes_that_batches_do_not_support_are_solved_without_them():
     drive, length = Harmonic(130.0, 20e-6), FixedDuration(2.0, 0.5)
     scenes = [
         Scene(gong2025(contact="rigid:0.5"), drive, duration=length, budget_s=0.0),

@@ -26,7 +26,7 @@ def test_the_largest_amplitude_is_checked_against_the_narrowest_gap():
 
 
 @pytest.mark.parametrize(("gaps_m", "count"), [((45.0,), 1), ((30e-6, float("inf")), 0), ((1e-3,), 0)])
-def test_a_gap_wider_than_a_specimen_is_doubted_unless_it_is_no_stop_at_all(gaps_m, count):
+def test_a_finite_gap_wider_than_a_specimen_gives_a_warning(gaps_m, count):
     found = said([5e-6], gaps_m)
     assert len(found) == count
     assert all(doubt.endswith("if 45 micrometres were meant, give 4.5e-05") for doubt in found)

@@ -241,7 +241,7 @@ def test_anyone_who_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_pat
     ("content", "said"),
     [(None, "does not exist, or is no file"), (b"", "is no readable HDF5"), (b"text", "is no readable HDF5")],
 )
-def test_anything_that_is_no_study_is_refused_in_one_sentence(tmp_path, content, said):
+def test_a_file_without_a_study_is_refused_in_one_sentence(tmp_path, content, said):
     path = tmp_path / "a.h5"
     if content is not None:
         path.write_bytes(content)

@@ -38,7 +38,7 @@ def test_what_a_study_does_not_vary_is_as_its_specimen_has_it():
     assert Study.model_validate_json(study.model_dump_json()) == study
 
 
-def test_a_study_of_an_earlier_file_has_its_structure_as_its_specimen():
+def test_the_structure_in_an_older_study_is_read_as_its_specimen():
     structure = {"masses_kg": [5e-3, 2e-3, 2e-3]}
     with pytest.warns(SpecimenWarning):
         assert Study(**LEAST, structure=structure).specimen.masses_kg == (5e-3, 2e-3, 2e-3)
