@@ -83,7 +83,7 @@ def test_anyone_who_comes_second_is_refused_and_the_next_day_comes_first(user, f
         "usb::0x699::0x0353::{}::0::instr",
     ],
 )
-def test_a_generator_is_one_however_it_is_written_and_whatever_reads_beside_it(user, resource):
+def test_one_generator_under_two_names_has_one_lock(user, resource):
     serial = "C012345"
     first = generator(resource=f"USB0::0x0699::0x0353::{serial}::INSTR")
     daq = first.daq.model_copy(update={"server": "another:31763"})

@@ -13,7 +13,7 @@ CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)
 
 @pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
 @pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
-def test_a_harmonic_of_m0_matches_a_base_which_moves_as_a_sine(harmonic, shift_rad):
+def test_a_harmonic_of_m0_is_measured_under_a_sinusoidal_base(harmonic, shift_rad):
     """Base U sin(w t), m0 X sin(n w t - 1.2), the vibrometer late: X/U exp(-1.2 i) from any moment on."""
     omega, order = 2 * np.pi * HERTZ, harmonic * 2 * np.pi * HERTZ
     base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))

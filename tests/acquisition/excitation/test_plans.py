@@ -246,7 +246,7 @@ def test_only_the_first_step_of_a_sweep_waits_so_that_it_is_one_segment():
     assert all(step.segment == steps[0].segment for step in steps)
 
 
-def test_a_tone_takes_up_the_phase_where_the_last_one_ended():
+def test_the_phase_is_continuous_from_one_tone_to_the_next():
     shown = SineSweep(amplitude_vpp=2, start_hz=100, stop_hz=140, duration_s=4, step_s=0.3).preview(51200)
     # A continuous sine of at most 140 Hz moves at most this much from sample to sample.
     assert np.max(np.abs(np.diff(shown.volts))) <= 2 * np.pi * 140 / 51200

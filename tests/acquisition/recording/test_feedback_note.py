@@ -73,7 +73,7 @@ def read(kind, text):
 
 
 @pytest.mark.parametrize(("kind", "text", "form"), WRITTEN)
-def test_a_note_of_an_older_recording_is_read_and_would_be_written_in_the_same_words(kind, text, form):
+def test_a_note_of_an_older_recording_is_read_and_written_back_unchanged(kind, text, form):
     note = read(kind, text)
     assert type(note) is form
     assert (note.kind, note.text) == (kind, text)

@@ -158,7 +158,7 @@ def test_a_stretch_outside_the_recording_is_refused_with_its_length(known, from_
         excerpt(known, (), from_s, to_s)
 
 
-def test_a_channel_that_is_not_there_is_refused_with_those_that_are(known):
+def test_a_missing_channel_is_refused_with_a_list_of_the_channels(known):
     with pytest.raises(RecordingError, match="it has drive_voltage, m0_velocity"):
         excerpt(known, ("velocity",))
 

@@ -83,7 +83,7 @@ def type_into(widget, text):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", FORMS)
-def test_a_bad_value_is_answered_with_the_name_and_the_unit_of_its_field(qtbot, name):
+def test_the_error_of_a_bad_value_has_the_name_and_unit_of_its_field(qtbot, name):
     form = FORMS[name]()
     qtbot.addWidget(form)
     assert form.value is not None, form.complaint  # a kind that is chosen begins with a test that can be made

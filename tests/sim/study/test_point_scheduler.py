@@ -27,7 +27,7 @@ def test_short_points_go_together_until_they_are_worth_the_trip():
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
 
 
-def test_a_point_counts_with_all_that_wait_for_it():
+def test_the_weight_of_a_point_includes_all_points_that_wait_for_it():
     # 0 <- 1 <- 2 take 6 s in a row; 3 alone takes 5 s.
     scheduler = scheduler_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
     assert scheduler.take(0.1, 1) == (0,)
