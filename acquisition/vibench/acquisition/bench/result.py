@@ -31,7 +31,7 @@ class Finding(FrozenModel):
 
     name: str = Field(min_length=1)
     value: str
-    """As people read it, with unit and uncertainty."""
+    """Value as text, with unit and uncertainty."""
     expected: str
     verdict: Verdict
     number: float | None = None

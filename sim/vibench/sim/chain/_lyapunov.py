@@ -87,7 +87,7 @@ def chain_lyapunov_exponent(
             f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
     tables = chain_tables(chain, drive, accuracy)
-    # Two motions.
+    # The limit of work covers both motions.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
