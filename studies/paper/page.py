@@ -97,7 +97,7 @@ def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str
 
 
 def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator[str]:
-    yield from ("# Which claims of the paper hold", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
+    yield from ("# Claims that hold", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
     yield from (found.options, found.made_with, "", found.sentence.replace(", ", ",\n"))
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
@@ -213,7 +213,7 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
     missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""
     return Page(
-        title="Which claims of the paper hold",
+        title="Claims that hold",
         about="Claims of Gong et al. (2025), measured on our simulation of their specimen.",
         warnings=(),
         findings=found.sentence + missing,

@@ -80,7 +80,7 @@ def reproduce(
 def _print_result(found: "Reproduction") -> None:
     from .paper.page import verdict_text
 
-    rows = Table(title="Which claims of the paper hold", title_justify="left")
+    rows = Table(title="Claims that hold", title_justify="left")
     rows.add_column("claim")
     rows.add_column("verdict")
     for each in found.judgements:
