@@ -20,7 +20,7 @@ RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.tom
 
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory):
-    """195 Hz from 0.1 to 0.8 Vpp and back; collisions at 0.2 Vpp end by chance, before or within its record."""
+    """195 Hz from 0.1 to 0.8 Vpp and back; collisions at 0.2 Vpp end by chance, early or late."""
     rig = RIG.model_copy(
         update={
             "daq": RIG.daq.model_copy(update={"sample_rate_hz": 5120.0}),
@@ -68,7 +68,8 @@ def test_the_largest_of_a_step_is_not_that_of_the_steps_beside_it(analysis):
     """Without contact the motion is a sine, and both responses are one."""
     found = analysis.response
     rising = [
-        way == "up" and level < 0.65 for way, level in zip(found.direction, found.amplitude_vpp, strict=True)
+        way == "up" and 0.15 < level < 0.65
+        for way, level in zip(found.direction, found.amplitude_vpp, strict=True)
     ]
     np.testing.assert_allclose(found.response_i[rising], found.response_ii[rising], rtol=5e-3)
 
