@@ -176,7 +176,7 @@ transmission_error turns_per_period up whole_stretches
 """
 PURE = set(_PURE.split())
 """Counts, shares, ratios, flags and numbers of samples: names that mean the same in every result."""
-_OF_A_SWEEP = ("linear_impacts", "linear_residual", "steady_over_swept")
+_OF_A_SWEEP = ("linear_ii", "linear_impacts", "linear_residual", "steady_over_swept")
 PURE_HERE = {
     *(f"ZeroOne.{name}" for name in ("k", "spread")),
     *(f"Evidence.{name}" for name in ("spread", "noise")),

@@ -5,12 +5,15 @@ import pytest
 
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis import InvalidRequest
+from vibench.analysis.sine.collision_region import collisions
 from vibench.analysis.sine.jumps import hysteresis, jumps
+from vibench.analysis.sine.sweep_analysis import smooth_jumps
 from vibench.sim import (
     BalanceOptions,
     BifurcationKind,
     FrequencyPath,
     LinearSweep,
+    base_transmissibility,
     gong2025,
     integrate,
     spring_of,
@@ -46,6 +49,49 @@ def test_a_steep_resonance_and_noise_are_no_jumps():
     noise = np.random.default_rng(1).standard_normal(TIME_S.size)
     assert jumps(TIME_S, FREQUENCY_HZ, resonance * np.exp(0.01 * noise)) == ()
     assert jumps(TIME_S, FREQUENCY_HZ, np.exp(0.3 * noise)) == ()
+
+
+@pytest.mark.parametrize("step_hz", [0.2, 0.4, 0.6, 1.1, 3.0])
+@pytest.mark.parametrize("ratio", [0.003, 0.017, 0.06])
+@pytest.mark.parametrize("noise", [1e-4, 1e-2])
+def test_a_resonance_with_few_intervals_is_no_jump(step_hz, ratio, noise):
+    frequency_hz = np.arange(220.0, 310.0, step_hz)
+    r = frequency_hz / 266
+    resonance = np.abs((1 + 2j * ratio * r) / (1 - r**2 + 2j * ratio * r))
+    scatter = noise * np.random.default_rng(0).standard_normal(r.size)
+    assert jumps(frequency_hz, frequency_hz, resonance * np.exp(scatter)) == ()
+
+
+@pytest.mark.parametrize("is_described", [True, False])
+@pytest.mark.parametrize("error", [1.0, 1.02])
+@pytest.mark.parametrize(
+    ("start_hz", "stop_hz", "duration_s"), [(220, 310, 8), (50, 600, 20), (600, 50, 60), (80, 110, 20)]
+)
+def test_the_ringing_of_a_linear_specimen_is_no_jump(start_hz, stop_hz, duration_s, error, is_described):
+    """Its description has modes at other frequencies (1.02), or is missing."""
+    specimen, rate, amplitude_m = gong2025(), 8192.0, 1e-8
+    run = integrate(
+        specimen, LinearSweep(start_hz, stop_hz, duration_s, amplitude_m), duration_s, sample_rate_hz=rate
+    )
+    slope = (stop_hz - start_hz) / duration_s
+    phase = 2 * np.pi * (start_hz * run.time_s + 0.5 * slope * run.time_s**2)
+    base = -amplitude_m * (2 * np.pi * (start_hz + slope * run.time_s)) ** 2 * np.sin(phase)
+    noise = 1e-9 * np.random.default_rng(0).standard_normal(phase.size)
+    low_hz, high_hz = sorted((start_hz, stop_hz))
+
+    def described(frequency_hz):
+        return base_transmissibility(specimen, frequency_hz / error)[:, 0]
+
+    found = sweep_response(
+        np.sin(phase),
+        base,
+        run.states[:, 3] + noise,
+        rate,
+        low_hz=low_hz,
+        high_hz=high_hz,
+        linear=described if is_described else None,
+    )
+    assert smooth_jumps(found, collisions(found)) == ()
 
 
 def test_a_leap_between_two_rough_sides_is_not_a_jump():

@@ -22,6 +22,11 @@ _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
 """Intervals of the transition, which belong to neither side."""
+_DEGREE, _EXPLAINED = 4, 0.06
+"""Degree of a polynomial for 1/response squared, which a resonance follows, and its largest residual over the
+step: a step leaves 0.13 or more, and 400 resonances left 0.03 at most."""
+_LARGER = 2.0
+"""Least step over that of the linear specimen."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -49,14 +54,18 @@ class Jump:
 
 
 def jumps(
-    time_s: Reals, frequency_hz: Reals, response: Reals, smooth: Flags | None = None
+    time_s: Reals,
+    frequency_hz: Reals,
+    response: Reals,
+    smooth: Flags | None = None,
+    linear: Reals | None = None,
 ) -> tuple[Jump, ...]:
     """Find the jumps of a response against time.
 
     At each interval straight lines are fitted to the logarithm of the response before and after. A jump is
-    a local maximum of their difference of at least 1.5 dB and 8 standard errors. Its place maximises the
-    likelihood; its bounds come from
-    the likelihood ratio.
+    a local maximum of their difference of at least 1.5 dB and 8 standard errors that is no resonance: those
+    of a linear specimen are steep, and in a fast sweep they ring. Its place maximises the likelihood; its
+    bounds come from the likelihood ratio.
 
     Parameters
     ----------
@@ -65,6 +74,9 @@ def jumps(
     smooth
         Intervals with smooth motion, by default all. At least one side of a jump must be smooth, because a
         chaotic response fluctuates without jumps.
+    linear
+        Response of the linear specimen in the same sweep, positive, if known: the step must be twice as large
+        as any of its steps nearby.
     """
     if not time_s.shape == frequency_hz.shape == response.shape:
         raise InvalidRequest(
@@ -72,20 +84,30 @@ def jumps(
             "must be equally long"
         )
     allowed = np.ones(time_s.shape, dtype=np.bool_) if smooth is None else smooth
-    logarithm = np.log(np.maximum(response, np.finfo(np.float64).tiny))
+    logarithm = _logarithm(response)
     size, error = _steps(logarithm)
     clear = (np.abs(size) * _PER_NEPER_DB >= _SMALLEST_DB) & (np.abs(size) >= _CLEAR * error)
+    explained = (
+        np.zeros_like(size)
+        if linear is None
+        else _steps(_logarithm(linear))[0]
+    )
     found = []
     for place in _peaks(np.where(clear, np.abs(size), 0.0)):
         near = slice(max(0, place - _SIDE), place + _SIDE)
         before = allowed[max(0, place - _SIDE) : max(0, place - _TRANSITION)]
         after = allowed[place + _TRANSITION : place + _SIDE]
-        if not (before.all() or after.all()):
+        is_linear = _LARGER * np.abs(explained[near]).max() > abs(size[place])
+        if not (before.all() or after.all()) or is_linear or _is_resonance(logarithm, place, size[place]):
             continue
         low, best, high = _likely(logarithm[near])
         first = near.start
         found.append(_jump((first + low, first + best, first + high), time_s, frequency_hz, logarithm))
     return tuple(found)
+
+
+def _logarithm(response: Reals) -> Reals:
+    return np.asarray(np.log(np.maximum(response, np.finfo(np.float64).tiny)))
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
@@ -107,6 +129,16 @@ def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
         size[place] = lines[0, 0] - lines[0, 1]
         error[place] = np.sqrt(variance * scatter.sum()) + np.finfo(np.float64).eps
     return size, error
+
+
+def _is_resonance(logarithm: Reals, place: int, step: float) -> bool:
+    """Return whether the response around a step is that of a mode: its 1/square is smooth."""
+    near = logarithm[max(0, place - _SIDE - _TRANSITION) : place + _SIDE + _TRANSITION]
+    square = np.exp(2 * (near.max() - near))
+    basis = np.vander(np.linspace(-1.0, 1.0, near.size), _DEGREE + 1) / square[:, np.newaxis]
+    solution, *_ = np.linalg.lstsq(basis, np.ones(near.size))
+    left = (basis @ solution - 1) / 2
+    return bool(np.sqrt(np.sum(left**2) / (near.size - _DEGREE - 1)) < _EXPLAINED * abs(step))
 
 
 def _peaks(size: Reals) -> list[int]:

@@ -171,6 +171,8 @@ class SweptMotion(Labelled):
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
     """Residual over order 1 of the specimen without contact in this sweep; NaN without a specimen."""
+    linear_ii: Reals
+    """Response II of the same, which rings too."""
     linear_impacts: Reals
     """Orders 2 and 3 over order 1 of the same, from modes that still ring at twice the drive."""
     steady_over_swept: float
@@ -362,8 +364,9 @@ class SweepSums:
         track = partial(tracked_together, phase_rad=phase.phase_rad, interval_samples=self._interval)
         base, velocity = track((data[-2], data[-1]))
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
+        omega = 2 * np.pi * frequency_hz
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
-        residual = impacts = np.full(upper.size, np.nan)
+        residual = impacts = linear_ii = np.full(upper.size, np.nan)
         steady_over_swept = np.nan
         if linear is not None:
             # Order 1 only, because accelerometer noise would ring in a linear specimen too.
@@ -375,12 +378,13 @@ class SweepSums:
             moved[inside] = cosine * np.cos(phase.phase_rad) - sine * np.sin(phase.phase_rad)
             (swept,) = track((self._linear_velocity(moved, linear)[inside],))
             residual, impacts = swept.residual_rms / np.abs(swept.order(1.0)), swept.impacts
-            over_base = [each.order(1.0) / base.order(1.0) for each in (swept, velocity)]
-            reached, measured = (float(np.max(frequency_hz * np.abs(each))) for each in over_base)
-            if abs(measured / reached - 1) < _SAME_LARGEST:
+            linear_ii, measured = (
+                omega * np.abs(each.order(1.0) / base.order(1.0)) for each in (swept, velocity)
+            )
+            reached = float(np.max(linear_ii))
+            if abs(float(np.max(measured)) / reached - 1) < _SAME_LARGEST:
                 steady = _largest_steady(linear, frequency_hz.min(), frequency_hz.max())
-                steady_over_swept = float(steady / (2 * np.pi * reached))
-        omega = 2 * np.pi * frequency_hz
+                steady_over_swept = float(steady / reached)
         fundamental = ORDERS.index(1.0)
         amplitude_m = np.abs(base.order(1.0)) / omega**2
         low_hz, high_hz = self._band_hz
@@ -421,6 +425,7 @@ class SweepSums:
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
             is_clear=np.asarray(~bridged.any(axis=1)),
             linear_residual=residual,
+            linear_ii=linear_ii,
             linear_impacts=impacts,
             steady_over_swept=steady_over_swept,
             interval_s=self._interval / self._rate_hz,

@@ -57,8 +57,23 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 
 
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
-    """Find the jumps of Response II that have a smooth motion on one side."""
-    return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
+    """Find the jumps of Response II that have a smooth motion on one side.
+
+    Without a description of the specimen they are known only where collisions begin or end: elsewhere they
+    may be the ringing of a fast sweep.
+    """
+    smooth = ~colliding.is_colliding
+    where = (response.time_s, response.frequency_hz, response.response_ii, smooth)
+    if np.isfinite(response.linear_ii).all():
+        return jumps(*where, response.linear_ii)
+    edges_s = response.time_s[1:][np.diff(smooth)]
+    return tuple(
+        each for each in jumps(*where) if (np.abs(edges_s - each.time_s) < _NEAR * response.interval_s).any()
+    )
+
+
+_NEAR = 12
+"""Intervals between a jump and the collisions that it begins or ends."""
 
 
 _BEHIND_STEPS = 1.5
