@@ -185,6 +185,7 @@ PURE_HERE = {
     *(f"Curve.{name}" for name in ("magnitude", "lower", "upper")),
     *(f"Resonance.{name}" for name in ("peak_magnitude", "sd_peak_magnitude")),
     *(f"Jump.{name}" for name in ("before", "after")),
+    *(f"MassCheck.{name}" for name in ("expected", "scale", "unexplained")),
     "DwellResponse.is_clear",
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
