@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 28_256,
-    "analysis": 32_625,
+    "analysis": 32_621,
     "cli": 5_068,
     "extensions": 2_716,
     "gui": 12_444,

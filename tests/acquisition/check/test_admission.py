@@ -148,7 +148,7 @@ def test_anything_that_has_changed_since_the_last_check_is_stated_in_decibels_an
     drifted = result.report["amplifier gain since last time"]
     assert drifted.value == "-0.80 dB since 2 days"
     assert drifted.verdict is Verdict.WARN
-    assert "look for a knob" in drifted.advice
+    assert "look for a changed knob" in drifted.advice
     assert result.report["drive over setting since last time"].verdict is Verdict.OK
     # The gain itself is still within a decibel of its knob: without memory nobody would have noticed.
     assert result.report["amplifier gain"].verdict is Verdict.OK

@@ -204,11 +204,12 @@ def test_a_first_day_requests_the_sensors_that_the_template_has(tmp_path):
     assert rig.sensors["base_force"].serial == "4711"
 
 
-def test_feedback_without_a_velocity_of_m0_is_refused_before_anything_plays(tmp_path):
+def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_path):
     level = {"displacement_m": 1e-6}
+    rig = rig_with("m2_acceleration", without=("m0_velocity",))
     with pytest.raises(ConfigurationError, match=r"feedback needs m0_velocity.*Nothing was played"):
         measured(
-            WITHOUT, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
+            rig, tmp_path, kind="held_dwell", frequency_hz=200.0, amplitude_vpp=0.5,
             base_level=level, duration_s=1.0,
         )  # fmt: skip
 

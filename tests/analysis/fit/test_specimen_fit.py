@@ -256,7 +256,7 @@ def test_it_finds_a_specimen_that_is_far_from_what_the_bench_states():
 
 def test_the_gap_cannot_be_reported_from_a_transmission(true):
     clean = measured(true, np.random.default_rng(4))
-    with pytest.raises(InvalidRequest, match="tells any of"):
+    with pytest.raises(InvalidRequest, match="determines any of"):
         fit_specimen(clean, NOMINAL, (Parameter.GAP,))
     with pytest.raises(InvalidRequest, match="nothing was to be fitted"):
         fit_specimen(clean, NOMINAL, ())

@@ -32,7 +32,7 @@ def scene(contact, frequency_hz, amplitude_m, gap_m=45e-6, damping_time_s=2e-5, 
     return Scene(specimen, Harmonic(frequency_hz, amplitude_m), **{"duration": AUTO, **options})
 
 
-LOTTERY = scene("hertz", 475.2, 154.1e-6, gap_m=(289e-6, 98e-6), budget_s=0.5)
+LOTTERY = scene("hertz", 475.2, 154.1e-6, gap_m=(289e-6, 98e-6), budget_s=2.0)
 SHORT_CHAOS = scene("hertz", 242.0, 5e-6, damping_time_s=3e-5)
 
 

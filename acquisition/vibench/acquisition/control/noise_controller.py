@@ -43,9 +43,9 @@ class Equaliser:
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
         self._rate_hz = loop.channels.sample_rate_hz
-        self._to_velocity = np.abs(loop.channels.velocity_over_response(plan.lines * plan.repetition_hz)) ** 2
         self._factor = loop.rig.generator.terminal_factor()
-        self.frequency_hz = plan.lines * plan.repetition_hz
+        self.frequency_hz = np.asarray(plan.lines * plan.repetition_hz, dtype=np.float64)
+        self._to_velocity = np.abs(loop.channels.velocity_over_response(self.frequency_hz)) ** 2
         transfer = RigModel(loop.rig, OnTable.NOTHING).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)
         self._modelled = np.abs(transfer) ** 2
         self._gain = self._modelled

@@ -76,9 +76,9 @@ def volts_per_unit(text: str, unit: str) -> float:
 
 
 def size_of_unit(name: str, unit: str) -> float | None:
-    """Return the size of a unit in another: 9.80665 for ``"g"`` in ``"m s-2"``.
+    """Return the size of the unit ``name`` in ``unit``: 9.80665 for ``"g"`` in ``"m s-2"``.
 
-    None if it is a unit of another quantity, or one of the two is not known.
+    None if ``name`` is a unit of another quantity, or one of the two is not known.
     """
     volts = _VOLTS | dict.fromkeys(("v", "volt", "volts", "Volt", "Volts"), 1.0)
     return {**_UNITS, "V": volts}.get(unit, {}).get(_plain(name))

@@ -300,7 +300,7 @@ def _without_drift(
     shapes, target = np.stack((np.ones_like(stretch), stretch), axis=1)[known], off[:, known].T
     largest = np.abs(target).max(axis=1, initial=0.0)
     is_small = largest < max(_SMALL, _OFTEN * float(np.median(largest)))
-    weight, lines = is_small[:, None] / sd[known, None], max(1, np.count_nonzero(is_small))
+    weight, lines = is_small[:, None] / sd[known, None], max(1, int(np.count_nonzero(is_small)))
     by_noise = (noise_variance / np.abs(value) ** 2)[known, None]
     excess = float(np.sum(np.abs(weight * target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
     left, shares = target, np.zeros(2)
@@ -317,7 +317,7 @@ def _without_drift(
         return None, off
     off = off.copy()
     off[:, known] = left.T
-    return Drift(*shares.tolist(), common_share), off
+    return Drift(float(shares[0]), float(shares[1]), common_share), off
 
 
 _TOGETHER = 0.8

@@ -87,11 +87,7 @@ def jumps(
     logarithm = _logarithm(response)
     size, error = _steps(logarithm)
     clear = (np.abs(size) * _PER_NEPER_DB >= _SMALLEST_DB) & (np.abs(size) >= _CLEAR * error)
-    explained = (
-        np.zeros_like(size)
-        if linear is None
-        else _steps(_logarithm(linear))[0]
-    )
+    explained = np.zeros_like(size) if linear is None else _steps(_logarithm(linear))[0]
     found = []
     for place in _peaks(np.where(clear, np.abs(size), 0.0)):
         near = slice(max(0, place - _SIDE), place + _SIDE)

@@ -80,7 +80,7 @@ next."""
 
 
 def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
-    """Return the point that each point continues, or NOBODY, shape (points,)."""
+    """Return the point that each point of ``starts`` continues, or NOBODY, shape (points,)."""
     blocks = np.full(grid.shape, NOBODY)
     numbers = np.arange(grid.size).reshape(grid.shape)
     for index, start in enumerate(starts):
