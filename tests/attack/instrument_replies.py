@@ -387,7 +387,7 @@ def harmful(text: str) -> list[str]:
 
 
 def faults(case: Case, ending: Ending) -> tuple[str, ...]:
-    """Say what may not be."""
+    """Return what is wrong with an ending; empty if nothing is."""
     said = f"{ending.out}\n{ending.err}"
     odd = json.loads(case.prepare[1])
     is_cut_off = odd.get("reply", 0) >= len(REPLIES) and odd["always"]

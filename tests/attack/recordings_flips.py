@@ -120,7 +120,7 @@ def resident_bytes() -> int:
 
 
 def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[str, ...]:
-    """Say what may not be."""
+    """Return what is wrong with an outcome; empty if nothing is."""
     found: list[tuple[str, bool]] = [
         (said[:300], said.startswith(("traceback", "died"))),
         (

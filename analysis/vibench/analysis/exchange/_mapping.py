@@ -31,7 +31,7 @@ _LARGEST_CORRECTION = 0.2
 
 
 def _is_another_quantity(file_unit: str) -> bool:
-    """Return whether a unit is that of a motion or force, so that no scale gives another one."""
+    """Return whether a unit belongs to a motion or a force, which no scale turns into another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
 
 

@@ -128,7 +128,7 @@ def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
 
 
 def _is_resonance(logarithm: Reals, place: int, step: float) -> bool:
-    """Return whether the response around a step is that of a mode: its 1/square is smooth."""
+    """Return whether a mode explains the response around a step: 1/response squared is smooth."""
     near = logarithm[max(0, place - _SIDE - _TRANSITION) : place + _SIDE + _TRANSITION]
     square = np.exp(2 * (near.max() - near))
     basis = np.vander(np.linspace(-1.0, 1.0, near.size), _DEGREE + 1) / square[:, np.newaxis]

@@ -53,7 +53,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     """Find the uncertainty exponent of the boundary between the motions of a map over two coordinates.
 
     A start is uncertain at a distance if a start that far away along an axis reaches another motion. The
-    interval is that of a jackknife over parts of the map. None where fewer than three distances have enough
+    interval is from a jackknife over parts of the map. None where fewer than three distances have enough
     uncertain starts, or fewer than half of all.
 
     Parameters

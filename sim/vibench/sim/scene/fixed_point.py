@@ -1,4 +1,4 @@
-"""Newton's iteration for the periodic motion near which a run is. SI units."""
+"""Newton's iteration for the periodic motion near a run. SI units."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ ITERATIONS = 8
 
 @dataclass(frozen=True, eq=False)
 class FixedPoint:
-    """A stable motion that comes back."""
+    """A stable periodic motion."""
 
     run: FollowedRun
-    """On it."""
+    """A run on it."""
     away: Floats
-    """Inverse of one less the derivative of the map, scaled, shape (6, 6)."""
+    """Inverse of the identity minus the scaled derivative of the map, shape (6, 6)."""
     distance: float
-    """Distance of the run from it, over the size of the motion."""
+    """Distance of the given run from it, over the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:

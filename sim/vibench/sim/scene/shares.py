@@ -153,7 +153,7 @@ def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
     """Return the rate at which chaos dies out, from the number of escapes in the total time of all starts.
 
     Lifetimes of transient chaos are exponentially distributed (Grebogi, Ott and Yorke, Physica D 7 (1983)
-    181); unfinished ones count as far as they were followed. The interval is that of a Poisson process
+    181); unfinished ones count as far as they were followed. The interval is for a Poisson process
     (Garwood, Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
