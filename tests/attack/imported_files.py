@@ -33,7 +33,12 @@ source = "{second}"
 role = "m0_velocity"
 """
 TEXT = frozenset({".csv", ".txt", ".unv"})
-NAMES = {".h5": ("/a", "/b"), ".nc": ("/a", "/b"), ".mat": ("a", "b"), ".tdms": ("Group/a", "Group/b")}
+NAMES = {
+    ".h5": ("/a", "/b"), ".nc": ("/a", "/b"), ".mat": ("a", "b"), ".tdms": ("Group/a", "Group/b"),
+    ".csv": ("2", "3"),
+}  # fmt: skip
+UNITS = (("voltage", "V"), ("velocity", "m/s"))
+"""Quantity and unit of the two channels."""
 SAYS_ITS_RATE = frozenset({".wav", ".tdms", ".csv"})
 
 
@@ -66,13 +71,14 @@ def _wav(path: Path) -> None:
 def _tdms(path: Path) -> None:
     import nptdms
 
-    about = {"wf_increment": 1 / RATE_HZ, "unit_string": "V"}
     with nptdms.TdmsWriter(path) as writer:
         for piece in np.split(_signals(), 3, axis=1):
             writer.write_segment(
                 [
-                    nptdms.ChannelObject("Group", name, row, about)
-                    for name, row in zip("ab", piece, strict=True)
+                    nptdms.ChannelObject(
+                        "Group", name, row, {"wf_increment": 1 / RATE_HZ, "unit_string": unit}
+                    )
+                    for name, row, (_, unit) in zip("ab", piece, UNITS, strict=True)
                 ]
             )
 
@@ -88,13 +94,14 @@ def _txt(path: Path) -> None:
 
 
 def _dataset_58(number: int, kind: str, body: bytes) -> bytes:
+    quantity, unit = UNITS[number - 1]
     head = "\n".join(
         (
             "    -1", kind, f"channel {number}", "NONE", "01-MAR-26 12:00:00", "NONE", "NONE",
             f"{1:5d}{number:10d}{0:5d}{0:10d} {'NONE':<10}{number:10d}{3:4d} {'NONE':<10}{0:10d}{0:4d}",
             f"{4:10d}{SAMPLES:10d}{1:10d}{0:13.5E}{1 / RATE_HZ:13.5E}{0:13.5E}",
             f"{17:10d}{0:5d}{0:5d}{0:5d} {'time':<20} {'s':<20}",
-            f"{11:10d}{1:5d}{0:5d}{0:5d} {'velocity':<20} {'m/s':<20}",
+            f"{11:10d}{1:5d}{0:5d}{0:5d} {quantity:<20} {unit:<20}",
             f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
             f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}", "",
         )

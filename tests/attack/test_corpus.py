@@ -39,7 +39,16 @@ def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it
     case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)
     ending = runner.run(case)
     assert (ending.code, imported_files.faults(case, ending)) == (1, ())
-    assert ending.err.startswith(f"error: broken{path.suffix} ") or "largest number" in ending.err
+    assert ending.err.startswith((f"error: broken{path.suffix} ", f"error: broken{path.suffix}: "))
+    assert ("largest number" in ending.err) == (path.stem == "largest_number_of_all")
+
+
+@pytest.mark.parametrize("suffix", imported_files.WRITERS)
+def test_the_attack_breaks_files_that_are_imported_while_they_are_whole(runner, suffix):
+    ending = runner.run(
+        imported_files.reading(suffix, imported_files.good_files()[suffix], *imported_files.MAKING)
+    )
+    assert (ending.code, ending.err) == (0, "")
 
 
 LONG = "x" * 300

@@ -262,7 +262,7 @@ def test_what_no_track_confirms_is_reported_without_bounds(world_recording):
     assert "±" not in said
     assert motion.to_dict()["without_contact_model"]["gaps_sd_m"] in ([None, None], (None, None))
     # It was said to be too short, of two seconds.
-    assert "may be otherwise" in motion.sentences[-1]
+    assert "may be wrong" in motion.sentences[-1]
     assert len(motion.sentences) < 10
 
 

@@ -174,7 +174,7 @@ def import_recording(
         wanted = tuple(map(_Wanted, mapping.channels, found, aligned.pieces, aligned.late_s))
         parts = place_parts(mapping, rate, samples)
         header = RecordingHeader(
-            channels=tuple(_header(source, each) for each in wanted),
+            channels=tuple(_header(path.name, source, each) for each in wanted),
             sample_rate_hz=rate,
             expected_samples=samples,
             origin=_origin(wanted, mapping, path),
@@ -208,13 +208,13 @@ def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> 
     return Origin.SIMULATED if Origin.SIMULATED in {*told, mapping.origin} else Origin.REAL
 
 
-def _header(source: Source, each: _Wanted) -> ChannelHeader:
+def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
     mapped, found = each.mapped, each.source
     quantity, unit = mapped.kind
     try:
         factor = mapped.factor(found.unit)
     except ValueError as error:
-        raise InvalidRequest(str(error)) from error
+        raise InvalidRequest(f"{name}: {error}") from error
     full_scale = mapped.full_scale or found.full_scale
     return ChannelHeader(
         role=mapped.role,
@@ -223,7 +223,7 @@ def _header(source: Source, each: _Wanted) -> ChannelHeader:
         unit=unit,
         physical_per_volt=factor,
         physical_offset=mapped.offset,
-        range_v=_power_of_two_above(_peak(source, found)) if full_scale is None else full_scale,
+        range_v=_power_of_two_above(_peak(source, found), name) if full_scale is None else full_scale,
         volts_per_count=found.step,
         coupling=mapped.coupling,
         sensitivity=mapped.sensitivity,
@@ -243,8 +243,8 @@ def _peak(source: Source, channel: SourceChannel) -> float:
     return peak
 
 
-def _power_of_two_above(peak: float) -> float:
-    """Return the smallest power of two that is not below a peak.
+def _power_of_two_above(peak: float, name: str) -> float:
+    """Return the smallest power of two that is not below a peak in the file of this name.
 
     ¶ Raises UnusableData when a recording cannot store the peak.
     """
@@ -252,8 +252,8 @@ def _power_of_two_above(peak: float) -> float:
         if peak == 0:
             return 1.0
         raise UnusableData(
-            f"a channel's largest number is {peak:g}, and a recording keeps those from {LEAST_PEAK:g} to "
-            f"{MOST_PEAK:g}; convert it to a unit in which it is smaller, or repair the file"
+            f"{name} has a channel whose largest number is {peak:g}, and a recording keeps those from "
+            f"{LEAST_PEAK:g} to {MOST_PEAK:g}; convert it to another unit, or repair the file"
         )
     mantissa, exponent = frexp(peak)
     return 2.0 ** (exponent - 1 if mantissa == 0.5 else exponent)
