@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from typing import Generic, Protocol, TypeVar, cast
 
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
@@ -80,7 +80,6 @@ class DisplayedResult:
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
 
-@runtime_checkable
 class Themed(Protocol):
     """A part of a page that draws with the theme's colours."""
 
@@ -127,8 +126,9 @@ class Page(QWidget):
     def retheme(self, theme: Theme) -> None:
         """Change the colours of plots; other widgets follow the palette."""
         for part in self.findChildren(QWidget):
-            if isinstance(part, Themed):
-                part.retheme(theme)
+            # A page has hundreds of parts, and isinstance with a protocol takes 80 µs.
+            if hasattr(type(part), "retheme"):
+                cast(Themed, part).retheme(theme)
 
     def enter(self) -> None:
         """Prepare to be shown."""

@@ -1,6 +1,7 @@
 """Two plots with a common frequency axis: the curves with their bounds, and the difference of two curves."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import isfinite, log10
 
 import numpy as np
@@ -190,8 +191,12 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
             "–" if peak.damping_ratio is None else f"{100 * peak.damping_ratio:.3g}",
         )
         for each in curves
-        for peak in curve_peaks(each)
+        for peak in _peaks(each)
     ]
+
+
+# A chaotic curve has thousands of peaks, and every tick and every change of units lists them again.
+_peaks = lru_cache(maxsize=64)(curve_peaks)
 
 
 def marker_headings(markers_hz: tuple[float, ...]) -> tuple[str, ...]:
