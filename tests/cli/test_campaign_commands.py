@@ -93,14 +93,6 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert searching.startswith("3 recordings (2 kept), at most 1:02:03 (h:min:s) of rig time")
 
 
-def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_here, tmp_path):
-    plan = short_points(tmp_path, 2)
-    result = vibench_here("measure", plan, "--out", "out", "--notify", "mail 'me", cwd=tmp_path)
-    assert result.returncode == 1
-    assert "close every quotation mark" in result.stderr
-    assert not list(tmp_path.glob("out/*.h5*"))
-
-
 def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_number(
     vibench_here, tmp_path
 ):

@@ -19,6 +19,7 @@ NOT_ALLOWED = [
     ("branches", "--amplitude", "5e-6", "--frequency", "260:270", "--starts", "abc"),
     ("spectrum", "--amplitude", "5e-6", "--frequency", "abc"),
     ("map", "map", "--out", "a", "--kicks", "-1"),
+    ("map", "map", "--out", "a", "--estimate", "--workers", "0"),
     ("study", "paper", "--out", "a.h5", "--workers", "0"),
     ("measure", "quick", "--out", "a", "--within", "soon"),
     ("measure", "quick", "--out", "a", "--after-failure", "laugh"),

@@ -1,7 +1,6 @@
 """`vibench map` as a user meets it: a folder with a file and a picture, and one sentence for each error."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -90,31 +89,6 @@ def test_a_basin_states_why_its_boundary_has_no_exponent(vibench_here, tmp_path,
     found = vibench_here("map", plan(tmp_path, text), "--out", "a", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert f"The uncertainty exponent is not determined: {why}" in found.stdout
-
-
-def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_here, tmp_path):
-    found = vibench_here("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "-3", cwd=tmp_path)
-    assert found.returncode == 1
-    assert "'--kicks': '-3' was given; it should be greater than or equal to 0" in found.stderr
-    assert not (tmp_path / "a").exists()
-
-
-@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
-@pytest.mark.parametrize("workers", ["-1", "0"])
-def test_an_estimate_for_fewer_threads_than_one_is_refused(vibench_here, tmp_path, workers):
-    asked = ("map", "map", "--estimate", "--out", "a", "--workers", workers)
-    found = vibench_here(*asked, cwd=tmp_path)
-    assert found.returncode == 1
-    assert f"'--workers': '{workers}' was given; it should be greater than or equal to 1" in found.stderr
-
-
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path):
-    found = vibench_here("map", plan(tmp_path, MAP), "--out", "/proc/map", cwd=tmp_path)
-    assert found.returncode == 1
-    assert (
-        "/proc/map cannot be created as a folder: /proc may not be written to. Nothing was computed"
-        in " ".join(found.stderr.split())
-    )
 
 
 @pytest.mark.parametrize(

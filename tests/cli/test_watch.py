@@ -18,7 +18,6 @@ from vibench.acquisition.engine import (
     EngineState,
     StopDelivery,
     Supervision,
-    announced_engines,
     start_engine,
     stop_engine,
 )
@@ -129,12 +128,6 @@ def test_where_the_state_folder_cannot_be_made_it_is_stated(vibench_here, tmp_pa
     assert told.returncode == 1
     assert "what drives a bench cannot be looked for in the state folder" in told.stderr
     assert "VIBENCH_STATE_DIR" in told.stderr
-
-
-def test_what_a_killed_engine_has_left_is_swept_away(tmp_path):
-    gone = EngineAddress(host="127.0.0.1", port=1, token="t")
-    with announce(gone, "killed", unheard):
-        assert announced_engines() == ()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")

@@ -81,21 +81,6 @@ def test_a_recording_may_be_moved_as_soon_as_it_is_complete(bench, tmp_path, mon
     assert [each.outcome for each in again] == [PointOutcome.KEPT, PointOutcome.RECORDED, PointOutcome.KEPT]
 
 
-def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
-    point_results = run_campaign(bench, CAMPAIGN, tmp_path / "out")
-    assert results(point_results) == [(name, PointOutcome.RECORDED) for name in ("one", "two", "three")]
-    for point_result in point_results:
-        with open_recording(point_result.path) as recording:
-            assert recording.state is RecordingState.COMPLETE
-            assert [segment.label for segment in recording.segments] == [
-                "check",
-                "ramp_up",
-                "dwell",
-                "ramp_down",
-            ]
-            assert recording.plan["name"] == point_result.name
-
-
 def test_progress_counts_the_recordings(bench, tmp_path):
     seen = set()
     run_campaign(bench, CAMPAIGN, tmp_path, on_progress=lambda p: seen.add((p.name, p.number, p.count)))

@@ -1,12 +1,10 @@
 """Chains as they are asked for: units, recorded drives, files, figures."""
 
-import h5py
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.analysis import InvalidRequest
-from vibench.analysis.dynamics import ChainDrive, ChainRequest, chain_answer, write_chain
+from vibench.analysis.dynamics import ChainDrive, ChainRequest, chain_answer
 from vibench.analysis.report import chain_figure
 from vibench.sim import LinearSweep, SpecimenTable, gong2025
 from vibench.sim.chain import chain_energies, chain_of, chain_transmissibility, integrate_chain
@@ -36,19 +34,6 @@ def test_a_swept_run_states_what_the_chain_itself_did(swept):
     mean = chain_energies(chain, alone.states, base).mean(axis=0)
     assert np.all(np.abs(run.energy_j - mean) < 0.05 * mean)
     assert np.all(run.energy_error_j > 0.0)
-
-
-def test_a_file_holds_everything_and_nothing_is_overwritten(swept, tmp_path):
-    path = write_chain(swept, tmp_path / "chain.h5")
-    (run,) = swept.runs
-    with h5py.File(path) as file:
-        assert ChainRequest.model_validate_json(file.attrs["request"]) == swept.request
-        np.testing.assert_allclose(file["gaps"][:2], np.array(swept.gaps)[:2])
-        for name in ("over_hz", "transmission", "energy_j", "motion_m", "time_s", "impact_cell"):
-            np.testing.assert_array_equal(file[f"run_00000/{name}"], getattr(run, name))
-            assert file[f"run_00000/{name}"].attrs["units"]
-    with pytest.raises(InvalidRequest):
-        write_chain(swept, path)
 
 
 def test_the_figure_shades_the_gaps_and_its_tables_hold_what_is_drawn(swept):

@@ -50,18 +50,3 @@ def require_coverage(estimator, overlap, averages, repeats):
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
 def test_bounds_of_hann_segments_hold_the_truth_95_times_in_100(estimator, overlap):
     require_coverage(estimator, overlap, averages=12, repeats=150)
-
-
-def test_segments_counted_as_independent_would_promise_too_much():
-    """Without the correction for overlap the bounds at 75 % would be those of too many averages."""
-    rng = np.random.default_rng(8)
-    outside = trials = 0
-    for _ in range(200):
-        drive = rng.standard_normal(12 * SEGMENT)
-        response = drive + NOISE * rng.standard_normal(drive.size)
-        found = transmissibility(drive, response, RATE, segment_samples=SEGMENT, overlap=0.75)
-        naive = found.half_width * np.sqrt(found.n_eff / found.segments_used)
-        error = np.abs(np.log(found.magnitude))
-        outside += np.count_nonzero(error[EVERY_THIRD] > naive[EVERY_THIRD])
-        trials += error[EVERY_THIRD].size
-    assert outside / trials > 0.12

@@ -23,12 +23,6 @@ def test_the_edges_of_a_steady_sine_are_straight(frequency_hz, noise):
     assert low[4:-4] == pytest.approx(-0.7, abs=room)
 
 
-def test_the_plain_extremes_of_that_sine_are_a_comb():
-    low, high = envelope(sine(260.0, 2.0), COLUMNS)
-    assert high.min() < 0.8
-    assert low.max() > -0.2
-
-
 def test_a_wave_of_many_columns_is_left_a_wave():
     wave = sine(260.0, 0.2)
     for drawn, plain in zip(outline(wave, COLUMNS), envelope(wave, COLUMNS), strict=True):

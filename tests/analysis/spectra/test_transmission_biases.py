@@ -45,18 +45,3 @@ def test_a_peak_narrower_than_the_resolution_is_the_peak_seen_through_the_window
     assert loss < -0.1
     assert abs(found.value[line] / expected - 1) < 4 * np.sqrt(2) * found.relative_sd_magnitude[line]
     assert abs(found.value[line] / expected - 1) < -loss / 5
-
-
-def test_filling_holes_with_zeros_would_lower_the_coherence_that_leaving_them_out_keeps():
-    drive = np.random.default_rng(43).standard_normal(400_000)
-    response = signal.lfilter([1.0, 0.5], [1.0], drive)
-    valid = np.ones(drive.size, dtype=bool)
-    for start in range(2_000, 390_000, 6_500):
-        valid[start : start + 100] = False
-    holed = np.where(valid, response, 0.0)
-    kept = transmissibility(drive, np.where(valid, response, np.nan), RATE, segment_samples=1024, valid=valid)
-    filled = transmissibility(drive, holed, RATE, segment_samples=1024)
-    assert np.min(kept.coherence) > 0.9999
-    # 100 of 6500 samples are missing, and the others cannot know it: 1.5 % of the power no longer belongs.
-    assert np.median(filled.coherence) == pytest.approx(1 - 100 / 6500, abs=0.004)
-    assert kept.segments_excluded > 0 == filled.segments_excluded

@@ -10,7 +10,6 @@ from hypothesis import given, settings, strategies as st
 from vibench.sim import Harmonic, Outcome, Rest, Scene, gong2025, solve_scene
 from vibench.sim.scene.scene import FixedDuration, Given
 from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
-from vibench.sim.study._errors import InvalidStudy
 from vibench.sim.study._executor import Reply, solve_timed
 from vibench.sim.study._grid import CONTINUES, PHASE
 from vibench.sim.study._queue import StudyEnd
@@ -85,15 +84,6 @@ def alone(frequency_hz, amplitude_m, start):
     return solve_scene(
         Scene(gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(0.2, 0.1), start=start)
     )
-
-
-def test_a_point_states_what_one_scene_alone_states(small, truth):
-    one = alone(260.0, 20e-6, Rest())
-    point = {"amplitude": 20e-6, "frequency": 260.0, "start": "rest"}
-    assert truth.values("response_i", **point).item() == one.response_i
-    assert truth.values("relative_ii", **point).item() == one.relative_ii
-    assert truth.values("impacts", **point).item() == one.impacts
-    np.testing.assert_array_equal(truth.values("final_state", **point).ravel(), one.final_state)
 
 
 def test_a_chain_continues_from_where_its_predecessor_ended(small, truth):
@@ -230,8 +220,3 @@ def test_progress_counts_every_point_once_and_ends_with_nothing_left(study):
     assert counts[-1] == seen[-1].of == study.grid.size
     assert seen[-1].left_s == 0.0
     assert seen[-1].note == ""
-
-
-def test_no_workers_are_refused():
-    with pytest.raises(InvalidStudy, match="0 workers are not allowed: give one or more"):
-        solve_study(Study(frequencies_hz=[100.0], amplitudes_m=[1e-6]), workers=0)

@@ -12,7 +12,6 @@ import pytest
 from vibench.sim import Rest, ScenePrediction, solve_scene
 from vibench.sim.study import (
     ExistingStudy,
-    MemoryStore,
     PointState,
     Study,
     StudyError,
@@ -24,7 +23,6 @@ from vibench.sim.study import (
 from vibench.sim.study._file_store import FileStore, make_file, sole_writer
 from vibench.sim.study._grid import COLUMNS, IDENTITY, NUMBERS, SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
-from vibench.sim.study._results import results_of
 from vibench.sim.study._solve import scene_identity
 
 
@@ -169,27 +167,11 @@ def test_resuming_computes_what_is_missing_and_nothing_else(study, tmp_path, req
     require_equal(open_study(path), solve_study(study))
 
 
-def test_a_complete_study_is_not_touched_when_it_is_resumed(small, tmp_path):
-    path = tmp_path / "a.h5"
-    solve_study(small, path)
-    before = path.read_bytes()
-    assert solve_study(small, path, ExistingStudy.RESUME).is_complete
-    assert path.read_bytes() == before
-
-
 def test_identities_match_the_scenes(small, tmp_path):
     results = solve_study(small, tmp_path / "a.h5")
     kept = [bytes(each).decode() for each in results.arrays[IDENTITY]]
     assert len(set(kept)) == small.grid.size - 4, "a chain's first point is the scene that starts at rest"
     assert kept[0] == scene_identity(small.scene((0,) * 6, REST))
-
-
-def test_a_file_that_exists_is_refused_and_kept(small, tmp_path):
-    path = tmp_path / "a.h5"
-    path.write_text("mine")
-    with pytest.raises(StudyError, match="exists, and nothing is ever overwritten; resume it, or choose"):
-        solve_study(small, path)
-    assert path.read_text() == "mine"
 
 
 @pytest.mark.parametrize(
@@ -334,11 +316,3 @@ def test_whatever_moment_the_power_goes_a_point_that_counts_has_all_its_cells(sm
                 found.arrays[column.name][is_done], truth.arrays[column.name][is_done], column.name
             )
     assert {0, small.grid.size} < seen
-
-
-def test_a_memory_store_holds_what_a_file_would(small, tmp_path, require_equal):
-    store = MemoryStore(small)
-    executor = ThreadExecutor(3)
-    run_study(small, executor, store)
-    executor.close()
-    require_equal(results_of(small, store.arrays), solve_study(small, tmp_path / "a.h5"))
