@@ -181,14 +181,6 @@ def test_each_hard_impact_adds_twice_the_logarithm_of_the_restitution():
     assert of_the_oscillator == pytest.approx(2.0 * math.log(0.8) * found.impact_rate_hz, rel=1e-3)
 
 
-def test_the_impact_map_gives_the_same_exponents_by_another_way():
-    found = by_impact_map(2.8, 0.8, 200, 100)
-    assert found.largest == pytest.approx(0.14202, abs=4.0 * found.standard_error)
-    assert found.standard_error < 0.003
-    # But for the speeds at both ends, by which areas in (phase, speed) are weighed.
-    assert found.sum == pytest.approx(2.0 * math.log(0.8) * found.impact_rate, rel=1e-3)
-
-
 @pytest.mark.parametrize("beyond", [-1e-6, 1e-6])
 def test_the_soft_oscillator_grazes_where_its_linear_resonance_reaches_the_stop(beyond):
     omega = GRAZING * (1.0 + beyond)
