@@ -31,7 +31,7 @@ from vibench.sim import Accuracy, Harmonic, Scene, Target, gong2025, solve_scene
 from vibench.sim.accuracy_benchmark.curve import CurvePoint, scene_curve
 from vibench.sim.engine.run import Watch
 from vibench.sim.scene.followed_run import FollowedRun
-from vibench.sim.scene.refinement import mean_error
+from vibench.sim.scene.mean_of_starts import mean_error
 from vibench.sim.scene.several_starts import SEED, pushes
 from vibench.sim.study import software
 

@@ -108,7 +108,6 @@ LONG = (
     "tests/virtual_rig/rig/test_fault_script.py",
     "tests/acquisition/check/test_admission.py",
     "tests/analysis/chaos/test_witnesses.py",
-    "tests/analysis/frequency_response/test_transmission_of_the_specimen.py",
     "tests/acquisition/recording/test_kill.py",
     "tests/gui/window/test_window.py",
     "tests/gui/plots/test_logical_line.py",

@@ -20,7 +20,7 @@ from vibench.sim import (
     refine_scene,
     solve_scene,
 )
-from vibench.sim.scene.refinement import mean_error
+from vibench.sim.scene.mean_of_starts import mean_error
 
 LAWS = ("hertz", "linear_gap", "power:3", "power:47", "rigid:0.8", "hunt_crossley:0.5")
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")

@@ -13,6 +13,12 @@ State = tuple[float, float, float, float, float, float]
 """x, y, z, vx, vy, vz, absolute [m, m/s]."""
 
 
+def state_of(values: Floats) -> State:
+    """Return a state of six numbers as a tuple."""
+    x, y, z, vx, vy, vz = (float(value) for value in values)
+    return (x, y, z, vx, vy, vz)
+
+
 class MotionKind(StrEnum):
     """Kind of a motion, from its states once per drive period."""
 

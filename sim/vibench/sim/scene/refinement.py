@@ -27,13 +27,23 @@ from .followed_run import (
     whole_periods,
     window_of,
 )
+from .mean_of_starts import (
+    ALIKE,
+    Start,
+    error_of,
+    more_needed,
+    next_size,
+    others_of,
+    windows_help,
+    windows_of,
+)
 from .plan import LinearMotion, linear_motion, never_touches, plan_of
-from .prediction import Method, MotionKind, ScenePrediction, StartMemory, State, TargetReport
+from .prediction import Method, MotionKind, ScenePrediction, StartMemory, TargetReport, state_of
 from .repetition import MOST_PERIODS, Pace, Repetition, Sharpness, pace_of
 from .scatter import COVERED
 from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
-from .shares import student_quantile, wilson_share
+from .shares import student_quantile
 from .solve import Question, in_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, with_errors
 
@@ -57,14 +67,9 @@ interval; then after this share of its time."""
 LOOKS = 8
 """The same for another start before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
-SAME, ALIKE = 1e-3, 1e-2
-"""Relative tolerances: of states, for a motion that repeats; of responses, for starts on one motion (some are
-still settling)."""
-OTHER_DIFFERS = 1.0
-"""Assumed relative difference of a motion not yet found, such as chaos beside a motion without impacts."""
-FIRST_STARTS, FEWEST_STARTS, MOST_STARTS = 6, 16, 1_000_000
-MOST_FREEDOM = 200
-"""Degrees of freedom above which Student's quantile hardly changes."""
+SAME = 1e-3
+"""Relative tolerance of states for a motion that repeats."""
+FIRST_STARTS, MOST_STARTS = 6, 1_000_000
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
 """Cost of Newton's iteration over that of following the period once, and the share of the time that it may
 use."""
@@ -114,25 +119,6 @@ class _Path:
     """Relative distance from that motion at the last check."""
     closest: float = CLOSE
     """Relative change per period below which Newton's iteration is tried next."""
-
-
-@dataclass(eq=False)
-class _Start:
-    """One of the indistinguishable starts, with the results of its windows."""
-
-    run: FollowedRun
-    windows: list[Floats]
-    """Responses of each window, shape (4,); a single one for a periodic motion."""
-    repeats: Repetition | None
-    """Period if the motion is nearly periodic: all its windows are alike."""
-    impacts: int
-    """Impacts in the first window, as the next."""
-    section: Floats
-    """States once a drive period, shape (n, 6)."""
-
-    def mean(self, windows: int) -> Floats:
-        """Return the mean of the responses over the first windows, shape (4,)."""
-        return np.asarray(np.mean(self.windows[:windows], axis=0))
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
@@ -360,7 +346,7 @@ class _Refinement:
             period=orbit.period,
             settled_s=self._main.time_s,
             ended=f"it repeats after {orbit.period} drive period(s)",
-            final_state=_state(orbit.run.state),
+            final_state=state_of(orbit.run.state),
             memory=StartMemory.KEPT,
             section=self._section(orbit.section),
         )
@@ -418,7 +404,7 @@ class _Refinement:
         found = replace(
             found,
             ended=f"observed from {run.time_s - window.length_s:.4g} to {run.time_s:.4g} s",
-            final_state=_state(run.state),
+            final_state=state_of(run.state),
             memory=StartMemory.UNKNOWN if is_parted else StartMemory.KEPT,
             integration_error=float(off.max()),
             section=self._section(states_of(window.stretches)),
@@ -457,12 +443,12 @@ class _Refinement:
         each_s = begins_s + self._window_periods / self._frequency_hz
         if self._clock.taken_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
             yield from self._interim()
-        starts: list[_Start] = []
+        starts: list[Start] = []
         wanted, windows = FIRST_STARTS, 1
         while len(starts) < MOST_STARTS:
             is_over = not self._observe_more(starts, wanted, windows, begins_s) or self._clock.is_over
             is_due = not self._has_answered and self._clock.taken_s > self._due_s
-            is_complete = len(starts) == wanted and _windows_of(starts) == windows
+            is_complete = len(starts) == wanted and windows_of(starts) == windows
             if len(starts) > 1 and (is_complete or is_due or is_over):
                 found = self._mean(starts, begins_s)
                 yield found
@@ -475,9 +461,10 @@ class _Refinement:
                     yield self._lost()
                 return
             if is_complete:
-                wanted, windows = self._next_size(starts, begins_s)
+                lead = begins_s * self._frequency_hz / self._window_periods
+                wanted, windows = next_size(starts, self._target.error, lead)
 
-    def _observe_more(self, starts: list[_Start], wanted: int, windows: int, begins_s: float) -> bool:
+    def _observe_more(self, starts: list[Start], wanted: int, windows: int, begins_s: float) -> bool:
         """Observe one more window of a start, or a new start; return False if time has run out."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:
@@ -502,55 +489,23 @@ class _Refinement:
                 assert orbit is not None
                 settled = Repetition(orbit.period, 0.0)
                 impacts = orbit.impacts * self._window_periods // orbit.period
-                starts.append(_Start(run, [orbit.responses_m], settled, impacts, orbit.section))
+                starts.append(Start(run, [orbit.responses_m], settled, impacts, orbit.section))
                 return True
         window = self._observed(run, self._window_periods)
         if window is not None:
             repeats = self._nearly.repeats(window.stretches)
             section = states_of(window.stretches)
-            starts.append(_Start(run, [window.responses_m], repeats, window.impacts, section))
+            starts.append(Start(run, [window.responses_m], repeats, window.impacts, section))
         return window is not None
 
-    def _next_size(self, starts: Sequence[_Start], begins_s: float) -> tuple[int, int]:
-        """Return the next numbers of starts and windows, at most doubling the motion followed so far."""
-        windows = _windows_of(starts)
-        if len(starts) < FEWEST_STARTS:
-            return FEWEST_STARTS, windows
-        more = 2.0 if self._target.error is None else min(2.0, self._more_needed(starts))
-        if self._windows_help(starts, begins_s):
-            return len(starts), max(windows + 1, math.ceil(windows * more))
-        return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
-
-    def _windows_help(self, starts: Sequence[_Start], begins_s: float) -> bool:
-        """Return whether more windows of the same starts reduce the error more cheaply than more starts.
-
-        More starts also find rare motions, so windows must cost half as much or less.
-        """
-        windows = _windows_of(starts)
-        is_soon = begins_s * self._frequency_hz < self._window_periods
-        if is_soon or any(each.repeats is not None for each in starts):
-            return False
-        if windows == 1:
-            return True
-        worst = int(np.argmax(_mean_error(starts)))
-        values = np.array([each.windows[:windows] for each in starts])[:, :, worst]
-        within = float(values.var(axis=1, ddof=1).mean()) / windows
-        return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
-
-    def _more_needed(self, starts: Sequence[_Start]) -> float:
-        """Return the factor of additional motion for the requested error."""
-        assert self._target.error is not None
-        power = 2.0 if _others(starts) is None else 1.0
-        return 1.05 * math.pow(float(_mean_error(starts).max()) / self._target.error, power)
-
-    def _mean(self, starts: Sequence[_Start], begins_s: float) -> ScenePrediction:
+    def _mean(self, starts: Sequence[Start], begins_s: float) -> ScenePrediction:
         """Return the mean over the starts and windows so far."""
-        windows, window_s = _windows_of(starts), self._window_periods / self._frequency_hz
+        windows, window_s = windows_of(starts), self._window_periods / self._frequency_hz
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)
         ends_s = begins_s + windows * window_s
-        found = self._prediction(mean, _mean_error(starts), ends_s, window_s, starts[0].impacts)
-        first = starts[0].repeats if _others(starts) == 0 else None
+        found = self._prediction(mean, error_of(starts), ends_s, window_s, starts[0].impacts)
+        first = starts[0].repeats if others_of(starts) == 0 else None
         is_periodic = first is not None and first.distance < self._pace.sharpness.tolerance
         each_observed = f"observed from {begins_s:.4g} to {ends_s:.4g} s"
         if windows > 1:
@@ -560,7 +515,7 @@ class _Refinement:
             motion=MotionKind.PERIODIC if is_periodic else MotionKind.CHAOTIC_SO_FAR,
             period=first.period if first is not None and is_periodic else None,
             ended=f"mean of {len(starts)} starts, each {each_observed}",
-            final_state=_state(starts[0].run.state),
+            final_state=state_of(starts[0].run.state),
             memory=StartMemory.LOST,
             scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
             section=self._section(starts[0].section),
@@ -568,9 +523,9 @@ class _Refinement:
         needed = None
         if self._target.error is not None:
             per_s = self._clock.taken_s / sum(each.run.time_s for each in starts)
-            more = self._more_needed(starts) - 1.0
+            more = more_needed(starts, self._target.error) - 1.0
             part_s = len(starts) * windows * window_s
-            if not self._windows_help(starts, begins_s):
+            if not windows_help(starts, begins_s / window_s):
                 part_s = sum(each.run.time_s for each in starts)
             # The deviation of n draws has a relative uncertainty of 1 / sqrt(2 n).
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
@@ -613,7 +568,7 @@ class _Refinement:
             lyapunov_per_s=None,
             lyapunov_error_per_s=None,
             start=self._scene.start.name,
-            final_state=_state(self._main.state),
+            final_state=state_of(self._main.state),
             outcome=Outcome.REACHED_END,
             method=self._method,
             accuracy=self._scene.accuracy.value,
@@ -624,47 +579,6 @@ class _Refinement:
     @property
     def _never_touches(self) -> bool:
         return never_touches(self._scene.specimen, self._motion)
-
-
-def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
-    """Return the relative error of the mean over starts, shape (4,).
-
-    Student's interval for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
-    Coull, Am. Stat. 52 (1998) 119), so that a rare motion counts once a start reaches it. If most starts
-    reached one repeating motion and ``others`` did not, their share may be up to the upper end of Wilson's
-    interval: the larger of the two errors counts, since both are intervals of that share.
-    """
-    responses = np.array(seen)
-    padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
-    mean, count = responses.mean(axis=0), len(seen)
-    times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
-    unseen = 0.0
-    if others is not None:
-        share = wilson_share(others, count)
-        unseen = (share.high - share.share) * max(
-            OTHER_DIFFERS, float((np.ptp(responses, axis=0) / mean).max())
-        )
-    return np.asarray(np.maximum(times * padded.std(axis=0, ddof=1) / mean, unseen) + ROUNDING)
-
-
-def _mean_error(starts: Sequence[_Start]) -> Floats:
-    windows = _windows_of(starts)
-    return mean_error([each.mean(windows) for each in starts], _others(starts))
-
-
-def _windows_of(starts: Sequence[_Start]) -> int:
-    """Return the number of windows that all starts have; those of a periodic motion are alike."""
-    return min((len(each.windows) for each in starts if each.repeats is None), default=1)
-
-
-def _others(starts: Sequence[_Start]) -> int | None:
-    """Return the starts that did not reach the most common motion; None if that does not repeat."""
-    settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
-    if 2 * len(settled) < len(starts) or len(settled) == 0:
-        return None
-    middle = np.median(settled, axis=0)
-    alike = int(np.sum(np.all(np.abs(settled - middle) <= ALIKE * middle, axis=1)))
-    return len(starts) - alike if 2 * alike >= len(starts) else None
 
 
 def _reported(
@@ -679,8 +593,3 @@ def _reported(
     is_met = error is not None and (target.error is None or error <= target.error)
     report = TargetReport(target.error, target.time_s, error, clock.taken_s, starts, windows, is_met, needed)
     return replace(found, target=report)
-
-
-def _state(values: Floats) -> State:
-    x, y, z, vx, vy, vz = (float(value) for value in values)
-    return (x, y, z, vx, vy, vz)

@@ -12,12 +12,11 @@ import numpy as np
 
 from ..specimen.accuracy import Accuracy
 from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
 from ..specimen.stops import chosen
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s
-from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
+from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, state_of
 from .repetition import FEWEST_TIMES, MOST_STATES, Pace, growth_of, pace_of
 from .scatter import WindowScatter, window_scatter
 from .scene import FEWEST, AutomaticDuration, FixedDuration, Observable, Scene
@@ -268,7 +267,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
         lyapunov_per_s=motion.slowest_rate if has_exponent else None,
         lyapunov_error_per_s=0.0 if has_exponent else None,
         start=scene.start.name,
-        final_state=_state(motion.state(duration_s)),
+        final_state=state_of(motion.state(duration_s)),
         outcome=Outcome.REACHED_END,
         method=Method.CLOSED_FORM,
         accuracy=scene.accuracy.value,
@@ -284,7 +283,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     if question is Question.MOTION:
         # As in integrated motions, the drive phase at the end equals that at the start.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
-        found = replace(found, duration_s=duration_s, final_state=_state(motion.state(duration_s)))
+        found = replace(found, duration_s=duration_s, final_state=state_of(motion.state(duration_s)))
     return found
 
 
@@ -393,7 +392,7 @@ class _Begun:
             if exponent is not None
             else None,
             start=scene.start.name,
-            final_state=_state(run.state),
+            final_state=state_of(run.state),
             outcome=run.outcome,
             method=self._method,
             accuracy=scene.accuracy.value,
@@ -463,8 +462,3 @@ def _exponent(scene: Scene, run: FollowedRun) -> "LyapunovEstimate":
         run.state,
         precision=Precision(*EXPONENT_PRECISION),
     )
-
-
-def _state(values: Floats) -> State:
-    x, y, z, vx, vy, vz = (float(value) for value in values)
-    return (x, y, z, vx, vy, vz)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
+from .stops import require_positive
+
 _STRICT = ConfigDict(extra="forbid")
 FEWEST_SAMPLES = 4
 """A not-a-knot cubic spline needs four points."""
@@ -106,7 +108,7 @@ class Sampled:
                 f"A sampled drive of shape {samples.shape} is not allowed: "
                 f"give one row of {FEWEST_SAMPLES} samples or more."
             )
-        _require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
+        require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
         if not bool(np.all(np.isfinite(samples))):
             bad = int(np.flatnonzero(~np.isfinite(samples))[0])
             raise ValueError(
@@ -123,11 +125,6 @@ class Sampled:
 
 Sweep = LinearSweep | LogarithmicSweep
 Drive = Harmonic | LinearSweep | LogarithmicSweep | Sampled
-
-
-def _require_positive(name: str, value: float, unit: str) -> None:
-    if not 0.0 < value < math.inf:
-        raise ValueError(f"{name} {value} {unit} is not allowed: it must be positive and finite.")
 
 
 def _require_frequency(name: str, frequency_hz: float) -> None:
@@ -149,7 +146,7 @@ def _require_amplitude(amplitude_m: float) -> None:
 def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude_m: float) -> None:
     _require_frequency("Sweep start", start_hz)
     _require_frequency("Sweep stop", stop_hz)
-    _require_positive("Sweep duration", duration_s, "s")
+    require_positive("Sweep duration", duration_s, "s")
     _require_amplitude(amplitude_m)
     if start_hz == stop_hz:
         raise ValueError(

@@ -1,0 +1,119 @@
+"""The mean over starts that nobody can distinguish: its error, and what would reduce it. SI units."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..specimen.state import Floats
+from .followed_run import FollowedRun
+from .repetition import Repetition
+from .scatter import COVERED
+from .shares import student_quantile, wilson_share
+from .stated_error import ROUNDING
+
+ALIKE = 1e-2
+"""Relative tolerance of responses for starts on one motion: some are still settling."""
+OTHER_DIFFERS = 1.0
+"""Assumed relative difference of a motion not yet found, such as chaos beside a motion without impacts."""
+FEWEST_STARTS = 16
+MOST_FREEDOM = 200
+"""Degrees of freedom above which Student's quantile hardly changes."""
+
+
+@dataclass(eq=False)
+class Start:
+    """One of the indistinguishable starts, with the results of its windows."""
+
+    run: FollowedRun
+    windows: list[Floats]
+    """Responses of each window, shape (4,); a single one for a periodic motion."""
+    repeats: Repetition | None
+    """Period if the motion is nearly periodic: all its windows are alike."""
+    impacts: int
+    """Impacts in the first window, as the next."""
+    section: Floats
+    """States once a drive period, shape (n, 6)."""
+
+    def mean(self, windows: int) -> Floats:
+        """Return the mean of the responses over the first windows, shape (4,)."""
+        return np.asarray(np.mean(self.windows[:windows], axis=0))
+
+
+def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
+    """Return the relative error of the mean over starts, shape (4,).
+
+    Student's interval for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
+    Coull, Am. Stat. 52 (1998) 119), so that a rare motion counts once a start reaches it. If most starts
+    reached one repeating motion and ``others`` did not, their share may be up to the upper end of Wilson's
+    interval: the larger of the two errors counts, since both are intervals of that share.
+    """
+    responses = np.array(seen)
+    padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
+    mean, count = responses.mean(axis=0), len(seen)
+    times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
+    unseen = 0.0
+    if others is not None:
+        share = wilson_share(others, count)
+        unseen = (share.high - share.share) * max(
+            OTHER_DIFFERS, float((np.ptp(responses, axis=0) / mean).max())
+        )
+    return np.asarray(np.maximum(times * padded.std(axis=0, ddof=1) / mean, unseen) + ROUNDING)
+
+
+def error_of(starts: Sequence[Start]) -> Floats:
+    """Return the relative error of the mean over the starts and windows so far, shape (4,)."""
+    windows = windows_of(starts)
+    return mean_error([each.mean(windows) for each in starts], others_of(starts))
+
+
+def windows_of(starts: Sequence[Start]) -> int:
+    """Return the number of windows that all starts have; those of a periodic motion are alike."""
+    return min((len(each.windows) for each in starts if each.repeats is None), default=1)
+
+
+def others_of(starts: Sequence[Start]) -> int | None:
+    """Return the starts that did not reach the most common motion; None if that does not repeat."""
+    settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
+    if 2 * len(settled) < len(starts) or len(settled) == 0:
+        return None
+    middle = np.median(settled, axis=0)
+    alike = int(np.sum(np.all(np.abs(settled - middle) <= ALIKE * middle, axis=1)))
+    return len(starts) - alike if 2 * alike >= len(starts) else None
+
+
+def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
+    """Return the next numbers of starts and windows, at most doubling the motion followed so far.
+
+    ``error`` is the requested one; ``lead`` is the time before the first window, in windows.
+    """
+    windows = windows_of(starts)
+    if len(starts) < FEWEST_STARTS:
+        return FEWEST_STARTS, windows
+    more = 2.0 if error is None else min(2.0, more_needed(starts, error))
+    if windows_help(starts, lead):
+        return len(starts), max(windows + 1, math.ceil(windows * more))
+    return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
+
+
+def windows_help(starts: Sequence[Start], lead: float) -> bool:
+    """Return whether more windows of the same starts reduce the error more cheaply than more starts.
+
+    More starts also find rare motions, so windows must cost half as much or less.
+    """
+    windows = windows_of(starts)
+    if lead < 1.0 or any(each.repeats is not None for each in starts):
+        return False
+    if windows == 1:
+        return True
+    worst = int(np.argmax(error_of(starts)))
+    values = np.array([each.windows[:windows] for each in starts])[:, :, worst]
+    within = float(values.var(axis=1, ddof=1).mean()) / windows
+    return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
+
+
+def more_needed(starts: Sequence[Start], error: float) -> float:
+    """Return the factor of additional motion for the requested error."""
+    power = 2.0 if others_of(starts) is None else 1.0
+    return 1.05 * math.pow(float(error_of(starts).max()) / error, power)
