@@ -60,7 +60,6 @@ LONG = (
     "tests/sim/branches/test_shot_branches.py",
     "tests/sim/branches/test_balanced_branches.py",
     "tests/sim/branches/test_known_folds.py",
-    "tests/sim/exponents/test_known_dimension.py",
     "tests/analysis/dynamics/test_dynamics.py",
     "tests/analysis/hidden_motion/test_hidden_motion.py",
     "tests/analysis/overlay/test_twin.py",

@@ -278,13 +278,6 @@ def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_
 
 
 @pytest.mark.thorough
-def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carried_out):
-    plan = other_resonance(47.5, 10.38, harmonic=2, phase_deg=90)
-    found = said(carried_out(plan, **bumpers(60e-6, 30e-6)), "resonance")
-    assert [each.get("frequency_hz") for each in found] == [None]
-
-
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("gap_m", "phase_deg", "model_hz", "model_m"),
     [
@@ -331,10 +324,3 @@ def test_a_search_ends_where_the_phase_leaps_from_one_motion_to_another(carried_
     (found,) = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
     assert found["lock"] == "a jump of the phase, as between two motions"
     assert found["tries"] < 25
-
-
-@pytest.mark.thorough
-def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
-    found = said(carried_out(other_resonance(31.6, 5.0, 8.0, harmonic=3)), "resonance")
-    assert [each.get("frequency_hz") for each in found] == [None, None]
-    assert "locked" not in [each["lock"] for each in found]

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import welch
 
 from vibench.acquisition import CheckFailed, open_bench, open_recording, run_measurement
 from vibench.acquisition.excitation.sine_sweep import Hold
@@ -105,31 +104,6 @@ def test_anything_that_is_recorded_is_what_the_plan_previews_to_the_converters_n
     assert np.max(np.abs(left)) < 10 * NOISE_V
 
 
-def test_the_first_sample_of_the_stream_is_at_the_first_sample_of_the_recording(streamed):
-    expected = played(streamed)
-    begin = streamed.segments["ramp_up"].start
-    heard = streamed.drive_v[begin : begin + expected.size]
-    cross = np.conj(np.fft.rfft(expected)) * np.fft.rfft(heard)
-    cycles = np.fft.rfftfreq(expected.size)
-    band = (cycles * RATE_HZ > 60) & (cycles * RATE_HZ < 590)
-    # The slope of the phase, each line weighted by its power.
-    phase = np.angle(cross[band] * np.exp(2j * np.pi * cycles[band] * DELAY))
-    weight = np.abs(cross[band])
-    slope = np.sum(weight * cycles[band] * phase) / np.sum(weight * cycles[band] ** 2)
-    assert -slope / (2 * np.pi) == pytest.approx(0.0, abs=0.01)
-
-
-def test_the_noise_has_its_rms_value_its_band_and_gaussian_moments(streamed):
-    noise = streamed.drive_v[streamed.segments["noise"]]
-    assert noise.size == round(1.0 * RATE_HZ)
-    # 1 s of 550 Hz is 1100 independent values: 2.1 % of scatter in the rms value, 0.15 in the kurtosis.
-    assert np.std(noise) == pytest.approx(2.0 * TERMINAL / 9, rel=0.05)
-    assert np.mean(noise**4) / np.mean(noise**2) ** 2 == pytest.approx(3.0, abs=0.4)
-    frequency_hz, density = welch(noise, RATE_HZ, nperseg=4096)
-    inside = np.median(density[(frequency_hz > 90) & (frequency_hz < 560)])
-    assert np.max(density[frequency_hz > 700]) < 1e-4 * inside
-
-
 def test_between_check_and_ramp_there_is_silence(streamed):
     quiet = streamed.drive_v[streamed.segments["check"].stop + 4000 : streamed.segments["ramp_up"].start]
     assert quiet.size > 0.2 * RATE_HZ
@@ -146,25 +120,6 @@ def test_the_check_at_low_level_plays_through_the_output(streamed):
 def test_the_recording_states_what_played(streamed):
     assert "analogue output" in streamed.log
     assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
-
-
-def test_two_runs_of_one_plan_play_the_same_and_another_seed_plays_another(tmp_path):
-    short = [
-        PLAN.model_copy(
-            update={"excitation": PLAN.excitation.model_copy(update={"seed": seed, "duration_s": 0.2})}
-        )
-        for seed in (11, 11, 12)
-    ]
-    drives = []
-    with open_bench(RIG) as bench:
-        for number, plan in enumerate(short):
-            path = tmp_path / f"{number}.h5"
-            run_measurement(bench, plan, path, LowLevelCheck.RECENTLY_PASSED)
-            with open_recording(path) as recording:
-                drives.append(recording.read("drive_voltage"))
-    first, again, another = drives
-    assert np.max(np.abs(first - again)) < 12 * NOISE_V
-    assert abs(np.corrcoef(first, another)[0, 1]) < 0.1
 
 
 def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):

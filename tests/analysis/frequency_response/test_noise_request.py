@@ -27,31 +27,6 @@ def response(path, **asked):
         return analyse(recording, FrequencyResponseRequest(**asked)).response
 
 
-@pytest.mark.thorough
-def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
-    found = response(streamed_file())
-    # Velocity over acceleration bends by 1 % over a line at 40 Hz: leakage leaves some of that.
-    for each in (found.frequency_response, found.h1, found.h2):
-        np.testing.assert_allclose(each.value, 2, rtol=6e-3)
-    hv = response(streamed_file(), estimator=Estimator.HV, noise_ratio=1e-6)
-    np.testing.assert_allclose(hv.frequency_response.value, 2, rtol=6e-3)
-    assert hv.frequency_response.settings.estimator is Estimator.HV
-    assert found.frequency_response.settings.estimator is Estimator.DRIVE
-
-
-@pytest.mark.thorough
-def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_drive(
-    streamed_file, streamed_noise
-):
-    velocity = streamed_noise[2]
-    extra = np.random.default_rng(3).standard_normal(velocity.size) * 2e-4
-    path = streamed_file(velocity=velocity + extra)
-    referenced, h2 = response(path), response(path, estimator=Estimator.H2)
-    band = referenced.frequency_response.frequency_hz < 100
-    assert np.median(h2.frequency_response.magnitude[band]) > 2.01
-    assert np.median(referenced.frequency_response.magnitude[band]) == pytest.approx(2, abs=0.005)
-
-
 @pytest.mark.parametrize("noisy", ["base", "m0"])
 @pytest.mark.parametrize(
     ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]

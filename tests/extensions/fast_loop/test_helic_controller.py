@@ -13,19 +13,13 @@ from vibench.acquisition import (
     InstrumentError,
     InstrumentLost,
     open_bench,
-    open_recording,
     run_measurement,
 )
 from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import (
     Measurement,
 )
-from vibench.acquisition.recording import BranchPointNote, feedback_note
-from vibench.acquisition.rig import confirm_simulated, load_rig, specimen_of
-from vibench.sim.periodic.balance_branch import balance, balance_branch_within
-from vibench.sim.periodic.branch_following import FrequencyPath
-from vibench.sim.periodic.harmonic_balance import structure_of
-from vibench.sim.periodic.restoring_force import spring_of
+from vibench.acquisition.rig import confirm_simulated, load_rig
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.contract import test_controller as contract
 from vibench_fast_loop.protocol import LoopFeedback, LoopProgram, LoopState
@@ -236,42 +230,3 @@ def test_a_board_whose_host_is_killed_closes_its_gate_at_once(found, installed, 
         host.kill()
         assert board.is_left.wait(10)
     assert not board.is_armed
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_unstable_motions_are_held_through_the_board_behind_their_fold(found, tmp_path):
-    _, rig = found
-    level_m = 1.6e-6
-    plan = BranchContinuation(
-        amplitude_vpp=4,
-        base_level=BaseLevel(displacement_m=level_m),
-        start_hz=94,
-        low_hz=90,
-        high_hz=118,
-        step_hz=2,
-        most_points=12,
-        record_s=0.3,
-    )
-    with open_bench(rig, confirm=confirm_simulated) as bench:
-        outcome = run_measurement(
-            bench, Measurement(name="branch", excitation=plan, ramp_s=0.4), tmp_path / "b.h5"
-        )
-    with open_recording(outcome.path) as recording:
-        notes = [feedback_note(event) for event in recording.events]
-    points = [each for each in notes if isinstance(each, BranchPointNote)]
-    structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
-    start = balance(structure, spring, 90.0, level_m)
-    branch = balance_branch_within(structure, spring, start, FrequencyPath((level_m,)), 89.0, 120.0)
-    folds = [each for each in branch.events if each.kind.value == "fold"]
-    hertz = [each.frequency_hz for each in points]
-    assert max(hertz) == pytest.approx(folds[0].frequency_hz, abs=0.3)
-    behind = points[int(np.argmax(hertz)) + 1 :]
-    assert len(behind) >= 2
-    unstable = slice(folds[0].index + 1, folds[1].index + 1)
-    f, ratio = branch.frequencies_hz[unstable][::-1], branch.response_ii[unstable, 0][::-1]
-    for each in behind:
-        assert each.base_m == pytest.approx(level_m, rel=0.005)
-        assert each.residue < 0.005
-        if each.frequency_hz < f[-1] - 0.05:
-            assert each.m0_m == pytest.approx(level_m * np.interp(each.frequency_hz, f, ratio), rel=0.02)

@@ -132,27 +132,6 @@ def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("contact", "amplitude", "low", "high"),
-    [("hertz", 5e-6, 88.0, 112.0), ("linear_gap", 20e-6, 125.0, 160.0), ("power:5", 5e-6, 60.0, 100.0)],
-)
-def test_a_run_from_near_a_stable_point_settles_on_it(contact, amplitude, low, high):
-    specimen = gong2025(contact=contact)
-    found = next(shot_branches(specimen, FrequencyPath((amplitude,)), low, high, FEW))
-    branch = found.branch
-    # Those that forget a push within the run.
-    quick = np.flatnonzero(np.abs(branch.multipliers[:, 0]) < 0.95)
-    chosen = np.random.default_rng(8).choice(quick, 17)
-    for k in chosen:
-        drive = Harmonic(float(branch.frequencies_hz[k]), amplitude)
-        pushed = branch.states[k] + 1e-6 * state_scales(specimen, drive)
-        run = steady_response(specimen, drive, "reference", 600 / drive.frequency_hz, 0.2, pushed)
-        assert run.response_ii == pytest.approx(branch.response_ii[k, 0], rel=1e-5)
-        assert run.relative_ii == pytest.approx(branch.response_ii[k, 3], rel=1e-5)
-        assert run.relative_i == pytest.approx(branch.response_i[k, 3], rel=2e-5)
-
-
-@pytest.mark.thorough
 def test_every_point_comes_back_within_its_error_whatever_its_stability(near_the_first_resonance):
     specimen = gong2025()
     for found in near_the_first_resonance:

@@ -23,7 +23,7 @@ def shrinking(specimen):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("drive", [CHAOS, LARGE, Harmonic(130.0, 20e-6), Harmonic(260.0, 1e-6)])
+@pytest.mark.parametrize("drive", [CHAOS, Harmonic(260.0, 1e-6)])
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5", "power:47", "linear", "rigid:1"])
 def test_the_exponents_add_up_to_what_the_dampers_take(contact, drive):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)

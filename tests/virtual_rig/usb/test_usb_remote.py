@@ -1,13 +1,9 @@
 """A generator in this process, opened by a program in another one."""
 
 import errno
-import subprocess
-import sys
-import textwrap
 from concurrent.futures import ThreadPoolExecutor
 
 import grpc
-import numpy as np
 import pytest
 
 from vibench.acquisition import InstrumentLost
@@ -43,37 +39,6 @@ def proxy(rig):
     device = RemoteUsbDevice(rig.address)
     yield device
     device.close()
-
-
-def test_a_program_in_another_process_needs_one_line(rig):
-    program = """
-        import sys, warnings
-        warnings.simplefilter("ignore")
-        from vibench.virtual_rig.usb.bus import plug_in_remote
-        plug_in_remote(sys.argv[1])
-        import numpy as np
-        import pyvisa
-        rm = pyvisa.ResourceManager("@py")
-        (name,) = [name for name in rm.list_resources() if name.startswith("USB")]
-        afg = rm.open_resource(name)
-        print(afg.query("*IDN?").split(",")[1])
-        codes = np.arange(8192) * 2
-        afg.write_binary_values("DATA:DATA EMEM,", codes, datatype="H", is_big_endian=True)
-        back = afg.query_binary_values("DATA:DATA? EMEM", datatype="H", is_big_endian=True)
-        print(back == codes.tolist())
-        afg.write("FREQ 321;:OUTP ON")
-        print(afg.query("SYST:ERR?").strip())
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(program), rig.address],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
-    assert done.stdout.splitlines() == ["AFG1022", "True", '0,"No error"'], done.stderr
-    assert rig.generator.settings(1).frequency_hz == 321
-    assert np.any(rig.generator.render(0.0, 1e-7, 100))
 
 
 def test_the_proxy_states_about_itself_what_the_device_states(rig, proxy):
