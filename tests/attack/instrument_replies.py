@@ -10,6 +10,7 @@ import math
 import os
 import random
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -404,6 +405,16 @@ def faults(case: Case, ending: Ending) -> tuple[str, ...]:
     return (*found, " ".join(case.arguments), case.prepare[1]) if found else ()
 
 
+def _usual(kind: str, *options: str) -> Case:
+    """Return a measurement without a fault: one that fails is no evidence."""
+    odd = {"kind": kind, "how": "as usual", "after": 0, "always": True, "seed": 0}
+    return Case(
+        ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out", *options),
+        {"plan.toml": (PLAN + DWELL).encode()},
+        prepare=(__name__, json.dumps(odd)),
+    )
+
+
 def attack(shard: Shard) -> Tally:
     """Let instruments reply oddly to whole commands."""
     from .recordings_mutants import restructured
@@ -411,16 +422,13 @@ def attack(shard: Shard) -> Tally:
     tally = shard.tally("replies")
     with CommandRunner() as runner, tempfile.TemporaryDirectory(prefix="vibench_replies_") as name:
         folder = Path(name)
-        usual = Case(
-            ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out"),
-            {"plan.toml": (PLAN + DWELL).encode()},
-            prepare=(__name__, json.dumps({"kind": "usb"})),
-        )
-        usual.lay(folder)
-        ended = runner.run_in(folder, usual)
-        if ended.code:
-            raise RuntimeError(f"a usual measurement failed: {ended.err}")
-        recorded = (folder / "out" / "point.h5").read_bytes()
+        for usual in (_usual("sound card", "--check", "waived", "--knobs", "knobs.toml"), _usual("usb")):
+            usual.lay(folder)
+            ended = runner.run_in(folder, usual)
+            if ended.code:
+                raise RuntimeError(f"a usual measurement failed: {ended.err}")
+            recorded = (folder / "out" / "point.h5").read_bytes()
+            shutil.rmtree(folder / "out")
 
         def played(chance: random.Random) -> bytes:
             return restructured("point.h5", recorded, chance)

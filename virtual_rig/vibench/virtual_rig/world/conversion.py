@@ -100,8 +100,7 @@ def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
     else:
         rows = ceil(_PHASES_PER_SAMPLE / max(ratio, 1.0))
         fractions = np.arange(rows + 1) / rows
-    table = np.array([_weights(ratio, float(fraction)) for fraction in fractions])
-    return Decimator(ratio, start_step, delay, table)
+    return Decimator(ratio, start_step, delay, _weights(ratio, fractions))
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
@@ -114,11 +113,14 @@ def _half_width_steps(ratio: float) -> int:
     return ceil(_HALF_WIDTH_SAMPLES * max(ratio, 1.0)) + _DROOP_REACH
 
 
-def _weights(ratio: float, fraction: float) -> FloatArray:
-    """Return the weights, oldest first, of a sample ``fraction`` of a step after a grid point."""
+def _weights(ratio: float, fractions: FloatArray) -> FloatArray:
+    """Return a row of weights, oldest first, for each fraction of a step that a sample follows a grid point.
+
+    All rows at once: a conversion that starts while a run waits for its samples may not take seconds.
+    """
     newest = _half_width_steps(ratio) + 1
     count = ceil(2 * newest / _LANES) * _LANES
-    positions = newest - np.arange(count - 1, -1, -1.0) - fraction
+    positions = newest - np.arange(count - 1, -1, -1.0) - fractions[:, np.newaxis]
     # Symmetric weights that invert sin(pi f)/(pi f), the gain of a mean over one step.
     frequency = np.linspace(0, _DROOP_BAND, _DROOP_FIT_POINTS)
     cosines = [np.ones_like(frequency)]
@@ -126,10 +128,10 @@ def _weights(ratio: float, fraction: float) -> FloatArray:
     matrix = np.array(cosines).T
     half, *_ = np.linalg.lstsq(matrix * np.sinc(frequency)[:, np.newaxis], np.ones_like(frequency))
     correction = np.concatenate([half[:0:-1], half])
-    weights = np.zeros(count)
+    weights = np.zeros_like(positions)
     for shift, weight in zip(range(-_DROOP_REACH, _DROOP_REACH + 1), correction, strict=True):
         weights += weight * _windowed_sinc(positions - shift, ratio)
-    return np.asarray(weights / weights.sum())
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _windowed_sinc(positions: FloatArray, ratio: float) -> FloatArray:
