@@ -186,11 +186,12 @@ def _change_journal(path: Path, chance: random.Random) -> str:
             f"SELECT seal FROM {noting[0]} WHERE file != ?",
             (path.name,),
         ).fetchone()
-    for table in noting:
+    changed = chance.choice((noting, noting[:1], noting[1:]))
+    for table in changed:
         connection.execute(f"UPDATE {table} SET seal = ? WHERE file = ?", (new, path.name))
     connection.commit()
     connection.close()
-    return f"journal, {seals} seal"
+    return f"journal, {seals} seal in {' and '.join(changed)}"
 
 
 ALTERATIONS: tuple[Callable[[Path, random.Random], str], ...] = (

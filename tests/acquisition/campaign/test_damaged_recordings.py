@@ -262,6 +262,40 @@ def said_by(statement):
     return damage
 
 
+@pytest.mark.parametrize("table", ["points", "attempts"])
+@pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
+def test_a_journal_whose_tables_state_two_seals_confirms_no_recording(folder, table, seal):
+    list_recordings(folder)
+    said_by(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
+    if (table, seal) == ("attempts", "''"):  # as in a journal from before seals
+        assert not [each for each in verify_recordings(folder) if each.is_bad]
+        return
+    with open_recording(folder / "two.h5") as recording:
+        for depth in SealDepth:
+            found = recording.check_seal(depth)
+            assert found.state is SealState.DAMAGED
+            assert found.sentence == "the campaign's journal has two seals for two: the journal was changed"
+        assert not recording.is_checked
+    assert [each.path for each in verify_recordings(folder) if each.is_bad] == ["two.h5"]
+    assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
+
+
+def test_a_forger_who_notes_another_recording_in_one_table_is_found(folder):
+    exchanged_for_an_older_one(folder)
+    with open_recording(folder / "two.h5") as recording:
+        said_by(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
+        assert recording.check_seal(SealDepth.WHOLE).state is SealState.DAMAGED
+
+
+def test_a_point_measured_again_under_a_deleted_name_is_intact_and_the_former_recording_is_not(bench, folder):
+    former = (folder / "two.h5").read_bytes()
+    (folder / "two.h5").unlink()
+    run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert not [each for each in verify_recordings(folder) if each.is_bad]
+    (folder / "two.h5").write_bytes(former)
+    assert [each.path for each in verify_recordings(folder) if each.is_bad] == ["two.h5"]
+
+
 @pytest.mark.parametrize(
     "damage",
     [

@@ -6,10 +6,11 @@ is then made again.
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import astuple, dataclass, fields
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from ..recording import (
     JOURNAL_SUFFIX,
     PART_SUFFIX,
     SUFFIX,
+    NotedSeal,
     Recording,
     RecordingState,
     SealCheck,
@@ -27,6 +29,7 @@ from ..recording import (
     SealKey,
     SealState,
     forget_checks,
+    noted_seals,
     open_recording,
 )
 from ._journal import JournalPoint, JournalPointState, journal_exists, read_journal
@@ -229,10 +232,12 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
 def _update(folder: Path, connection: sqlite3.Connection) -> None:
     """Read new or changed files, and remove entries of missing ones; all in one transaction."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
+    noted = cache(noted_seals)
     for path in recordings_below(folder):
         try:
             found = path.stat()
-            size_bytes, stamp = found.st_size, _stamp(found)
+            size_bytes = found.st_size
+            stamp = _stamp(found, noted(path.parent).get(path.name, ()))
         except FileNotFoundError:  # it got its final name in the meantime
             continue
         except OSError:  # a link to itself: its entry says that it cannot be read
@@ -252,9 +257,13 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
     connection.execute("COMMIT")
 
 
-def _stamp(found: os.stat_result) -> str:
-    """Return a value that changes with any write: no program sets back the file system's time of change."""
-    return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}"
+def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
+    """Return a value that changes with any write, and with the seals that journals have for the file.
+
+    No program sets back the file system's time of change.
+    """
+    seals = "".join(f" {each.seal} {each.attempt_seal}" for each in noted)
+    return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}{seals}"
 
 
 def recordings_below(folder: Path) -> Iterator[Path]:

@@ -30,7 +30,7 @@ from ._seal import (
     SealState,
     check_result,
     check_seal,
-    noted_seals,
+    journal_objection,
     remember,
     require_reachable,
     seal_key,
@@ -301,12 +301,10 @@ class Recording(RecordingDescription):
             Its state, a few words on it, and the seal.
         """
         found = self._check_own_seal(SealDepth(depth), key)
-        noted = noted_seals(self.path)
-        if found.state in (SealState.UNFINISHED, SealState.DAMAGED) or not noted or found.seal in noted:
+        if found.state in (SealState.UNFINISHED, SealState.DAMAGED):
             return found
-        name = next(iter(noted.values()))
-        sentence = f"its seal is not the one in the campaign's journal for {name}: another recording"
-        return SealCheck(SealState.DAMAGED, sentence, found.seal)
+        objection = journal_objection(self.path, found.seal)
+        return SealCheck(SealState.DAMAGED, objection, found.seal) if objection else found
 
     def _check_own_seal(self, depth: SealDepth, key: SealKey | None) -> SealCheck:
         if self.is_growing and layout.SEAL not in self._open.file:
@@ -329,7 +327,7 @@ class Recording(RecordingDescription):
     @property
     def is_checked(self) -> bool:
         """Whether this process has checked the whole file; later reads are compared with that."""
-        return was_checked(self.seal) and self.seal in (noted_seals(self.path) or (self.seal,))
+        return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
         """Check every saved result against its own seal; the key is as in `check_seal`."""

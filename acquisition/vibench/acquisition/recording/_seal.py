@@ -356,23 +356,50 @@ def _sha256(raw: bytes) -> str:
 JOURNAL_SUFFIX = ".campaign.sqlite"
 
 _NOTED = """
-SELECT seal, name FROM points WHERE file = :file AND seal != ''
-UNION SELECT seal, name FROM attempts WHERE file = :file AND seal != ''
+WITH last AS (SELECT file, name, seal, MAX(number) FROM attempts GROUP BY file)
+SELECT file, points.name, points.seal, COALESCE(last.seal, '') FROM points LEFT JOIN last USING (file)
+UNION ALL SELECT file, name, seal, seal FROM last WHERE file NOT IN (SELECT file FROM points)
 """
 
 
-def noted_seals(path: Path) -> Mapping[str, str]:
-    """Return the points that a recording was made for, by the seal that a journal in its folder noted.
+@dataclass(frozen=True)
+class NotedSeal:
+    """Seal of one file in a journal, from both tables that have it."""
 
-    Empty where no journal knows the file. A journal that cannot be read notes nothing: `vibench
-    verify` reports it.
+    point: str
+    seal: str
+    """In the table of points; that of the attempt for a file that was not the point's last one."""
+    attempt_seal: str
+    """In the file's last attempt; empty without one, and for one from before seals."""
+
+
+def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
+    """Return the seals that the journals of a folder have noted, by file name.
+
+    A journal that cannot be read notes nothing: `vibench verify` reports it.
     """
-    noted: dict[str, str] = {}
-    file = path.name.encode(errors="replace").decode()  # a name that is not text is in no journal
-    for journal in sorted(path.parent.glob(f"*{JOURNAL_SUFFIX}")):
+    noted: dict[str, list[NotedSeal]] = {}
+    for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
         with suppress(sqlite3.Error), closing(opened_to_look(journal)) as connection:
-            noted |= connection.execute(_NOTED, {"file": file}).fetchall()
+            for file, *seals in connection.execute(_NOTED):
+                noted.setdefault(file, []).append(NotedSeal(*seals))
     return noted
+
+
+def journal_objection(path: Path, seal: str) -> str:
+    """Return why a journal in its folder contradicts a recording with this seal; empty if none does.
+
+    No program notes two seals for one file: where the tables differ, neither confirms it.
+    """
+    noted = noted_seals(path.parent).get(path.name, ())
+    stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
+    if stated and seal not in stated:
+        point = noted[0].point
+        return f"its seal is not the one in the campaign's journal for {point}: another recording"
+    for each in noted:
+        if each.attempt_seal not in ("", each.seal):
+            return f"the campaign's journal has two seals for {each.point}: the journal was changed"
+    return ""
 
 
 def opened(uri: str) -> sqlite3.Connection:
