@@ -49,7 +49,7 @@ def focusable(window):
             yield widget
 
 
-def test_everything_that_takes_the_focus_has_a_name(window):
+def test_every_focusable_widget_has_an_accessible_name(window):
     nameless = []
     for widget in focusable(window):
         text = widget.text() if isinstance(widget, NAMED_BY_TEXT) else ""
@@ -58,7 +58,7 @@ def test_everything_that_takes_the_focus_has_a_name(window):
     assert nameless == []
 
 
-def test_every_page_and_every_tab_has_a_name(window):
+def test_every_page_and_tab_has_an_accessible_name(window):
     for name, page in window.pages.items():
         assert page.accessibleName() == f"{name} page"
     for tabs in window.findChildren(QTabWidget):
@@ -83,7 +83,7 @@ def test_mnemonics_are_unique_in_each_menu_and_on_each_page(window):
         assert max(keys.values(), default=1) == 1, menu.title()
 
 
-def test_keys_of_the_window_are_unique(window):
+def test_keyboard_shortcuts_are_unique(window):
     keys = [
         action.shortcut().toString()
         for menu in window.menuBar().findChildren(QMenu)
@@ -155,7 +155,7 @@ def test_no_text_is_cut_off(window, qapp, size):
 
 
 @pytest.mark.thorough
-def test_no_text_is_cut_off_at_twice_the_scale():
+def test_no_text_is_cut_off_at_a_scale_of_two():
     """On a fine screen, as Qt scales it for a whole process."""
     this = f"{Path(__file__)}::test_no_text_is_cut_off"
     environment = {**os.environ, "QT_SCALE_FACTOR": "2"}

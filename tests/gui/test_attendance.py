@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.mark.thorough
-def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left_alone(window, qtbot):
+def test_a_window_busy_for_one_second_does_not_stop_a_campaign(window, qtbot):
     bridge, seen = window.context.bridge, []
 
     def reach(*states):
@@ -59,7 +59,7 @@ def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left
 
 
 @pytest.mark.thorough
-def test_nothing_of_an_engine_that_was_killed_is_taken_for_the_next_one(window, qtbot):
+def test_a_new_engine_does_not_inherit_data_of_a_killed_one(window, qtbot):
     """Its orders were waited for, and its last picture was continued by the next engine's first run."""
     bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))
     page = window.pages[RUN]

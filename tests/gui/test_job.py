@@ -163,7 +163,7 @@ def read_and_start(qtbot, window):
 
 
 @pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
-def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, width, height, points):
+def test_the_whole_job_can_be_done_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
     """Another measurement is made, looked at, compared with those before it, and exported."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
@@ -205,7 +205,7 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, w
     qapp.setFont(font)
 
 
-def test_the_whole_job_is_done_by_mouse_alone(bench, qtbot, tmp_path):
+def test_the_whole_job_can_be_done_by_mouse(bench, qtbot, tmp_path):
     """But for the name of the file, which nobody can point at."""
 
     def point_at(widget, place=None):
@@ -291,7 +291,7 @@ def in_a_menu(bench):
 
 
 @pytest.mark.parametrize("place", [on_the_banner, on_a_plot, in_a_field, in_a_modal_dialog, in_a_menu])
-def test_esc_brings_the_drive_to_zero_wherever_the_focus_is(bench, qtbot, place):
+def test_esc_silences_the_drive_from_any_focus(bench, qtbot, place):
     start_dwell(bench, qtbot, place.__name__)
     focus = place(bench)
     began_s = time.monotonic()
@@ -324,7 +324,7 @@ def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
     assert "carried out" not in bench.pages[RUN].summary.sentence + said[-1]
 
 
-def test_the_live_pictures_show_the_run(bench, qtbot):
+def test_the_live_plots_show_the_run(bench, qtbot):
     bench.show_page(RUN)
     start_dwell(bench, qtbot, "live")
     page = bench.pages[RUN]
@@ -356,7 +356,7 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
         assert any("tapped the table" in event.text for event in recording.events)
 
 
-def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
+def test_the_current_noise_average_can_be_rejected(bench, qtbot):
     noise = {"kind": "white_noise", "amplitude_vpp": 0.2, "band_start_hz": 40, "band_stop_hz": 600}
     noise |= {"realisations": 12, "settle_s": 1.0}
     plan = {"name": "noise", "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": noise}
@@ -375,7 +375,7 @@ def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
     assert analyse(Path(recorded(bench).file)).response.periodic.realisations == 11
 
 
-def test_anything_that_is_complained_of_goes_when_it_has_come_about(bench, qtbot):
+def test_an_error_message_disappears_when_its_cause_is_fixed(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.start()
     assert "nothing is armed" in bench.strip.notices[-1].what
@@ -401,7 +401,7 @@ def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
 
 
-def test_an_engine_that_dies_is_reported_within_a_moment(bench, qtbot):
+def test_the_death_of_the_engine_is_reported_promptly(bench, qtbot):
     os.kill(bench.context.bridge.engine_pid, signal.SIGKILL)
     qtbot.waitUntil(lambda: bench.context.bridge.status is None, timeout=5_000)
     assert bench.strip.notices[-1].code == "EngineGone"

@@ -55,7 +55,7 @@ def measuring_window(folder, attendance, state, patience_s=USUAL_PATIENCE_S):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither signal")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 @pytest.mark.timeout(300)
-def test_a_window_that_dies_or_freezes_leaves_silence(tmp_path, number):
+def test_the_drive_is_silenced_when_the_window_dies_or_freezes(tmp_path, number):
     with measuring_window(tmp_path, Supervision.ATTENDED, tmp_path / "state") as window:
         assert silent_after_s(window, number, tmp_path) < SILENT_WITHIN_S[number.name]
 
@@ -71,9 +71,7 @@ def test_a_window_that_dies_or_freezes_leaves_silence(tmp_path, number):
     ],
 )
 @pytest.mark.timeout(900)
-def test_a_busy_computer_stops_no_drive_at_its_limit_and_a_window_that_ends_still_does(
-    tmp_path, number, attended_s
-):
+def test_a_busy_computer_does_not_stop_a_drive_but_a_dead_window_does(tmp_path, number, attended_s):
     """A thread of the window was to say that it is there: it waited up to 1.6 s for Python's lock."""
     with (
         measuring_window(tmp_path, Supervision.ATTENDED, tmp_path / "state", VIEWER_PATIENCE_S) as window,
@@ -120,9 +118,7 @@ def silent_after_s(window, number, folder):
 @pytest.mark.thorough
 @sees_locks
 @pytest.mark.timeout(300)
-def test_anything_that_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_it(
-    window, qtbot, tmp_path
-):
+def test_the_next_window_shows_and_attends_an_unattended_run(window, qtbot, tmp_path):
     bridge, left = window.context.bridge, tmp_path / "left"
     with measuring_window(left, Supervision.UNATTENDED, os.environ["VIBENCH_STATE_DIR"]):
         window.look_for_left_campaign()

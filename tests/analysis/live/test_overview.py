@@ -50,7 +50,7 @@ def test_a_picture_holds_the_extremes_of_its_stretch(recording, start, stop):
     assert np.nanmin(picture.low) == pytest.approx(np.nanmin(samples), rel=1e-6)
 
 
-def test_a_close_look_shows_the_samples_themselves(recording):
+def test_zooming_in_shows_individual_samples(recording):
     picture = overview_of(recording).picture(("m0_velocity",), 150_000, 150_010, 100)
     assert picture.samples_per_column == 1.0
     assert np.allclose(picture.low[0], recording.read("m0_velocity", 150_000, 150_010))

@@ -13,7 +13,7 @@ import pytest
 from vibench.gui.background.background import Background, LatestRequest
 
 
-def test_an_answer_comes_from_another_process(context, qtbot):
+def test_answers_are_computed_in_another_process(context, qtbot):
     answers, errors = [], []
     context.background.ask(os.getpid, answers.append, errors.append)
     qtbot.waitUntil(lambda: bool(answers or errors), timeout=100_000)
@@ -21,7 +21,7 @@ def test_an_answer_comes_from_another_process(context, qtbot):
     assert answers[0] != os.getpid()
 
 
-def test_an_error_comes_back_as_itself_and_a_dropped_answer_does_not(context, qtbot):
+def test_errors_keep_their_type_and_dropped_answers_are_not_delivered(context, qtbot):
     answers, errors = [], []
     context.background.ask(factorial, answers.append, errors.append, 5).drop()
     context.background.ask(factorial, answers.append, errors.append, -1)
@@ -43,7 +43,7 @@ def background(qapp):
     background.close()
 
 
-def test_a_process_that_dies_is_reported_and_others_do_what_is_left(background, qtbot):
+def test_a_dead_process_is_reported_and_others_finish_its_queue(background, qtbot):
     answers, errors = [], []
     background.ask(leave, answers.append, errors.append, 0)
     dropped = [background.ask(factorial, answers.append, errors.append, 3) for _ in range(5)]
@@ -56,7 +56,7 @@ def test_a_process_that_dies_is_reported_and_others_do_what_is_left(background, 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_closing_ends_a_process_that_does_not_answer(background, qtbot):
+def test_closing_ends_an_unresponsive_process(background, qtbot):
     pids = []
     background.ask(os.getpid, pids.append, pids.append)
     qtbot.waitUntil(lambda: bool(pids), timeout=100_000)
@@ -83,7 +83,7 @@ def is_being_read(thread):
 
 
 @pytest.mark.timeout(60)
-def test_closing_ends_a_process_that_is_handing_an_answer_over(background, qtbot, tmp_path):
+def test_closing_ends_a_process_that_is_sending_its_answer(background, qtbot, tmp_path):
     """The end of an answer that never came was waited for: the window hung for ever."""
     background.ask(large, lambda _: None, lambda _: None, str(tmp_path / "begun"))
     qtbot.waitUntil((tmp_path / "begun").exists, timeout=100_000)
@@ -106,7 +106,7 @@ def hungry(_number):
     return bytearray(8 << 30)
 
 
-def test_a_question_after_a_dropped_one_is_answered(background, qtbot, qapp):
+def test_a_request_after_a_dropped_one_is_answered(background, qtbot, qapp):
     answers, errors = [], []
     latest = LatestRequest(background, factorial, answers.append, errors.append, 1, qapp)
     for number in (3, 4):
@@ -120,7 +120,9 @@ def test_a_question_after_a_dropped_one_is_answered(background, qtbot, qapp):
     assert not latest.is_busy
 
 
-def test_a_process_that_works_in_vain_is_ended_and_what_waits_is_done(background, qtbot, qapp, tmp_path):
+def test_a_process_with_a_dropped_request_is_ended_and_the_next_request_runs(
+    background, qtbot, qapp, tmp_path
+):
     answers, errors = [], []
     latest = LatestRequest(background, for_ever, answers.append, errors.append, 1, qapp)
     latest.ask(str(tmp_path / "pid"))
@@ -133,14 +135,14 @@ def test_a_process_that_works_in_vain_is_ended_and_what_waits_is_done(background
     qtbot.waitUntil(lambda: not Path(f"/proc/{pid}").exists(), timeout=5000)
 
 
-def test_a_process_has_a_bound_on_its_memory(background, qtbot):
+def test_worker_memory_is_limited(background, qtbot):
     answers, errors = [], []
     background.ask(hungry, answers.append, errors.append, 0)
     qtbot.waitUntil(lambda: bool(answers or errors), timeout=100_000)
     assert re.search(r"needs more than 6 GB of memory", str(errors[0]))
 
 
-def test_a_job_is_over_when_its_answer_was_handed_over_and_not_before(background, qtbot):
+def test_a_job_ends_only_after_its_answer_was_delivered(background, qtbot):
     answers, seen = [], []
 
     def take(answer):
@@ -152,7 +154,7 @@ def test_a_job_is_over_when_its_answer_was_handed_over_and_not_before(background
     assert seen == [[True, False], [True, True]]
 
 
-def test_a_preview_comes_while_long_work_keeps_every_other_process(context, qtbot):
+def test_previews_are_computed_while_all_other_processes_are_busy(context, qtbot):
     """Analyses that took minutes had the Test page wait behind them."""
     for _ in range(4):
         context.background.ask(sleep, lambda _: None, lambda _: None, 3600.0)

@@ -27,7 +27,7 @@ def form(qtbot):
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)
-def test_a_measurement_comes_out_of_the_form_as_it_went_in(form, name):
+def test_the_form_returns_an_unedited_measurement_unchanged(form, name):
     measurement = MEASUREMENTS[name]
     form.show_content(measurement.model_dump(mode="json", exclude_none=True))
     assert Measurement.model_validate(form.content()) == measurement
@@ -44,7 +44,7 @@ def leaves(form):
 
 
 @pytest.mark.parametrize("kind", sorted(EXCITATION_KINDS))
-def test_every_field_of_every_kind_is_there_named_and_labelled(form, kind):
+def test_every_field_of_every_kind_has_a_name_and_a_label(form, kind):
     example = next((m for m in MEASUREMENTS.values() if m.excitation.kind == kind), None)
     excitation = form.editors["excitation"]
     excitation.show_content({"kind": kind} if example is None else example.excitation)
@@ -57,7 +57,7 @@ def test_every_field_of_every_kind_is_there_named_and_labelled(form, kind):
         assert widget in buddies, name
 
 
-def test_units_and_limits_stand_at_the_field(form):
+def test_fields_show_units_and_limits(form):
     widget = form.editors["ramp_s"].widget
     assert widget.accessibleName() == "Ramp in s"
     assert "above 0, at most 60 s" in widget.toolTip()
@@ -65,7 +65,7 @@ def test_units_and_limits_stand_at_the_field(form):
     assert widget.text() == "1.5 s"
 
 
-def test_anything_that_is_typed_is_in_the_plan(form, qtbot):
+def test_typed_values_reach_the_plan(form, qtbot):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     widget = form.editors["excitation"].form.editors["frequency_hz"].widget
     widget.lineEdit().setText("0,3 kHz")
@@ -73,7 +73,7 @@ def test_anything_that_is_typed_is_in_the_plan(form, qtbot):
     assert form.content()["excitation"]["frequency_hz"] == 300.0
 
 
-def test_a_text_that_is_no_number_is_complained_about_at_its_field_and_changes_nothing(form, qtbot):
+def test_non_numeric_text_shows_an_error_at_its_field_and_keeps_the_plan(form, qtbot):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     editor = form.editors["ramp_s"]
     editor.widget.lineEdit().setText("soon")
@@ -83,7 +83,7 @@ def test_a_text_that_is_no_number_is_complained_about_at_its_field_and_changes_n
     assert form.content()["ramp_s"] == MEASUREMENTS["quick-dwell"].ramp_s
 
 
-def test_a_change_of_kind_keeps_what_both_kinds_have(form):
+def test_changing_the_kind_keeps_shared_values(form):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     excitation = form.editors["excitation"]
     excitation.kind_choice.setCurrentIndex(excitation.kind_choice.findText("sine sweep"))
@@ -92,7 +92,7 @@ def test_a_change_of_kind_keeps_what_both_kinds_have(form):
     assert content["amplitude_vpp"] == MEASUREMENTS["quick-dwell"].excitation.amplitude_vpp
 
 
-def test_what_a_field_states_of_itself_in_the_plan_is_its_explanation(form):
+def test_the_help_of_a_field_is_its_description_in_the_model(form):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     excitation = form.editors["excitation"].form
     assert (
@@ -101,7 +101,7 @@ def test_what_a_field_states_of_itself_in_the_plan_is_its_explanation(form):
     )
 
 
-def test_a_specimen_whose_springs_follow_from_another_mass_is_warned_of(qtbot, tmp_path):
+def test_the_form_warns_when_spring_constants_belong_to_another_mass(qtbot, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\nmodel = "gong2025"\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n')
     form = ValidatedForm(SpecimenChoice, "scene", frozenset({"described"}))

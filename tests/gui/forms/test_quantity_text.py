@@ -25,7 +25,7 @@ from vibench.gui.forms.quantity_edit import QuantityEdit, parse_quantity, quanti
         (" 7 ", "", 7.0),
     ],
 )
-def test_numbers_are_read_as_people_write_them(text, unit, value):
+def test_common_number_formats_are_parsed(text, unit, value):
     assert parse_quantity(text, unit) == value
 
 
@@ -33,13 +33,13 @@ def test_numbers_are_read_as_people_write_them(text, unit, value):
     ("text", "unit"),
     [("5 Hz", "s"), ("fast", "Hz"), ("1.2.3", "V"), ("5 G", "m/s²"), ("5 g", "m"), ("", "s")],
 )
-def test_other_units_and_words_are_refused(text, unit):
+def test_wrong_units_and_words_are_refused(text, unit):
     with pytest.raises(ConfigurationError, match=r"number|unit"):
         parse_quantity(text, unit)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["", "Hz", "m", "s", "Vpp", "m/s²"]))
-def test_anything_that_is_shown_reads_back_as_the_same_number(value, unit):
+def test_displayed_text_parses_to_the_same_number(value, unit):
     assert parse_quantity(quantity_text(value, unit), unit) == value
 
 
@@ -82,13 +82,13 @@ def field(qtbot):
         ("m", None, 7e-6),
     ],
 )
-def test_a_plain_number_takes_the_unit_that_is_displayed(qtbot, field, unit, value, taken):
+def test_a_number_without_unit_is_in_the_displayed_unit(qtbot, field, unit, value, taken):
     edit = field(unit, value)
     assert typed(qtbot, edit, "7") == taken
     assert edit.complaint == ""
 
 
-def test_a_plain_number_in_a_list_takes_the_unit_that_is_displayed(qtbot):
+def test_numbers_without_unit_in_a_list_are_in_the_displayed_unit(qtbot):
     editor = ListEditor("m", lambda: None)
     qtbot.addWidget(editor.widget)
     editor.show_content([5e-6, 2e-3])
@@ -96,7 +96,7 @@ def test_a_plain_number_in_a_list_takes_the_unit_that_is_displayed(qtbot):
     assert editor.content() == [7e-6, 3e-3, 4e-3]
 
 
-def test_a_value_a_thousand_times_the_old_one_is_asked_about(qtbot, field):
+def test_a_value_a_thousand_times_larger_must_be_confirmed(qtbot, field):
     edit = field("m", 5e-6)
     assert typed(qtbot, edit, "7 mm") == 5e-6
     assert "1.4e+03 times" in edit.complaint
@@ -109,7 +109,7 @@ def test_a_value_a_thousand_times_the_old_one_is_asked_about(qtbot, field):
     assert edit.complaint == ""
 
 
-def test_a_value_that_is_asked_about_is_not_taken_by_the_form(qtbot, field):
+def test_an_unconfirmed_value_does_not_enter_the_form(qtbot, field):
     form = ValidatedForm(Dwell, "dwell")
     qtbot.addWidget(form)
     form.show_value(Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=8.0))

@@ -133,7 +133,7 @@ def numbers_of(page):
     return [edit.value() for edit in page.findChildren(QuantityEdit)]
 
 
-def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
+def test_a_change_of_units_converts_every_number_and_can_be_undone(filled):
     before = {name: list(texts_of(page)) for name, page in filled.pages.items()}
     values = {name: numbers_of(page) for name, page in filled.pages.items()}
     told = {name for name, texts in before.items() if any(map(OLD.search, texts))}
@@ -156,7 +156,7 @@ def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
 
 
 @pytest.mark.parametrize("kind", EXCITATION_KINDS)
-def test_every_field_of_a_test_is_in_the_new_unit_and_takes_what_it_shows(qtbot, kind):
+def test_every_field_of_a_test_shows_and_reads_the_new_unit(qtbot, kind):
     form = form_of_a_kind(qtbot, kind)
     before = form.value
     assert before is not None, form.complaint
@@ -169,7 +169,7 @@ def test_every_field_of_a_test_is_in_the_new_unit_and_takes_what_it_shows(qtbot,
     assert form.value == before
 
 
-def test_numbers_of_a_list_are_read_in_the_unit_that_is_shown(qtbot):
+def test_lists_are_read_in_the_displayed_unit(qtbot):
     form = form_of_a_kind(qtbot, "resonance_tracking")
     levels = form.form.editors["excitation"].form.editors["accelerations_m_per_s2"]
     UNITS.choose({"m/s²": "g"})
@@ -181,7 +181,7 @@ def test_numbers_of_a_list_are_read_in_the_unit_that_is_shown(qtbot):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
+def test_chosen_units_are_kept_after_a_restart(filled, tmp_path):
     chosen_in(filled, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
@@ -189,7 +189,7 @@ def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
     again.background.close()
 
 
-def test_an_axis_states_the_number_of_its_unit(filled):
+def test_axis_numbers_are_in_the_unit_of_the_label(filled):
     plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
     chosen_in(filled, OTHERS)
@@ -210,13 +210,13 @@ def test_an_axis_states_the_number_of_its_unit(filled):
         ("m/s²", "m/s²", "1 g", 9.80665),
     ],
 )
-def test_a_field_takes_what_it_shows_and_any_unit_that_is_named(unit, shown, text, value):
+def test_a_field_reads_its_own_text_and_any_stated_unit(unit, shown, text, value):
     UNITS.choose({unit: shown})
     assert parse_quantity(text, unit) == value
     assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
 
 
-def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
+def test_a_value_keeps_its_digits_in_coarser_units(qtbot):
     form = ValidatedForm(HeldDwell, "dwell")
     qtbot.addWidget(form)
     form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})
@@ -239,14 +239,14 @@ def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
         ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
     ],
 )
-def test_a_sentence_is_reported_in_the_chosen_units_and_nothing_else_of_it_changes(sentence, told):
+def test_sentences_are_converted_to_the_chosen_units_only(sentence, told):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
     assert UNITS.convert(sentence) == told
 
 
 @pytest.mark.parametrize("unit", CHOICES)
 @pytest.mark.parametrize("value", [3e-7, 4.5e-5, 0.02, 1.5, 1234.0])
-def test_every_choice_writes_the_same_quantity(unit, value):
+def test_every_unit_choice_shows_the_same_quantity(unit, value):
     for name in CHOICES[unit]:
         UNITS.choose({unit: name})
         fitted = prefixed_unit(unit, value)

@@ -8,7 +8,7 @@ import pytest
 from vibench.gui.plots.axis import LOG_FREQUENCY, AxisItem, PlotAxis, Scale, logarithmic_ticks, number_text
 
 
-def test_decades_are_labelled_at_one_two_and_five():
+def test_decades_have_labels_at_one_two_and_five():
     (_, major), (_, minor) = logarithmic_ticks(log10(10), log10(2000))
     assert [round(10**value) for value in major] == [10, 20, 50, 100, 200, 500, 1000, 2000]
     assert round(10 ** minor[0]) == 30
@@ -23,11 +23,11 @@ def test_less_than_a_decade_is_labelled_at_round_numbers():
     ("value", "text"),
     [(10, "10"), (100, "100"), (1000, "1k"), (20000, "20k"), (1e-9, "10⁻⁹"), (2e-5, "2·10⁻⁵")],
 )
-def test_numbers_are_written_as_people_read_them(value, text):
+def test_tick_numbers_have_common_formats(value, text):
     assert number_text(value) == text
 
 
-def test_the_unit_stands_in_the_label_and_never_with_its_own_prefix(qapp):
+def test_the_label_shows_the_unit_with_one_prefix_at_most(qapp):
     item = AxisItem("bottom", LOG_FREQUENCY)
     item.setRange(10, 20000)
     assert item.labelText == "Frequency (Hz)"
@@ -41,7 +41,7 @@ def test_metres_are_shown_as_micrometres(qapp):
 
 @pytest.mark.parametrize("scale", list(Scale))
 @pytest.mark.parametrize("side", ["bottom", "left"])
-def test_every_axis_has_two_numbers_at_least(qapp, scale, side):
+def test_every_axis_has_at_least_two_numbers(qapp, scale, side):
     rng = np.random.default_rng(4)
     is_logarithmic = scale is Scale.LOGARITHMIC
     item = AxisItem(side, PlotAxis("Length", "m", scale=scale))
@@ -55,7 +55,7 @@ def test_every_axis_has_two_numbers_at_least(qapp, scale, side):
         assert len(inside) >= 2, (low, span, size)
 
 
-def test_ticks_between_one_two_and_five_have_no_number_to_run_into_another(qapp):
+def test_minor_ticks_have_no_numbers(qapp):
     item = AxisItem("bottom", LOG_FREQUENCY)
     item.setLogMode(x=True, y=False)
     written = [item.tickStrings(values, 1.0, step) for step, values in item.tickValues(1.7, 2.9, 400.0)]

@@ -30,7 +30,7 @@ for x, y in (([0.0, 10.0], [4.3, 4.3]), ([4.3, 4.3], [0.0, 10.0])):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("scale", "pixels"), [("1", "1"), ("2", "2")])
-def test_level_and_upright_lines_have_the_width_of_a_pixel_of_the_layout(scale, pixels):
+def test_horizontal_and_vertical_lines_are_one_logical_pixel_wide(scale, pixels):
     environment = {**os.environ, "QT_SCALE_FACTOR": scale}
     told = subprocess.run(
         [sys.executable, "-c", WIDTHS],

@@ -36,7 +36,7 @@ def dark_pixels(plot):
     )
 
 
-def test_the_hint_is_there_until_a_curve_has_points_and_again_without_them(plot, qapp):
+def test_the_hint_is_shown_only_while_no_curve_has_points(plot, qapp):
     plot.with_hint("What was measured appears here")
     curve = plot.curve(curve_style(0))
     plot.show()
@@ -53,7 +53,7 @@ def test_the_hint_is_there_until_a_curve_has_points_and_again_without_them(plot,
     assert dark_pixels(plot) > 50
 
 
-def test_the_legend_stands_above_the_axes_in_as_many_lines_as_it_needs(plot, qapp):
+def test_the_legend_wraps_above_the_axes(plot, qapp):
     plot.with_legend()
     for number in range(4):
         plot.curve(curve_style(number), f"a curve with a long name, number {number}")
@@ -74,7 +74,7 @@ def test_the_legend_stands_above_the_axes_in_as_many_lines_as_it_needs(plot, qap
     assert bottom < lower <= lower_top
 
 
-def test_a_label_without_room_gives_way_to_a_shorter_one(plot, qapp):
+def test_a_label_is_shortened_when_space_is_small(plot, qapp):
     plot.show()
     qapp.processEvents()
     assert plot.up.labelText == "Velocity of the mass (mm/s)"
@@ -91,14 +91,14 @@ def test_ticks_are_thinned_to_round_steps(most):
 
 
 @pytest.mark.parametrize("reach", [12.0, 17.0, 19.0, 26.0, 44.0])
-def test_a_low_axis_has_two_numbers_at_least_for_one_alone_states_no_scale(reach):
+def test_a_short_axis_has_at_least_two_numbers(reach):
     places = [5.0 * n for n in range(-8, 9) if abs(5.0 * n) <= reach]
     step, values = thin_ticks(5.0, places, 2)
     assert len(values) == 2
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
 
 
-def test_a_closed_plot_is_let_alone_when_units_change(qtbot):
+def test_unit_changes_ignore_closed_plots(qtbot):
     closed = Plot("a plot", TIME, PlotAxis("x", "m"), LIGHT).with_legend()
     closed.curve(curve_style(0), "5 µm").setData([0.0, 1.0], [0.0, 1.0])
     closed.close()
@@ -108,7 +108,7 @@ def test_a_closed_plot_is_let_alone_when_units_change(qtbot):
     assert raised == []
 
 
-def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
+def test_a_linked_axis_without_numbers_stays_blank(plot, qapp):
     bare = Plot("bare", LOG_FREQUENCY, PlotAxis("x"), LIGHT)
     bare.across.show_nothing()
     bare.resize(600, 200)
@@ -118,7 +118,7 @@ def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
     bare.close()
 
 
-def test_the_grid_lies_at_the_ticks_at_once(plot, qapp):
+def test_the_first_grid_matches_the_ticks(plot, qapp):
     for top in (1.0, 7.0):
         plot.setXRange(0.0, top, padding=0)
         plot.setYRange(0.0, top, padding=0)
@@ -136,7 +136,7 @@ def test_the_grid_lies_at_the_ticks_at_once(plot, qapp):
             assert min(abs(place - x) for x in seen) < 3
 
 
-def test_the_axes_follow_a_curve_and_not_how_little_is_known_of_it(plot, qapp):
+def test_axis_ranges_follow_curves_and_ignore_error_bands(plot, qapp):
     curve, band = plot.curve(curve_style(0)), plot.band(curve_style(0))
     curve.setData([0.0, 1.0, 2.0], [0.8, 1.0, 0.9])
     band.set_data([0.0, 1.0, 2.0], [1e-15, 0.9, 1e-15], [1e10, 1.1, 1e10])
@@ -146,7 +146,7 @@ def test_the_axes_follow_a_curve_and_not_how_little_is_known_of_it(plot, qapp):
     assert 0.5 < low < high < 1.5
 
 
-def test_values_are_read_under_the_pointer_and_differences_from_a_mark(plot, qapp, qtbot):
+def test_the_cursor_reads_values_and_differences_from_a_mark(plot, qapp, qtbot):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.0, 0.004, 0.002])
     plot.show()
     qapp.processEvents()
@@ -172,7 +172,7 @@ def read_at_one(plot):
     return plot.reading.text
 
 
-def test_anything_that_is_read_is_of_the_curve_that_is_there_now(plot):
+def test_readings_belong_to_the_current_curve(plot):
     """It stayed under the pointer while another curve was drawn, or none."""
     curve = plot.curve(curve_style(0), "mass")
     curve.setData([0.0, 1.0], [0.0, 0.004])
@@ -188,7 +188,7 @@ def test_anything_that_is_read_is_of_the_curve_that_is_there_now(plot):
     assert "other: 1 mm/s" in read_at_one(plot)
 
 
-def test_values_are_read_and_written_in_the_unit_that_the_axis_shows_now(plot):
+def test_readings_and_copies_use_the_current_unit_of_the_axis(plot):
     """A plot that was taken for another channel read, and copied, in the unit of the first one."""
     plot.curve(curve_style(0), "base").setData([0.0, 1.0], [0.0, 2.0])
     plot.up.show_unit(PlotAxis("Acceleration", "m/s²"))
@@ -196,7 +196,7 @@ def test_values_are_read_and_written_in_the_unit_that_the_axis_shows_now(plot):
     assert numbers_of(plot, ",").splitlines()[::2] == ["Curve,Time (s),Acceleration (m/s²)", "base,1,2"]
 
 
-def test_a_mark_stays_at_its_values_when_the_scale_turns(plot):
+def test_a_mark_keeps_its_values_when_the_axis_becomes_logarithmic(plot):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.001, 0.1])
     plot.show()
     plot.reading.show_at(QPointF(0.5, 0.01))
@@ -215,7 +215,7 @@ def test_a_mark_stays_at_its_values_when_the_scale_turns(plot):
     assert "dB" not in plot.reading.text
 
 
-def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plot, qapp, tmp_path):
+def test_pictures_and_numbers_are_copied_and_saved_without_overwriting(plot, qapp, tmp_path):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
     plot.show()
     offered = {action.text(): action.trigger for action in plot.actions()}
@@ -238,7 +238,7 @@ def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plo
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
 @pytest.mark.parametrize("ending", ["csv", "svg", "png"])
-def test_a_disk_that_refuses_a_picture_or_numbers_leaves_no_file(plot, tmp_path, ending):
+def test_failed_saving_leaves_no_file(plot, tmp_path, ending):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
     plot.show()
     import resource
@@ -253,7 +253,7 @@ def test_a_disk_that_refuses_a_picture_or_numbers_leaves_no_file(plot, tmp_path,
     assert [*tmp_path.iterdir()] == []
 
 
-def test_anything_that_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
+def test_outdated_results_are_greyed_out(plot, qapp):
     plot.curve(curve_style(0)).setData([0.0, 1.0], [0.0, 0.001])
     plot.show()
     qapp.processEvents()
@@ -263,7 +263,7 @@ def test_anything_that_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
     assert dark_pixels(plot) > before + 20
 
 
-def test_a_picture_made_of_pixels_lies_under_a_veil_as_well(plot, qapp):
+def test_outdated_images_are_greyed_out(plot, qapp):
     plot.addItem(pg.ImageItem(np.full((4, 4, 4), 255, dtype=np.uint8)))
     plot.show()
     qapp.processEvents()
@@ -273,7 +273,7 @@ def test_a_picture_made_of_pixels_lies_under_a_veil_as_well(plot, qapp):
     assert dark_pixels(plot) > 20
 
 
-def test_a_level_stays_at_its_value_when_the_scale_turns_and_hides_where_there_is_no_place_for_it(plot):
+def test_a_level_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
     zero, high = plot.level(LIMIT, 0.0), plot.level(LIMIT, 100.0)
     plot.turn_scale()
     assert (zero.isVisible(), high.value()) == (False, 2.0)
@@ -287,7 +287,7 @@ def test_a_level_stays_at_its_value_when_the_scale_turns_and_hides_where_there_i
     assert plot.level(LIMIT, 10.0).value() == 1.0
 
 
-def test_the_bounds_of_the_curve_that_is_read_stand_beside_it(plot):
+def test_readings_include_the_bounds_of_the_curve(plot):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.001, 0.004, 0.001])
     shade = LineStyle(lambda theme: theme.traces[0])
     plot.band(shade, "mass").set_data([0.0, 1.0, 2.0], [0.0, 0.003, 0.0], [0.002, 0.006, 0.002])

@@ -27,7 +27,7 @@ def drawn(plot):
 
 
 @pytest.mark.parametrize("place", np.linspace(0.001, 1.999, 13))
-def test_an_impact_of_three_samples_is_seen_in_two_seconds(plot, place):
+def test_an_impact_of_three_samples_is_visible_in_two_seconds(plot, place):
     samples = np.zeros(round(2 * RATE_HZ))
     first = round(place * RATE_HZ)
     samples[first : first + 3] = (0.5, 1.0, -0.5)
@@ -39,7 +39,7 @@ def test_an_impact_of_three_samples_is_seen_in_two_seconds(plot, place):
     assert abs(time_s[values.argmax()] - place) < 2 / 400
 
 
-def test_a_close_look_shows_the_samples_themselves(plot):
+def test_zooming_in_shows_individual_samples(plot):
     samples = np.sin(2 * np.pi * 100 * np.arange(round(2 * RATE_HZ)) / RATE_HZ)
     curve = SignalCurve(plot, curve_style(0))
     curve.set_samples(samples, RATE_HZ)

@@ -36,7 +36,7 @@ def red_columns(plot, qapp):
     ]
 
 
-def test_a_stripe_thinner_than_a_pixel_is_seen_where_it_is(plot, qapp):
+def test_a_stripe_thinner_than_a_pixel_is_visible(plot, qapp):
     plot.stripes(RED).show_bands([(5.0, 5.0001)])
     (*_, seen) = red_columns(plot, qapp)
     assert seen == pytest.approx(5.0, abs=0.04)
@@ -48,12 +48,12 @@ def test_a_wide_stripe_covers_its_band_and_no_more(plot, qapp):
     assert (min(seen), max(seen)) == pytest.approx((2.0, 5.0), abs=0.05)
 
 
-def test_stripes_outside_of_what_is_in_sight_are_not_drawn(plot, qapp):
+def test_stripes_outside_the_view_are_not_drawn(plot, qapp):
     plot.stripes(RED).show_bands([(-5.0, -4.0), (12.0, 13.0)])
     assert red_columns(plot, qapp) == []
 
 
-def test_lines_are_seen_once_they_are_apart(plot, qapp):
+def test_separated_lines_are_all_visible(plot, qapp):
     plot.rules(LINE).show_at(0.02 * number for number in range(500))
     assert red_columns(plot, qapp) == []
     plot.setXRange(5.0, 5.1, padding=0.0)

@@ -33,7 +33,7 @@ def read(tip):
 
 
 @pytest.mark.parametrize("kind", [ElidedLabel, SentenceLabel])
-def test_a_label_shows_foreign_text_as_it_is_written(qtbot, kind):
+def test_labels_show_markup_as_plain_text(qtbot, kind):
     label = kind(HOSTILE)
     qtbot.addWidget(label)
     label.setToolTip(HOSTILE)
@@ -42,7 +42,7 @@ def test_a_label_shows_foreign_text_as_it_is_written(qtbot, kind):
     assert read(label.toolTip()) == SHOWN
 
 
-def test_a_table_shows_foreign_text_as_it_is_written(qtbot):
+def test_tables_show_markup_as_plain_text(qtbot):
     table = ReadTable("findings", ("what",))
     qtbot.addWidget(table)
     table.show_rows([(HOSTILE,)])
@@ -50,7 +50,7 @@ def test_a_table_shows_foreign_text_as_it_is_written(qtbot):
     assert read(table.item(0, 0).toolTip()) == SHOWN
 
 
-def test_messages_and_status_show_foreign_text_as_it_is_written(qtbot):
+def test_messages_and_status_show_markup_as_plain_text(qtbot):
     strip, status = MessageStrip(), StatusLine()
     qtbot.addWidget(strip)
     qtbot.addWidget(status)
@@ -67,7 +67,7 @@ def curve(source):
     return Curve(source, CurveOrigin.MEASURED, CurveKind.RESPONSE_II, ones, ones, ones)
 
 
-def test_a_list_of_curves_shows_foreign_names_as_they_are_written(qtbot):
+def test_curve_lists_show_markup_as_plain_text(qtbot):
     curves, pair = CurveList(LIGHT), PairBox()
     qtbot.addWidget(curves)
     qtbot.addWidget(pair)
@@ -78,7 +78,7 @@ def test_a_list_of_curves_shows_foreign_names_as_they_are_written(qtbot):
     assert pair.pair() == (made[1], made[0])
 
 
-def test_a_plot_shows_foreign_names_and_units_as_they_are_written(qtbot):
+def test_plots_show_markup_in_names_and_units_as_plain_text(qtbot):
     plot = Plot("picture", TIME, PlotAxis("velocity", HOSTILE), LIGHT).with_legend()
     qtbot.addWidget(plot)
     plot.curve(curve_style(0), HOSTILE).setData([0.0, 1.0], [1.0, 1.0])
@@ -92,7 +92,7 @@ def test_a_plot_shows_foreign_names_and_units_as_they_are_written(qtbot):
     assert line.label.toPlainText() == "{" + SHOWN
 
 
-def test_a_rig_of_a_foreign_name_is_listed_as_it_is_written(qtbot, tmp_path):
+def test_rig_lists_show_markup_as_plain_text(qtbot, tmp_path):
     choice = RigChoice()
     qtbot.addWidget(choice)
     choice._add(tmp_path / "<h1>a\u202eb.toml")

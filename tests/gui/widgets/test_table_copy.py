@@ -24,7 +24,7 @@ def clipboard():
     return QGuiApplication.clipboard().text()
 
 
-def test_the_chosen_rows_are_copied_by_the_key_and_everything_while_none_is_chosen(table, qtbot):
+def test_copy_takes_the_selected_rows_or_all(table, qtbot):
     qtbot.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     whole = "used\tquantity\tlimit\n12 %\tstroke\t10 mm\n3 %\tforce\t20 N"
     assert clipboard() == whole
@@ -35,7 +35,7 @@ def test_the_chosen_rows_are_copied_by_the_key_and_everything_while_none_is_chos
     assert clipboard() == whole
 
 
-def test_every_table_of_the_window_offers_it(window):
+def test_every_table_of_the_window_can_be_copied(window):
     tables = [each for each in window.findChildren(QTableView) if isinstance(each, QAbstractItemView)]
     assert len(tables) >= 8
     for each in tables:
@@ -44,7 +44,7 @@ def test_every_table_of_the_window_offers_it(window):
 
 
 @pytest.mark.parametrize("width", [120, 240, 900])
-def test_the_wide_column_stays_readable_in_a_narrow_table(qtbot, width):
+def test_the_stretching_column_stays_readable_in_a_narrow_table(qtbot, width):
     made = ReadTable("Findings", ("finding", "measured", "expected"))
     qtbot.addWidget(made)
     made.resize(width, 200)

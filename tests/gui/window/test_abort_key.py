@@ -18,7 +18,7 @@ def heard(qapp):
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Pause])
-def test_the_key_is_heard_in_a_field(qtbot, heard, key):
+def test_the_abort_key_works_in_a_field(qtbot, heard, key):
     window = QWidget()
     field = QLineEdit(window)
     qtbot.addWidget(window)
@@ -28,7 +28,7 @@ def test_the_key_is_heard_in_a_field(qtbot, heard, key):
     assert heard == ["abort"]
 
 
-def test_the_key_is_heard_in_an_open_modal_dialog_and_still_closes_it(qtbot, heard):
+def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, heard):
     window = QWidget()
     qtbot.addWidget(window)
     window.show()
@@ -43,7 +43,7 @@ def test_the_key_is_heard_in_an_open_modal_dialog_and_still_closes_it(qtbot, hea
     assert not dialog.isVisible()
 
 
-def test_the_key_is_heard_in_an_open_menu(qtbot, heard):
+def test_the_abort_key_works_in_an_open_menu(qtbot, heard):
     menu = QMenu()
     menu.addAction("one")
     qtbot.addWidget(menu)
@@ -52,14 +52,14 @@ def test_the_key_is_heard_in_an_open_menu(qtbot, heard):
     assert heard == ["abort"]
 
 
-def test_other_keys_are_not_an_abort(qtbot, heard):
+def test_other_keys_do_not_abort(qtbot, heard):
     field = QLineEdit()
     qtbot.addWidget(field)
     qtbot.keyClicks(field, "stop 123")
     assert heard == []
 
 
-def test_every_press_counts(qtbot, heard):
+def test_repeated_presses_all_count(qtbot, heard):
     field = QLineEdit()
     qtbot.addWidget(field)
     for _ in range(3):

@@ -9,7 +9,7 @@ from vibench.gui.window.banner import Banner, StateIndicator
 READABLE = 4.5
 
 
-def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
+def test_a_state_is_shown_by_symbol_and_word_besides_colour(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
@@ -28,20 +28,20 @@ def test_a_click_on_stop_requests_a_stop(qtbot):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("tone", list(Tone))
-def test_the_letters_of_every_tone_can_be_read(theme, tone, contrast):
+def test_banner_text_has_enough_contrast(theme, tone, contrast):
     paint = theme.tones[tone]
     assert contrast(paint.letters, paint.ground) >= READABLE
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
-def test_text_and_accents_can_be_read_on_every_ground(theme, contrast):
+def test_text_and_accents_have_enough_contrast_on_every_background(theme, contrast):
     for ground in (theme.window, theme.base, theme.raised):
         for letters in (theme.text, theme.muted):
             assert contrast(letters, ground) >= READABLE, (letters, ground)
     assert contrast(theme.base, theme.accent) >= READABLE
 
 
-def test_the_button_states_which_ramp_it_requests_and_keeps_its_place(qtbot):
+def test_the_stop_button_names_its_ramp_and_keeps_its_place(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.resize(1000, 60)
@@ -55,6 +55,6 @@ def test_the_button_states_which_ramp_it_requests_and_keeps_its_place(qtbot):
     assert button.geometry() == before
 
 
-def test_the_window_begins_with_the_focus_on_the_next_step(window, qtbot):
+def test_the_window_opens_with_the_focus_on_the_next_step(window, qtbot):
     qtbot.waitUntil(lambda: window.focusWidget() is not None)
     assert window.focusWidget().objectName() != "stop"

@@ -19,7 +19,7 @@ def started(tmp_path, **environment):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a display")
 @pytest.mark.parametrize("display", [{}, {"DISPLAY": ":97"}], ids=["none", "dead"])
-def test_without_a_display_one_sentence_reports_it(tmp_path, display):
+def test_a_missing_display_is_reported_in_one_sentence(tmp_path, display):
     told = started(tmp_path, **display)
     assert told.returncode == 1
     assert told.stderr.startswith("The window cannot be opened: ")
@@ -28,7 +28,7 @@ def test_without_a_display_one_sentence_reports_it(tmp_path, display):
     assert "qt.qpa" not in told.stderr
 
 
-def test_a_library_that_is_missing_is_reported_with_all_packages(monkeypatch):
+def test_missing_libraries_are_reported_with_the_packages_to_install(monkeypatch):
     def refused(path):
         raise OSError("libxcb-cursor.so.0: cannot open shared object file: No such file or directory")
 

@@ -13,7 +13,7 @@ def work_for(duration_s):
         sum(range(1000))
 
 
-def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtbot):
+def test_blocking_work_is_logged_with_the_visible_page(qapp, qtbot):
     monitor = EventLoopMonitor(lambda: "Files page")
     qtbot.waitUntil(lambda: monitor.longest_s > 0 or monitor.busiest_s > 0)
     monitor.begin()
@@ -27,6 +27,6 @@ def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtb
     monitor.stop()
 
 
-def test_a_loop_that_is_free_is_reported_on_the_status_line(window, qtbot):
+def test_the_status_line_shows_a_responsive_event_loop(window, qtbot):
     qtbot.waitUntil(lambda: "latency" in window.status_line.text_of("frames"))
     assert "Longest wait" in window.status_line.tip_of("frames")

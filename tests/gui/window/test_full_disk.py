@@ -41,7 +41,7 @@ def own(tmp_path):
 
 
 @pytest.mark.parametrize("page", [TEST, QUEUE])
-def test_a_test_or_a_campaign_that_finds_no_room_is_one_notice(window, own, monkeypatch, page):
+def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(window, own, monkeypatch, page):
     measurement = window.context.selection.measurement
     window.context.selection.choose_campaign(Campaign(name="night", measurements=(measurement,)))
     (own / "mine.toml").write_text("older")
@@ -56,7 +56,7 @@ def test_a_test_or_a_campaign_that_finds_no_room_is_one_notice(window, own, monk
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "csv"])
-def test_a_plot_that_finds_no_room_is_one_box(window, own, monkeypatch, ending):
+def test_saving_a_plot_on_a_full_disk_gives_one_dialog(window, own, monkeypatch, ending):
     said = []
     monkeypatch.setattr(plot_actions, "new_path", lambda *_: own / f"plot.{ending}")
     monkeypatch.setattr(QMessageBox, "warning", lambda *given: said.append(given[-1]))
@@ -68,7 +68,7 @@ def test_a_plot_that_finds_no_room_is_one_box(window, own, monkeypatch, ending):
 
 
 @pytest.mark.parametrize("ending", ["csv", "uff", "mat", "nxs", "note"])
-def test_an_export_or_a_note_that_finds_no_room_is_one_sentence(own, ending):
+def test_exports_and_notes_on_a_full_disk_give_one_sentence(own, ending):
     path = own / "dwell.h5"
     path.write_bytes(good_recordings()["dwell.h5"])
     before = content(own)
@@ -78,7 +78,7 @@ def test_an_export_or_a_note_that_finds_no_room_is_one_sentence(own, ending):
     assert content(own) == before
 
 
-def test_settings_that_find_no_room_are_reported_and_the_older_ones_are_kept(qapp, own):
+def test_settings_on_a_full_disk_are_reported_and_the_old_ones_kept(qapp, own):
     settings = Settings(own / "window.ini")
     settings.keep_text(SettingKey.TEST, "older")
     assert settings.complaint == ""
@@ -89,7 +89,7 @@ def test_settings_that_find_no_room_are_reported_and_the_older_ones_are_kept(qap
     assert content(own) == before
 
 
-def test_a_check_does_not_need_the_folder_of_recordings(window, own, monkeypatch):
+def test_the_bench_check_works_without_a_recording_folder(window, own, monkeypatch):
     """A folder that cannot be made raised in the window, before the engine could report it."""
     orders = []
     (own / "file").touch()

@@ -18,7 +18,7 @@ def button(strip, text):
     return next(each for each in strip.findChildren(QPushButton) if each.text() == text)
 
 
-def test_the_three_parts_stand_in_the_strip(qtbot):
+def test_the_strip_shows_event_reaction_and_advice(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.WARNING, "The disk is nearly full.", "Recording goes on.", "Make room."))
@@ -29,7 +29,7 @@ def test_the_three_parts_stand_in_the_strip(qtbot):
     assert text.startswith("⚠")
 
 
-def test_copy_puts_everything_on_the_clipboard(qtbot):
+def test_copy_puts_the_whole_message_on_the_clipboard(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(notice_of(LimitExceeded("noise: the stroke would be 5 mm")))
@@ -37,7 +37,7 @@ def test_copy_puts_everything_on_the_clipboard(qtbot):
     assert QGuiApplication.clipboard().text() == "FAULT: [LimitExceeded] noise: the stroke would be 5 mm"
 
 
-def test_dismissed_messages_can_still_be_read_in_details(qtbot):
+def test_dismissed_messages_remain_in_details(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.INFO, "first"))
@@ -50,7 +50,7 @@ def test_dismissed_messages_can_still_be_read_in_details(qtbot):
     assert details.toPlainText() == "INFO: second\n\nINFO: first"
 
 
-def test_every_message_gives_way_to_what_was_wanted_and_stays_in_details(qtbot):
+def test_a_message_disappears_after_success_and_remains_in_details(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     for kind in NoticeKind:
@@ -62,7 +62,7 @@ def test_every_message_gives_way_to_what_was_wanted_and_stays_in_details(qtbot):
 
 
 @pytest.mark.thorough
-def test_a_message_moves_nothing_that_can_be_clicked(window, qapp):
+def test_messages_do_not_move_clickable_widgets(window, qapp):
     """A page that moved down put "Check bench" where "Find instruments" had been."""
 
     def places():

@@ -28,7 +28,7 @@ def dropped(window, *paths):
     )
 
 
-def test_anything_that_is_dropped_comes_up_on_its_page_and_is_listed_as_recent(window, tmp_path):
+def test_a_dropped_file_opens_on_its_page_and_is_listed_as_recent(window, tmp_path):
     test = tmp_path / "mine.toml"
     measurement = window.context.selection.measurement.model_copy(update={"name": "mine"})
     save_toml(measurement, test)
@@ -57,7 +57,7 @@ def test_anything_that_is_dropped_comes_up_on_its_page_and_is_listed_as_recent(w
     ("name", "content"),
     [("a.txt", b"x"), ("a.toml", b"\xff"), ("b.toml", b"a = 1"), ("c.toml", b"["), ("gone.toml", None)],
 )
-def test_anything_that_cannot_be_opened_is_reported_and_nothing_changes(window, tmp_path, name, content):
+def test_unsupported_files_are_reported_and_change_nothing(window, tmp_path, name, content):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     before = window.page
@@ -68,7 +68,7 @@ def test_anything_that_cannot_be_opened_is_reported_and_nothing_changes(window, 
 
 
 @pytest.mark.thorough
-def test_anything_that_is_no_recording_is_reported_by_the_page_that_would_show_it(window, qtbot, tmp_path):
+def test_a_file_that_is_no_recording_is_reported_on_the_files_page(window, qtbot, tmp_path):
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
     dropped(window, tmp_path / "broken.h5")
     assert window.page is window.pages[COMPARE]
@@ -76,7 +76,7 @@ def test_anything_that_is_no_recording_is_reported_by_the_page_that_would_show_i
     assert "broken.h5" in window.strip.notices[-1].what
 
 
-def test_edits_of_test_and_campaign_are_taken_back(window, qtbot):
+def test_edits_of_test_and_campaign_can_be_undone(window, qtbot):
     selection, key = window.context.selection, Qt.KeyboardModifier.ControlModifier
     window.show_page(TEST)
     first = selection.measurement
@@ -101,7 +101,7 @@ def test_edits_of_test_and_campaign_are_taken_back(window, qtbot):
     assert selection.campaign == before
 
 
-def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
+def test_settings_are_edited_in_one_form_and_kept(window, qapp, tmp_path):
     dialog = SettingsDialog(window.context, window)
     points = qapp.font().pointSize()
     dialog.form.form.show_content(
@@ -129,7 +129,7 @@ def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
 
 
 @pytest.mark.thorough
-def test_help_is_offline_and_states_what_is_installed(window, qtbot):
+def test_help_works_offline_and_lists_installed_versions(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_F1)
     keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())
     assert all(word in keys.text() for word in ("F5", "F6", "Ctrl+7", "Ctrl+Z", "Shift+F1", "Esc, Pause"))
@@ -153,13 +153,13 @@ def test_a_bench_that_is_missing_is_refused_before_a_window_opens(tmp_path, caps
     assert len(said.splitlines()) == 1
 
 
-def test_the_name_of_a_refused_bench_moves_no_cursor(tmp_path, capsys):
+def test_control_characters_in_a_bench_name_have_no_effect(tmp_path, capsys):
     (tmp_path / "a\x1b[2J\u202e.toml").write_text("name = 1", encoding="utf-8")
     assert main(["--bench", str(tmp_path / "a\x1b[2J\u202e.toml")]) == NO_WINDOW
     assert r"a\x1b[2J\u202e.toml: name = 1" in capsys.readouterr().err
 
 
-def test_what_states_that_the_window_is_coming_bears_its_name(qapp):
+def test_the_start_message_names_the_window(qapp):
     """The program's file stood there."""
     label = _sign_of_life()
     assert label.windowTitle() == "vibench"

@@ -9,20 +9,20 @@ from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.window import PAGES, Window
 
 
-def test_every_page_can_be_shown_by_its_key(window, qtbot):
+def test_every_page_has_a_working_key(window, qtbot):
     for number, name in enumerate(window.pages, start=1):
         qtbot.keyClick(window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)
         assert window.page is window.pages[name], name
 
 
-def test_the_pages_lie_in_the_order_of_the_job(window):
+def test_pages_are_in_the_order_of_the_job(window):
     names = list(PAGES)
     assert list(window.pages) == names
     assert names[:3] == ["Rig", "Test", "Run"]
 
 
 @pytest.mark.thorough
-def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, own_state, tmp_path):
+def test_a_restart_restores_theme_page_and_test_without_arming(window, qapp, own_state, tmp_path):
     window.context.choose_theme(DARK)
     window.show_page(TEST)
     form = window.pages[TEST].form.form
@@ -37,7 +37,7 @@ def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, 
     again.deleteLater()
 
 
-def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
+def test_banner_and_stop_are_visible_on_every_page(window, qapp):
     for name in window.pages:
         window.show_page(name)
         qapp.processEvents()
@@ -46,7 +46,7 @@ def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
-def test_an_order_without_a_bench_is_answered_with_what_to_do(window, order):
+def test_a_command_without_a_bench_shows_what_to_do(window, order):
     getattr(window.user_actions, order)()
     newest = window.strip.notices[-1]
     assert newest.next_step

@@ -62,7 +62,7 @@ def test_curves_are_drawn_as_they_are(laid):
     assert laid.is_done
 
 
-def test_peaks_stand_in_the_table_with_their_damping(laid):
+def test_the_table_lists_peaks_with_damping(laid):
     first, second = texts(laid.peaks)
     assert first[0] == "one, Response I, predicted"
     assert float(first[1]) == pytest.approx(266.0, abs=0.2)
@@ -81,7 +81,7 @@ def test_the_second_curve_is_compared_with_the_first(laid):
     assert frequency_hz[0] >= 100.0
 
 
-def test_a_curve_that_is_not_ticked_is_neither_drawn_nor_listed(laid):
+def test_unticked_curves_are_neither_drawn_nor_listed(laid):
     laid.curves.tick("half, Response I, predicted", Qt.CheckState.Unchecked)
     assert len(texts(laid.peaks)) == 1
     assert len(laid.curves.curves) == 2
@@ -98,14 +98,14 @@ def test_markers_read_every_curve(laid):
     assert float(first[3]) == pytest.approx(20 * np.log10(expected[1] / expected[0]), abs=0.01)
 
 
-def test_removed_curves_are_gone(laid):
+def test_removed_curves_are_no_longer_drawn_or_listed(laid):
     laid.curves.setCurrentRow(0)
     laid._remove()
     assert [each.source for each in laid.curves.curves] == ["half"]
     assert laid.pair_box.pair() is None
 
 
-def test_an_option_that_is_not_allowed_is_refused_in_words(page):
+def test_invalid_options_are_refused_with_an_explanation(page):
     form = page.panel.form.form
     form.show_content({"estimator": "hv"})
     assert page.panel.options() is None
@@ -121,7 +121,9 @@ def test_curves_follow_the_theme(laid):
 
 
 @pytest.mark.thorough
-def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record_noise, tmp_path, waited):
+def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
+    working, record_noise, tmp_path, waited
+):
     """The road of the page: two recordings, their curves, a picture with a known point, a report."""
     paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))
     notices = []
@@ -148,7 +150,7 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
 
 
 @pytest.mark.thorough
-def test_anything_that_cannot_be_analysed_or_written_reports_it_and_spoils_nothing(working, tmp_path, waited):
+def test_failed_analyses_and_exports_are_reported_and_keep_the_other_curves(working, tmp_path, waited):
     notices = []
     working.context.noticed.connect(notices.append)
     working.add_prediction((mode("model"),))
@@ -162,7 +164,7 @@ def test_anything_that_cannot_be_analysed_or_written_reports_it_and_spoils_nothi
     assert len(working.curves.curves) == known
 
 
-def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_reported(page):
+def test_colour_shows_the_recording_and_dash_the_kind_of_curve(page):
     frequency_hz = np.arange(100.0, 300.0)
     ones, none = np.ones_like(frequency_hz), np.full_like(frequency_hz, np.nan)
     curves = {
@@ -188,7 +190,7 @@ def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_reported(page
     assert "5 µm and as driven" in page.pair_box.summary
 
 
-def test_what_begins_or_ends_moves_nothing_on_the_left(page, qapp):
+def test_progress_does_not_move_the_controls_on_the_left(page, qapp):
     def places():
         qapp.processEvents()
         return [each.geometry().getRect() for each in page.panel.findChildren(QWidget) if each.isVisible()]

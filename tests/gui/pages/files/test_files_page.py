@@ -110,7 +110,7 @@ def drawn(page, number):
     return curve.getData()
 
 
-def test_states_plans_and_troubles_of_all_files_are_listed_in_words(page):
+def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "State") == "✔ complete"
     assert cell(page, "stopped", "State") == "■ stopped"
     assert cell(page, "broken", "State") == "✖ unreadable"
@@ -120,13 +120,13 @@ def test_states_plans_and_troubles_of_all_files_are_listed_in_words(page):
     assert cell(page, "whole", "Length") == "10 s"
 
 
-def test_a_recording_whose_seal_is_gone_is_warned_of(opened):
+def test_a_recording_without_its_seal_gets_a_warning(opened):
     page = opened("old.h5")
     assert "seal gone" in cell(page, "old", "Verdict")
     assert page._facts.sentence.startswith("✖ seal gone: its seal is gone")
 
 
-def test_samples_that_were_changed_under_an_intact_seal_are_warned_of(page, folder, tmp_path, waited):
+def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_path, waited):
     """A quick look at the seal reads no samples of a large file."""
     path = tmp_path / "changed.h5"
     shutil.copyfile(folder / "whole.h5", path)
@@ -139,7 +139,7 @@ def test_samples_that_were_changed_under_an_intact_seal_are_warned_of(page, fold
     waited(lambda: "  ·  as it was sealed  ·  " in page._facts.sentence)
 
 
-def test_a_name_moves_no_cursor_and_reorders_no_text(page, folder, waited, tmp_path):
+def test_control_characters_in_names_have_no_effect(page, folder, waited, tmp_path):
     shutil.copyfile(folder / "whole.h5", tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
     page._go_to(tmp_path)
     waited(lambda: len(page.table.recordings.entries) == 1 and not page.context.background.is_busy)
@@ -160,7 +160,7 @@ def test_every_readable_recording_has_a_picture(page):
     assert {name for name, picture in pictures.items() if picture is not None} == {"whole", "stopped", "old"}
 
 
-def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(opened):
+def test_an_impact_of_three_samples_is_visible_at_every_zoom(opened):
     page = opened("whole.h5")
     for low_s, high_s in ((0.0, 10.0), (IMPACT_S - 0.5, IMPACT_S + 0.5), (IMPACT_S - 2e-3, IMPACT_S + 2e-3)):
         page.time_histories.show_range(low_s, high_s)
@@ -172,12 +172,12 @@ def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(open
         assert len(time_s) <= 2.1 * page.time_histories.width()
 
 
-def test_a_recording_without_overview_is_opened_all_the_same(opened):
+def test_a_recording_without_overview_can_be_opened(opened):
     page = opened("old.h5")
     assert np.nanmax(drawn(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
 
-def test_a_broken_file_states_why_and_what_to_do(page, opened, folder, qtbot):
+def test_a_broken_file_shows_the_reason_and_a_remedy(page, opened, folder, qtbot):
     with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "no readable HDF5 file" in said.args[0].what
@@ -185,7 +185,7 @@ def test_a_broken_file_states_why_and_what_to_do(page, opened, folder, qtbot):
     assert len(opened("whole.h5").time_histories.plots) == 3
 
 
-def test_keys_zoom_move_and_show_all(opened, qtbot):
+def test_keys_zoom_pan_and_show_everything(opened, qtbot):
     page = opened("whole.h5")
     qtbot.keyClick(page.time_histories, Qt.Key.Key_Plus)
     low_s, high_s = page.time_histories.view_s
@@ -196,7 +196,7 @@ def test_keys_zoom_move_and_show_all(opened, qtbot):
     assert page.time_histories.view_s == pytest.approx((0.0, 10.0))
 
 
-def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(opened):
+def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(opened):
     page = opened("whole.h5")
     page.time_histories.show_range(-50.0, 100.0)
     assert page.time_histories.view_s == (0.0, 10.0)
@@ -205,7 +205,7 @@ def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(opened):
     assert high_s - low_s == pytest.approx(8 / 6400.0, rel=1e-3)
 
 
-def test_markers_measure_between_two_moments(opened):
+def test_markers_measure_time_differences(opened):
     page = opened("whole.h5")
     page._markers.setChecked(True)
     first, second = page.time_histories._histories[1].markers
@@ -216,14 +216,14 @@ def test_markers_measure_between_two_moments(opened):
     assert "0.5 s apart = 1 / 2 Hz" in page._view.text()
 
 
-def test_a_search_leaves_rows_that_hold_the_words(page):
+def test_search_keeps_rows_containing_all_words(page):
     page.table.search("95 hz")
     assert page.table.model().rowCount() == 1
     page.table.search("")
     assert page.table.model().rowCount() == 4
 
 
-def test_a_campaign_states_how_far_it_is_and_shows_its_own_recordings(page):
+def test_a_campaign_shows_its_progress_and_its_recordings(page):
     assert page.campaigns.isVisible()
     assert page.campaigns.itemText(1) == "▲ night: 1 of 3 done, 1 queued, 1 failed"
     page.campaigns.setCurrentIndex(1)
@@ -234,7 +234,7 @@ def test_a_campaign_states_how_far_it_is_and_shows_its_own_recordings(page):
     assert model.rowCount() == 4
 
 
-def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
+def test_selected_recordings_can_be_sent_to_compare(page, folder, qtbot):
     page.table.selectAll()
     with qtbot.waitSignals([page.context.comparison_requested, page.context.page_requested]):
         page._compare.click()
@@ -243,14 +243,14 @@ def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
     }
 
 
-def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, record, tmp_path, qtbot):
+def test_a_recording_from_another_folder_can_be_opened(page, record, tmp_path, qtbot):
     path = record(tmp_path, "elsewhere")
     page.context.recording_requested.emit(path)
     qtbot.waitUntil(lambda: page._opened.path == path)
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
-def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(opened, waited):
+def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(opened, waited):
     page = opened("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
@@ -274,7 +274,7 @@ def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(open
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_a_recording_that_is_opened_by_its_path_is_read_once(opened, folder, waited, monkeypatch):
+def test_opening_by_path_reads_the_recording_once(opened, folder, waited, monkeypatch):
     page, read = opened("stopped.h5"), []
 
     def counted(path):
@@ -287,9 +287,7 @@ def test_a_recording_that_is_opened_by_its_path_is_read_once(opened, folder, wai
     assert read == [folder / "whole.h5"]
 
 
-def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(
-    page, begin_recording, tmp_path, waited
-):
+def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp_path, waited):
     writer, part = begin_recording(tmp_path, "growing")
     page.context.choose_folder(tmp_path)
     page.list_folder()
@@ -318,7 +316,7 @@ def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
     assert page.time_histories.plots[0].backgroundBrush().color().name() == DARK.base
 
 
-def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_context, waited):
+def test_a_late_file_list_keeps_the_current_selection(page, shared_context, waited):
     page.table.selectAll()
     chosen = page.table.chosen_paths()
     assert len(chosen) > 1
@@ -327,7 +325,7 @@ def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_con
     assert page.table.chosen_paths() == chosen
 
 
-def test_to_look_into_a_folder_does_not_redirect_recordings(page, folder, tmp_path, waited):
+def test_browsing_a_folder_does_not_change_where_recordings_are_saved(page, folder, tmp_path, waited):
     shown = page.table.recordings
     assert shown.entries
     page._folder_line.setText(str(tmp_path))
@@ -344,13 +342,13 @@ def test_to_look_into_a_folder_does_not_redirect_recordings(page, folder, tmp_pa
 
 
 @pytest.mark.parametrize("typed", ["9" * 300, "a\0b", "~nobody of that name/x"])
-def test_a_name_that_no_system_allows_is_no_folder(page, typed):
+def test_an_impossible_folder_name_is_refused(page, typed):
     page._folder_line.setText(typed)
     page._typed_folder()
     assert page._folder_line.text() == str(page._folder)
 
 
-def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_path, waited, qtbot):
+def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, waited, qtbot):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
     page = FilesPage(shared_context)
@@ -378,14 +376,14 @@ def test_a_forged_note_is_not_shown(record, tmp_path):
     assert "not as they were saved: results note" in said
 
 
-def test_the_facts_state_a_state_once(begin_recording, tmp_path):
+def test_the_summary_shows_the_state_once(begin_recording, tmp_path):
     writer, _ = begin_recording(tmp_path, "ended")
     path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
     with open_recording(path) as recording:
         assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path, waited):
+def test_a_growing_file_shows_its_data_size_not_the_reserved_size(begin_recording, tmp_path, waited):
     """512 MB were shown a second after a long run had begun."""
     writer, part = begin_recording(tmp_path, "grows")
     waited(lambda: writer.committed_samples == 6400)
@@ -398,7 +396,7 @@ HINTS = (("broken.h5", "broken.h5"), ("whole.h5", "Reading|Working|Zoom in"), ("
 
 
 @pytest.mark.parametrize(("name", "hint"), HINTS)
-def test_no_picture_requests_a_recording_while_one_is_chosen(
+def test_no_hint_asks_for_a_recording_when_one_is_selected(
     page, folder, tmp_path, name, hint, begin_recording
 ):
     path = folder / name
@@ -414,7 +412,7 @@ def test_no_picture_requests_a_recording_while_one_is_chosen(
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_the_wheel_zooms_the_spectrogram_and_the_pointer_reads_its_level(opened, waited, qtbot):
+def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, waited, qtbot):
     page = opened("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
@@ -433,7 +431,7 @@ def test_the_wheel_zooms_the_spectrogram_and_the_pointer_reads_its_level(opened,
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_a_recording_is_exported_for_others_and_keeps_notes(page, folder, tmp_path, waited, monkeypatch):
+def test_recordings_can_be_exported_and_annotated(page, folder, tmp_path, waited, monkeypatch):
     path = tmp_path / "mine.h5"
     shutil.copyfile(folder / "whole.h5", path)
     notices = []

@@ -17,7 +17,7 @@ def shaken(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shaken, waited):
+def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shaken, waited):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
     pictures.setCurrentWidget(pictures.hidden_motion)
@@ -39,9 +39,7 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
 
 
 @pytest.mark.thorough
-def test_another_specimen_is_chosen_and_its_numbers_are_found(
-    shared_context, shaken, waited, tmp_path, monkeypatch
-):
+def test_choosing_another_specimen_identifies_its_gaps(shared_context, shaken, waited, tmp_path, monkeypatch):
     """A file whose gaps are 1 um too small: as described the track is lost, and collisions tell the gaps."""
     described = tmp_path / "tight.toml"
     described.write_text('name = "tight"\nabout = "1 um less"\nmodel = "gong2025"\ngap_m = 44e-6\n')

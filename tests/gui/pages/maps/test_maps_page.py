@@ -53,7 +53,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
     assert not np.array_equal(page.map.image.image, before)
 
 
-def test_anything_that_is_in_sight_is_computed_finer(page, waited):
+def test_the_visible_part_can_be_refined(page, waited):
     mapped(page, waited)
     page.map.plot.setXRange(110.0, 120.0, padding=0.0)
     page.map.plot.setYRange(-5.2, -5.0, padding=0.0)
@@ -67,7 +67,7 @@ def test_anything_that_is_in_sight_is_computed_finer(page, waited):
 
 
 @pytest.mark.thorough
-def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
+def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, waited):
     mapped(page, waited)
     wanted, pages = [], []
     page.context.scene_requested.connect(lambda *point: wanted.append(point))
@@ -86,25 +86,25 @@ def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
     assert pages == [SIMULATE]
 
 
-def test_a_level_lies_on_the_map_as_a_line(page):
+def test_a_level_is_drawn_on_the_map_as_a_line(page):
     page._show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
     across, up = page.map._levels[0].getOriginalDataset()
     assert across.tolist() == [100.0, 140.0]
     assert up.tolist() == [6e-6, 7e-6]
 
 
-def test_anything_that_is_too_large_for_a_window_is_reported(page):
+def test_too_large_a_map_is_refused_with_an_explanation(page):
     page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
     assert not page._begin.isEnabled()
     assert "810000 points are too many for a window" in page.form.complaint
 
 
-def test_the_page_turns_dark(page):
+def test_the_page_follows_the_dark_theme(page):
     page.retheme(DARK)
     assert page.map.plot.backgroundBrush().color().name() == DARK.base
 
 
-def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
+def test_map_and_motion_of_another_specimen_are_greyed_out(page, waited):
     mapped(page, waited)
     page.pick(120.0, 1e-5)
     waited(lambda: page._motion_of is not None and page.motion.isEnabled(), 100.0)
@@ -122,7 +122,7 @@ def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
     page.cancel()
 
 
-def test_before_a_map_the_axes_show_what_the_form_states_also_with_a_level(context, qtbot):
+def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot):
     """With a recorded level they ran from 10 to 10^6 um."""
     page = MapsPage(context)
     qtbot.addWidget(page)

@@ -21,23 +21,23 @@ def names(campaign):
     return campaign.recording_names()
 
 
-def test_the_same_test_twice_gets_two_names():
+def test_adding_a_test_twice_gives_two_names():
     campaign = with_measurement(with_measurement(None, DWELL), DWELL)
     assert names(campaign) == ("dwell", "dwell-2")
 
 
-def test_a_sweep_over_the_level_makes_a_recording_a_level():
+def test_a_level_sweep_makes_one_recording_per_level():
     campaign = with_sweep(with_measurement(None, DWELL), DWELL, SweepAxis.LEVEL, LEVELS, RIG)
     levels = [each.excitation.amplitude_vpp for _, each in campaign.recordings()]
     assert levels == [1.5, 0.5, 1.0, 1.5, 2.0, 2.5]
 
 
-def test_a_sweep_past_what_the_generator_can_play_is_refused():
+def test_a_sweep_beyond_the_generator_is_refused():
     with pytest.raises(ConfigurationError, match=r"amplitude_vpp"):
         with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2), RIG)
 
 
-def test_entries_change_places_and_go_away():
+def test_entries_can_be_moved_and_removed():
     other = DWELL.model_copy(update={"name": "other"})
     campaign = with_measurement(with_measurement(None, DWELL), other)
     assert names(move_up(campaign, 1)) == ("other", "dwell")
@@ -45,7 +45,7 @@ def test_entries_change_places_and_go_away():
     assert without(without(campaign, 0), 0) is None
 
 
-def test_a_saved_campaign_reads_back_as_the_same_one(tmp_path):
+def test_a_saved_campaign_loads_unchanged(tmp_path):
     campaign = with_sweep(
         with_measurement(None, DWELL), DWELL, SweepAxis.FREQUENCY, Range(start=200, stop=300, step=50), None
     )

@@ -13,7 +13,7 @@ def page(shared_context, qtbot):
     return made
 
 
-def test_rows_of_an_earlier_campaign_name_no_entry_to_take_away(page, waited):
+def test_rows_of_an_earlier_campaign_cannot_be_removed(page, waited):
     """Remove, twice in a row: the second one took what stood elsewhere by then, or nothing that there was."""
     page.open_file(shipped("campaigns/quick.toml"))
     first = load_campaign(shipped("campaigns/quick.toml"))

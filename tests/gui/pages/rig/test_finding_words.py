@@ -40,7 +40,7 @@ def test_an_uncertainty_has_the_same_prefix():
     assert measured_text(finding(1.2e-3, "V", uncertainty=4e-5)) == "1.2 ± 0.04 mV"
 
 
-def test_advice_follows_what_was_expected():
+def test_advice_comes_after_the_expected_value():
     assert (
         expected_text(finding(1.0, "V", advice="look at the cable")) == "0.005 V or less. Look at the cable"
     )

@@ -28,7 +28,7 @@ def opened(qapp, tmp_path):
     ("text", "why"),
     [(None, "cannot be read"), ("name = 3 4", "is not valid TOML"), ("name = 'a'", "generator")],
 )
-def test_a_bench_that_cannot_be_used_states_why_and_is_not_remembered(opened, tmp_path, text, why):
+def test_an_unusable_bench_shows_the_reason_and_is_not_remembered(opened, tmp_path, text, why):
     bench = tmp_path / "bench.toml"
     if text is not None:
         bench.write_text(text, encoding="utf-8")
@@ -40,7 +40,7 @@ def test_a_bench_that_cannot_be_used_states_why_and_is_not_remembered(opened, tm
     assert opened(None).choice.rig.name == "virtual rig"
 
 
-def test_a_bench_that_can_be_used_is_remembered(opened):
+def test_a_usable_bench_is_remembered(opened):
     lab = shipped("hardware_configs/lab_rig.toml")
     assert opened(lab).choice.rig.name == "laboratory rig"
     again = opened(None)
@@ -48,7 +48,7 @@ def test_a_bench_that_can_be_used_is_remembered(opened):
     assert again.context.settings.text(SettingKey.BENCH) == str(lab)
 
 
-def test_a_bench_whose_springs_follow_from_another_mass_is_warned_of(opened, tmp_path):
+def test_a_bench_gets_a_warning_when_spring_constants_belong_to_another_mass(opened, tmp_path):
     bench = tmp_path / "bench.toml"
     text = shipped("hardware_configs/virtual_rig.toml").read_text(encoding="utf-8")
     heavier = "[specimen]\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n"

@@ -48,7 +48,7 @@ def show(page, status, qapp):
     page.arm_card.show_status(status, "", "")
 
 
-def test_it_cannot_be_started_before_its_end_was_in_sight(small, qapp, qtbot):
+def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qapp, qtbot):
     page, status = small
     show(page, status, qapp)
     card, bar = page.arm_card, page._parts.side.verticalScrollBar()
@@ -71,7 +71,7 @@ def test_it_cannot_be_started_before_its_end_was_in_sight(small, qapp, qtbot):
     assert card.is_read, "it has been read once"
 
 
-def test_another_plan_is_to_be_read_again_from_its_beginning(small, qapp):
+def test_a_new_plan_must_be_read_from_its_beginning(small, qapp):
     page, status = small
     show(page, status, qapp)
     bar = page._parts.side.verticalScrollBar()
@@ -85,7 +85,7 @@ def test_another_plan_is_to_be_read_again_from_its_beginning(small, qapp):
     assert not page.arm_card.is_read
 
 
-def test_what_fits_into_the_window_can_be_started_at_once(window, qapp):
+def test_a_plan_that_fits_into_the_window_can_be_started_at_once(window, qapp):
     window._timer.stop()
     window.resize(1280, 800)
     window.show_page(RUN)

@@ -61,7 +61,7 @@ def test_p_ends_at_the_newest_sample_between_the_stops(picture):
     assert "tracked · lower gap (44.001 ± 0.005) µm" in picture.caption.text()
 
 
-def test_a_forecast_continues_from_there_and_fades_as_its_error_grows(picture):
+def test_the_forecast_fades_as_its_error_grows(picture):
     picture.show_status(status())
     pieces = [np.array(curve.getData()) for curve in picture.forecast]
     assert all(piece.shape[1] for piece in pieces)
@@ -72,7 +72,7 @@ def test_a_forecast_continues_from_there_and_fades_as_its_error_grows(picture):
     assert ends[:-1] == pytest.approx([0.25 * 44e-6 * (n + 1) / 5 for n in range(4)], rel=0.15)
 
 
-def test_anything_that_was_not_followed_is_a_hole_and_a_lost_track_is_stated(picture):
+def test_gaps_and_lost_tracks_are_shown(picture):
     lost = (*P_M[:100], *[None] * 200)
     picture.show_status(
         status(state="lost", sentence="the motion does not fit", p_m=lost, forecast_m=(), forecast_error_m=())
@@ -82,14 +82,14 @@ def test_anything_that_was_not_followed_is_a_hole_and_a_lost_track_is_stated(pic
     assert all(is_empty(curve) for curve in picture.forecast)
 
 
-def test_without_a_twin_nothing_is_shown(picture):
+def test_the_plot_is_empty_without_a_twin(picture):
     picture.show_status(status())
     picture.show_status(EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED))
     assert is_empty(picture.tracked)
     assert picture.caption.text() == "The live twin is off."
 
 
-def test_the_switch_shows_whether_a_twin_is_on_and_requests_one(context, qtbot):
+def test_the_switch_shows_and_changes_whether_a_twin_is_on(context, qtbot):
     card = WatchCard(context.theme)
     card.show_status(status(), 0)
     assert card.twin.isChecked()
@@ -100,7 +100,7 @@ def test_the_switch_shows_whether_a_twin_is_on_and_requests_one(context, qtbot):
     assert asked.args == [TwinSwitch.OFF]
 
 
-def test_averages_started_and_planned_are_shown_and_the_one_that_is_played_can_be_rejected(context, qtbot):
+def test_averages_are_counted_and_the_current_one_can_be_rejected(context, qtbot):
     card = WatchCard(context.theme)
     playing = RunStatus(
         name="noise", number=1, count=1, file="noise.h5", run_state=RunState.RECORDING, segment="realisation",

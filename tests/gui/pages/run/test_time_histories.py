@@ -36,7 +36,7 @@ def test_each_lane_is_labelled_with_its_channel(time_histories, qapp, channels):
     assert all(plot.up.label.isVisible() for plot in time_histories.plots)
 
 
-def test_the_last_lane_alone_has_the_time(time_histories, qapp):
+def test_only_the_last_lane_has_a_time_axis(time_histories, qapp):
     for channels in (OTHERS, FOUR, OTHERS):
         time_histories.show_channels(channels)
         qapp.processEvents()
@@ -45,7 +45,7 @@ def test_the_last_lane_alone_has_the_time(time_histories, qapp):
 
 
 @pytest.mark.parametrize("width", [833, 872, 905])
-def test_the_edge_of_a_growing_sine_has_no_teeth(time_histories, qapp, width):
+def test_the_envelope_of_a_growing_sine_is_drawn_without_gaps(time_histories, qapp, width):
     """Where two columns fell on one pixel the next one stayed empty: a comb of one pixel at 1280."""
     time_s = np.arange(round(2.0 * RATE_HZ)) / RATE_HZ
     phase = 2 * np.pi * (290.0 + 6.75 * time_s) * time_s

@@ -55,7 +55,7 @@ def asked(view, request):
 
 
 @pytest.mark.thorough
-def test_branches_are_found_drawn_and_reported_with_error_and_cost(page, waited):
+def test_branches_are_drawn_with_error_and_cost(page, waited):
     view = page.branches
     asked(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
     assert view.simulator.is_busy
@@ -69,7 +69,7 @@ def test_branches_are_found_drawn_and_reported_with_error_and_cost(page, waited)
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_stable_stretches_are_solid_and_unstable_ones_dashed(page, along):
+def test_stable_branches_are_solid_and_unstable_ones_dashed(page, along):
     view = page.branches
     start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
     asked(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
@@ -83,7 +83,7 @@ def test_stable_stretches_are_solid_and_unstable_ones_dashed(page, along):
     assert view._compare.isEnabled() is (along is Parameter.FREQUENCY)
 
 
-def test_branches_are_laid_over_recordings(page):
+def test_branches_can_be_overlaid_on_recordings(page):
     view = page.branches
     view.form.show_value(BranchRequest(start=100.0, stop=110.0))
     asked(view, BranchRequest(start=100.0, stop=110.0, places=2, starts=0))
@@ -142,7 +142,7 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
 
 
 @pytest.mark.thorough
-def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_stated(page, waited, tmp_path):
+def test_wave_dispersion_needs_no_run_and_forbidden_drives_are_reported(page, waited, tmp_path):
     view = page.chain
     asked(view, ChainRequest(lengths=(2, 5), drive="none"))
     waited(lambda: not view.simulator.is_busy, 100.0)
@@ -157,7 +157,7 @@ def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_stated
     assert view.simulator.background.workers[0].process.is_alive()
 
 
-def test_anything_that_is_not_allowed_cannot_be_asked(page):
+def test_invalid_inputs_disable_the_find_button(page):
     view = page.branches
     view.form.form.show_content({"method": "first-order"})
     assert not view._begin.isEnabled()
@@ -166,13 +166,13 @@ def test_anything_that_is_not_allowed_cannot_be_asked(page):
     assert view._begin.isEnabled()
 
 
-def test_a_dark_theme_reaches_the_tabs(page):
+def test_tabs_follow_the_dark_theme(page):
     page.retheme(DARK)
     page.refresh()
 
 
 @pytest.mark.parametrize("name", ["branches", "spectrum", "chain"])
-def test_while_a_tab_still_looks_it_reports_it_and_gives_no_answer(page, name):
+def test_a_running_search_is_shown_as_running_without_a_result(page, name):
     """Branches said: no periodic motion was found; 0.0 s."""
     view = getattr(page, name)
     view.begin()
@@ -182,7 +182,7 @@ def test_while_a_tab_still_looks_it_reports_it_and_gives_no_answer(page, name):
 
 
 @pytest.mark.parametrize("place", range(4))
-def test_what_begins_a_computation_is_in_sight_at_every_size(page, qapp, place):
+def test_start_buttons_are_visible_at_every_window_size(page, qapp, place):
     """Simulate lay below the fold at 1280 x 800, Find half below the edge of the Chain tab."""
     for width, height in ((1040, 560), (1100, 640), (1300, 800)):
         page.resize(width, height)

@@ -38,7 +38,7 @@ def point(model, frequency_hz, response=2.0, impacts=0, exponent=None):
     return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, "periodic", exponent, 1e-6)
 
 
-def test_a_simulation_is_complete_and_drawn(page, waited):
+def test_a_simulation_completes_and_is_drawn(page, waited):
     asked(page)
     assert page.simulator.is_busy
     waited(lambda: not page.simulator.is_busy, 60.0)
@@ -53,7 +53,7 @@ def test_a_simulation_is_complete_and_drawn(page, waited):
     assert page.is_done
 
 
-def test_cancelling_is_at_once_and_keeps_what_was_found(page, waited):
+def test_cancelling_is_immediate_and_keeps_partial_results(page, waited):
     asked(page, step_hz=0.05)
     waited(lambda: page.progress.done > 0, 60.0)
     page.cancel()
@@ -66,7 +66,7 @@ def test_cancelling_is_at_once_and_keeps_what_was_found(page, waited):
     assert page.progress.done == page.progress.asked == 6
 
 
-def test_a_dead_process_is_reported_and_the_next_request_begins_another(page, waited):
+def test_a_dead_process_is_reported_and_replaced(page, waited):
     said = []
     page.context.noticed.connect(said.append)
     asked(page, step_hz=0.05)
@@ -80,7 +80,7 @@ def test_a_dead_process_is_reported_and_the_next_request_begins_another(page, wa
     assert page.progress.done == 6
 
 
-def test_anything_that_is_not_allowed_cannot_be_started(page):
+def test_invalid_inputs_cannot_be_simulated(page):
     page.form.form.show_content({"window_s": 50.0})
     assert not page._begin.isEnabled()
     assert "Window 50.0 s is not allowed" in page.form.complaint
@@ -88,7 +88,7 @@ def test_anything_that_is_not_allowed_cannot_be_started(page):
     assert page._begin.isEnabled()
 
 
-def test_cost_and_error_stand_beside_the_accuracy(page):
+def test_cost_and_error_are_shown_beside_the_accuracy(page):
     page.form.show_value(SimulationRequest(accuracy="quick"))
     quick = page._cost.text()
     page.form.show_value(SimulationRequest(accuracy="reference"))
@@ -99,7 +99,7 @@ def test_cost_and_error_stand_beside_the_accuracy(page):
     assert quick != strict
 
 
-def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
+def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
     asked(page, step_hz=100.0)
     page.cancel()
     page._grow(
@@ -118,7 +118,7 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
     assert np.array_equal(x, 1e-6 * np.sin(time_s))
 
 
-def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(page):
+def test_coexisting_motions_are_dots_and_table_rows_with_their_shares(page):
     asked(page, step_hz=100.0)
     page.cancel()
     motions = tuple(
@@ -154,7 +154,7 @@ def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(p
     assert not page.motions.isVisible()
 
 
-def test_points_that_failed_are_reported_at_the_end(page):
+def test_failed_points_are_reported_at_the_end(page):
     said = []
     page.context.noticed.connect(said.append)
     page._grow((Trouble("a at 300 Hz: a contact made no progress"),))
@@ -162,14 +162,14 @@ def test_points_that_failed_are_reported_at_the_end(page):
     assert "no progress" in said[-1].what
 
 
-def test_the_curves_go_to_compare(page, qtbot):
+def test_curves_can_be_sent_to_compare(page, qtbot):
     page._grow((point("a", 100.0), point("a", 200.0)))
     with qtbot.waitSignal(page.context.prediction_made) as made:
         page._compare.click()
     assert {each.name for each in made.args[0]} >= {"model a, 5 µm, Response I, predicted"}
 
 
-def test_plots_follow_the_theme_and_carry_units(page):
+def test_plots_follow_the_theme_and_show_units(page):
     page.retheme(DARK)
     assert {plot.backgroundBrush().color().name() for plot in page.plots.plots} == {DARK.base}
     assert all(plot.accessibleName() for plot in page.plots.plots)
@@ -177,7 +177,7 @@ def test_plots_follow_the_theme_and_carry_units(page):
     assert "µm" in page.plots.motion.up.labelText
 
 
-def test_a_signal_is_left_out_by_emptying_its_field(page):
+def test_an_empty_field_omits_its_signal(page):
     page.form.form.show_content({})
     editor = page.form.form.editors["signal_hz"]
     assert page.form.value.signal_hz == 260.0
@@ -186,7 +186,7 @@ def test_a_signal_is_left_out_by_emptying_its_field(page):
     assert page.form.value.signal_hz is None
 
 
-def test_curves_of_another_scene_than_the_form_states_lie_under_a_veil_and_the_scene_is_kept(page):
+def test_curves_that_differ_from_the_form_are_greyed_out(page):
     page._request = SimulationRequest(**LINEAR)
     page.form.show_value(SimulationRequest(**LINEAR))
     assert page.plots.isEnabled()

@@ -20,7 +20,7 @@ def page(context):
     page.close()
 
 
-def test_the_expected_uncertainty_stands_under_the_prediction(page):
+def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
     page._predicted(preview.predict_test(preview.TestPreview(Measurement(name="weak", excitation=plan), RIG)))
     assert page.expectation.text().startswith("Will be known: Response II: ± ")
@@ -29,14 +29,14 @@ def test_the_expected_uncertainty_stands_under_the_prediction(page):
     assert page.expectation.text() == ""
 
 
-def test_the_predicted_time_of_a_test_with_until_stands_before_it(page):
+def test_a_test_with_until_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
     page._predicted(preview.predict_test(preview.TestPreview(test, RIG)))
     assert page.expectation.text().startswith("Will record for about 2 s, until known. Will be known: ")
 
 
-def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_page_states_why(page):
+def test_a_branch_beyond_the_fast_loop_is_refused_with_the_reason(page):
     fast_loop = pytest.importorskip(
         "vibench_fast_loop.branch_continuation", reason="pip install -e extensions/fast_loop"
     )
@@ -54,7 +54,7 @@ def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_p
     assert not page.is_done
 
 
-def test_every_limit_that_is_passed_stands_among_the_reasons(page):
+def test_every_exceeded_limit_is_among_the_reasons(page):
     """49 of 45 N were missing beside an exceeded stroke."""
     seen = preview.preview_test(
         preview.TestPreview(
@@ -71,7 +71,7 @@ def test_every_limit_that_is_passed_stands_among_the_reasons(page):
     assert all(check.complaint() in said for check in passed)
 
 
-def test_another_name_requests_no_other_prediction_not_even_while_one_is_made(page, qtbot):
+def test_renaming_a_test_does_not_repeat_the_prediction(page, qtbot):
     page.context.selection.choose_rig(RIG)
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
     page.form.show_value(Measurement(name="before", excitation=plan))

@@ -30,7 +30,7 @@ def choose(form, word):
     box.activated.emit(place)
 
 
-def test_kinds_stand_below_headings_that_cannot_be_chosen_with_a_line_on_each(form):
+def test_kinds_are_grouped_below_headings_and_explained(form):
     box = form.form.editors["excitation"].kind_choice
     flags = [box.model().item(place).flags() for place in range(box.count())]
     headings = [box.itemText(n) for n, each in enumerate(flags) if not each & Qt.ItemFlag.ItemIsEnabled]
@@ -43,7 +43,7 @@ def test_kinds_stand_below_headings_that_cannot_be_chosen_with_a_line_on_each(fo
     assert box.currentData() == form.value.excitation.kind
 
 
-def test_a_heading_that_becomes_current_leaves_the_kind_as_it_was(form):
+def test_selecting_a_heading_keeps_the_kind(form):
     box = form.form.editors["excitation"].kind_choice
     kind = form.value.excitation.kind
     box.setCurrentIndex(box.findText("STEPS"))
@@ -51,7 +51,7 @@ def test_a_heading_that_becomes_current_leaves_the_kind_as_it_was(form):
 
 
 @pytest.mark.parametrize("word", EXCITATION_KINDS)
-def test_a_new_kind_has_its_name_and_values_that_the_rig_allows(form, word):
+def test_a_new_kind_gets_a_name_and_values_within_the_rig(form, word):
     choose(form, "dwell" if word != "dwell" else "white_noise")
     choose(form, word)
     assert form.value is not None, form.complaint
@@ -60,7 +60,7 @@ def test_a_new_kind_has_its_name_and_values_that_the_rig_allows(form, word):
     assert seen.is_allowed, [each.complaint() for each in seen.checks if not each.is_kept]
 
 
-def test_a_sweep_does_not_take_over_the_seconds_of_a_dwell_and_finds_its_own_again(form):
+def test_each_kind_remembers_its_own_duration(form):
     choose(form, "sine_sweep")
     choose(form, "dwell")
     form.form.editors["excitation"].form.editors["duration_s"].widget.set_value(3.0)
@@ -72,7 +72,7 @@ def test_a_sweep_does_not_take_over_the_seconds_of_a_dwell_and_finds_its_own_aga
     assert form.value.name == "dwell"
 
 
-def test_a_test_that_is_taken_over_keeps_its_name(form):
+def test_a_copied_test_keeps_its_name(form):
     named = next(each for each in shipped_tests() if each.measurement.excitation.kind == "sine_sweep")
     form.show_value(named.measurement)
     assert form.value == named.measurement
