@@ -1,4 +1,4 @@
-"""The window as it is, offscreen, with settings of its own."""
+"""The complete window, offscreen, with separate settings."""
 
 import gc
 from time import thread_time
@@ -14,7 +14,7 @@ from vibench.gui.window.open_window import application
 from vibench.gui.window.window import PAGES, Window
 
 YARDSTICK_S = 0.0054
-"""What `yardstick` takes where the bound was set; a slower processor is given as much more."""
+"""Time of `yardstick` [s] on the machine of the bounds; bounds scale with it on slower processors."""
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +49,7 @@ def contrast():
 
 @pytest.fixture
 def _without_leftovers():
-    """Keep the collector of garbage from walking through what hundreds of other tests have left."""
+    """Exclude objects left by other tests from garbage collection, which would take long."""
     gc.collect()
     gc.freeze()
     yield
@@ -57,27 +57,27 @@ def _without_leftovers():
 
 
 @pytest.fixture
-def held_up(qtbot, _without_leftovers):
-    """Do something, and tell the longest stretch of work of the window's loop, and what is allowed [s].
+def longest_blocking(qtbot, _without_leftovers):
+    """Do something; return the longest blocking of the event loop and its bound [s].
 
     The bound is that of the loop watch, in processor time, on this processor at the speed that it has now.
     """
 
-    def told(window, act, is_done=lambda: True):
+    def measure(window, act, is_done=lambda: True):
         before_s = yardstick()
         window.event_loop_monitor.begin()
         act()
         qtbot.waitUntil(is_done, timeout=120_000)
-        # The loop has been round, whatever the act left to it.
+        # Handle all events that the action has posted.
         qtbot.waitUntil(lambda: window.event_loop_monitor.rounds >= 5)
         busiest_s = window.event_loop_monitor.busiest_s
         return busiest_s, BOUND_S * max(1.0, 0.5 * (before_s + yardstick()) / YARDSTICK_S)
 
-    return told
+    return measure
 
 
 def yardstick():
-    """Processor time of a piece of work of a window's kinds: Python, text, lines, a picture's memory."""
+    """Return the processor time of a reference workload: Python, text, lines, images [s]."""
     begun_s = thread_time()
     picture = QImage(1200, 600, QImage.Format.Format_ARGB32_Premultiplied)
     picture.fill(Qt.GlobalColor.white)
@@ -92,7 +92,7 @@ def yardstick():
 
 @pytest.fixture(scope="module")
 def own_state(tmp_path_factory):
-    """Keep locks out of the user's folder."""
+    """Use a temporary state folder for locks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
         yield
@@ -100,7 +100,7 @@ def own_state(tmp_path_factory):
 
 @pytest.fixture
 def window(context, own_state, tmp_path, qapp):
-    """The whole window, without a bench."""
+    """The complete window, without a bench."""
     context.choose_folder(tmp_path / "recordings")
     window = Window(context, PAGES)
     window.resize(1280, 720)
@@ -110,7 +110,7 @@ def window(context, own_state, tmp_path, qapp):
 
 
 def end(window, qapp):
-    """Close a window, and let Qt forget it: thousands of old widgets would slow down the next one."""
+    """Close a window and delete its widgets, which would slow down the next window."""
     window.context.bridge.close()
     window.close()
     window.deleteLater()

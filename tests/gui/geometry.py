@@ -1,4 +1,4 @@
-"""What of a window is out of reach at a size, a font and a scale, with the longest texts in every place."""
+"""Find hidden or cut-off widgets at a size, font and scale, with the longest texts everywhere."""
 
 import json
 import sys
@@ -28,11 +28,11 @@ from vibench.gui.window.window import PAGES, Window
 
 SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4
 NAME = "a_recording_whose_name_was_chosen_by_somebody_who_likes_to_say_everything_in_it_" * 2
-"""A word without a place to break it."""
+"""A long word that cannot be wrapped."""
 
 
 def fill_with_longest_texts(window):
-    """Put long texts wherever a text changes: frame, labels, bars, fields and lists."""
+    """Put long texts into every variable text: frame, labels, bars, fields and lists."""
     window._timer.stop()
     window.banner.show_indicator(StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION, SENTENCE))
     window.strip.say(Notice(NoticeKind.FAULT, SENTENCE, NAME, SENTENCE))
@@ -57,12 +57,12 @@ def fill_with_longest_texts(window):
 
 
 def place_in(widget, window):
-    """Where a widget lies, in the coordinates of the window."""
+    """Return the rectangle of a widget in window coordinates."""
     return QRect(widget.mapTo(window, QPoint(0, 0)), widget.size())
 
 
 def is_whole(widget, window):
-    """Whether all of a widget lies inside the window and inside everything that could cut it."""
+    """Return whether a widget is completely inside the window and its parents."""
     place, parent = place_in(widget, window), widget.parentWidget()
     while parent is not None and parent is not window:
         if not place_in(parent, window).contains(place):
@@ -72,7 +72,7 @@ def is_whole(widget, window):
 
 
 def scrolls_to(button, window):
-    """How many areas have to be scrolled until a button is in sight; None where none of them helps."""
+    """Return how many areas must be scrolled to show a button; None if scrolling cannot show it."""
     moved = 0
     area = button.parentWidget()
     while area is not None and area is not window:
@@ -85,7 +85,7 @@ def scrolls_to(button, window):
 
 
 def buttons_of(page):
-    """Everything of a page that can be pressed, as far as it is shown."""
+    """Return the visible buttons of a page."""
     return [
         each
         for each in page.findChildren(QAbstractButton)
@@ -102,7 +102,7 @@ def scroll_home(page):
 
 
 def troubles_of(window, width, height, points):
-    """Every page at a size and a font: what is out of sight, in words."""
+    """Describe everything hidden on any page at a size and font."""
     font = QFont(QApplication.font())
     font.setPointSize(points)
     QApplication.setFont(font)
@@ -140,7 +140,7 @@ def troubles_of(window, width, height, points):
 
 
 def tabs_of(page):
-    """Turn to each tab of a page that is made of tabs; yields its name."""
+    """Show each tab of a page in turn; yield its name."""
     tabs = next((each for each in page.findChildren(QTabWidget) if each.parent() is page), None)
     if tabs is None:
         yield ""
@@ -151,7 +151,7 @@ def tabs_of(page):
 
 
 def main(cases):
-    """Print what is out of sight; scale is that of QT_SCALE_FACTOR."""
+    """Print everything hidden; `QT_SCALE_FACTOR` sets the scale."""
     app = application(["vibench"])
     with TemporaryDirectory() as folder:
         context = AppContext(Settings(Path(folder) / "window.ini"))
@@ -162,7 +162,7 @@ def main(cases):
         fill_with_longest_texts(window)
         found = [each for case in cases for each in troubles_of(window, *case)]
         window.close()
-    print(json.dumps(found))  # noqa: T201 - its word to the test
+    print(json.dumps(found))  # noqa: T201 - output for the test
 
 
 if __name__ == "__main__":

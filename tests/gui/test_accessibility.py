@@ -1,4 +1,4 @@
-"""Everything that takes the focus has a name; mnemonics are unique; nothing is cut off."""
+"""Focusable widgets have names, mnemonics are unique, and no text is cut off."""
 
 import os
 import re
@@ -100,7 +100,7 @@ def cut_off(window):
             continue
         if isinstance(widget, QLabel) and (widget.wordWrap() or widget.sizePolicy().horizontalPolicy() == 13):
             continue
-        # qt_ objects belong to Qt's own widgets; labels without text have nothing to show.
+        # qt_ objects belong to Qt's widgets; labels without text show nothing.
         if widget.objectName().startswith("qt_") or not widget.text():
             continue
         if (
@@ -111,7 +111,7 @@ def cut_off(window):
 
 
 def scrolled_sideways(page):
-    """Columns of fields that have to be scrolled to the right; tables may be."""
+    """Return field columns that need horizontal scrolling; tables may scroll."""
     for area in page.findChildren(QScrollArea):
         if area.isVisible() and area.widget().minimumSizeHint().width() > area.viewport().width():
             yield area.accessibleName(), area.widget().minimumSizeHint().width(), area.viewport().width()
@@ -119,7 +119,7 @@ def scrolled_sideways(page):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 def test_every_field_has_a_visible_edge(window, qapp, qtbot, contrast, theme):
-    """WCAG 2.1, section 1.4.11: at least 3, against what is inside and what is outside."""
+    """WCAG 2.1, section 1.4.11: contrast of at least 3 with the inside and the outside."""
     window.context.choose_theme(theme)
     qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
     faint, looked_at = [], 0
@@ -156,9 +156,11 @@ def test_no_text_is_cut_off(window, qapp, size):
 
 @pytest.mark.thorough
 def test_no_text_is_cut_off_at_a_scale_of_two():
-    """On a fine screen, as Qt scales it for a whole process."""
+    """Qt sets the scale for a whole process."""
     this = f"{Path(__file__)}::test_no_text_is_cut_off"
     environment = {**os.environ, "QT_SCALE_FACTOR": "2"}
-    asked = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", this]
-    told = subprocess.run(asked, env=environment, capture_output=True, text=True, check=False, timeout=110)
-    assert told.returncode == 0, told.stdout
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", this]
+    result = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=False, timeout=110
+    )
+    assert result.returncode == 0, result.stdout

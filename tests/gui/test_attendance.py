@@ -1,4 +1,4 @@
-"""Who looks after a run: the window's process, whatever its drawing thread does at the moment."""
+"""The window's process attends a run even while its drawing thread is busy."""
 
 import os
 from time import sleep
@@ -40,7 +40,7 @@ def test_a_window_busy_for_one_second_does_not_stop_a_campaign(window, qtbot):
     reach(EngineState.RUNNING)
     qtbot.waitUntil(lambda: bridge.status.samples > 0, timeout=PATIENCE_MS)
     assert seen[-1].attendance.value == "attended"
-    sleep(1.5)  # a picture that takes so long, or a computer with other things to do
+    sleep(1.5)  # as a slow plot or a busy computer would
     qtbot.wait(300)
     assert bridge.state in DRIVING
     assert not bridge.may_leave
@@ -60,7 +60,7 @@ def test_a_window_busy_for_one_second_does_not_stop_a_campaign(window, qtbot):
 
 @pytest.mark.thorough
 def test_a_new_engine_does_not_inherit_data_of_a_killed_one(window, qtbot):
-    """Its orders were waited for, and its last picture was continued by the next engine's first run."""
+    """Commands to the dead engine were awaited, and the next engine's run continued the old plots."""
     bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))
     page = window.pages[RUN]
 
@@ -87,8 +87,8 @@ def test_a_new_engine_does_not_inherit_data_of_a_killed_one(window, qtbot):
     for _ in range(3):
         bridge.order(EngineClient.mark, "here")
     qtbot.waitUntil(lambda: bridge.engine_pid is None, timeout=PATIENCE_MS)
-    told = next(each for each in notices if each.what == "The engine was killed.")
-    assert told.next_step.startswith("The generator may still be driving: switch the amplifier off")
+    notice = next(each for each in notices if each.what == "The engine was killed.")
+    assert notice.next_step.startswith("The generator may still be driving: switch the amplifier off")
     assert not bridge.is_ordering
     for _ in run():
         window.tick()

@@ -1,4 +1,4 @@
-"""The job on the virtual rig: by keyboard from the open window to an export, and every way to stop."""
+"""The whole job on the virtual rig by keyboard, from opening to export, and every way to stop."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ from vibench.gui.window.window import PAGES, Window
 CONTROL = Qt.KeyboardModifier.ControlModifier
 ALT = Qt.KeyboardModifier.AltModifier
 STOPPED_S = 5.0
-"""From the key to a finished recording; when the drive is silent is measured where the stops are."""
+"""Time from key press to finished recording; other tests measure the time to silence."""
 PATIENCE_MS = 100_000
 pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]
 
@@ -48,14 +48,14 @@ def dwell(name, duration_s):
 
 @pytest.fixture(scope="module")
 def bench(qapp, own_state, tmp_path_factory):
-    """A window whose bench is open; the engine starts once for all tests here."""
+    """A window with an open bench; one engine serves all tests of this module."""
     folder = tmp_path_factory.mktemp("job")
-    # Unattended: a machine that is busy with other tests must not end a run here; that a window that
-    # falls silent does is tested with the engine.
+    # Unattended: a busy machine must not end a run here; tests of the engine check that a silent
+    # window ends one.
     context = AppContext(Settings(folder / "window.ini"), partial(start_engine, Supervision.UNATTENDED))
     context.choose_folder(folder / "recordings")
     window = Window(context, PAGES)
-    # Free of the clock: a simulated converter that has to keep up with it may overrun on a busy machine.
+    # Not in real time: a simulated converter could overrun on a busy machine.
     window.pages["Rig"].choice.pace.setCurrentIndex(list(PACES).index("free"))
     window.show()
     yield window
@@ -77,13 +77,13 @@ def press(qtbot, window, key, modifier=Qt.KeyboardModifier.NoModifier):
 
 
 def recorded(window):
-    """The newest recording, opened and looked at."""
+    """Open the newest recording."""
     (row,) = window.context.bridge.status.rows
     return row
 
 
 def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
-    """It opened the list that had the focus; the Esc that closed the list killed the run."""
+    """Space opened the focused list, and the Esc that closed it ended the run."""
     card = bench.pages[RUN].watch_card
     bench.tick()
     press(qtbot, bench, Qt.Key.Key_Space)
@@ -95,7 +95,7 @@ def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
 
 
 def test_a_newcomer_measures_with_five_keys(bench, qtbot):
-    """Alt+O opens, Ctrl+Return arms, F5 starts, the run ends by itself: three keys, and two to look."""
+    """Alt+O opens, Ctrl+Return arms, F5 starts; two more keys show the recording."""
     keys = []
 
     def key(*which):
@@ -124,7 +124,7 @@ def test_a_newcomer_measures_with_five_keys(bench, qtbot):
 
 
 def tab_to(qtbot, window, widget):
-    """Press Tab until a widget has the focus; how often, a person would count as well."""
+    """Press Tab until a widget has the focus, with a limit on the number of presses."""
     for presses in range(1, 10):
         press(qtbot, window, Qt.Key.Key_Tab)
         if QApplication.focusWidget() is widget:
@@ -149,13 +149,13 @@ def type_into_dialog(qtbot, text):
 
 
 def give_focus(qtbot, window):
-    """Make the window active: no window manager here does so when a dialog has closed."""
+    """Make the window active, since no window manager does so after a dialog closes."""
     window.activateWindow()
     qtbot.waitUntil(lambda: QApplication.activeWindow() is window, timeout=PATIENCE_MS)
 
 
 def read_and_start(qtbot, window):
-    """Read what will happen to its end, and start it."""
+    """Scroll the plan to its end and start it."""
     while window.context.bridge.state is EngineState.ARMED:
         press(qtbot, window, Qt.Key.Key_PageDown)
         press(qtbot, window, Qt.Key.Key_F5)
@@ -164,7 +164,7 @@ def read_and_start(qtbot, window):
 
 @pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
 def test_the_whole_job_can_be_done_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
-    """Another measurement is made, looked at, compared with those before it, and exported."""
+    """Make a measurement, open it, compare it with earlier ones and export it."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
     font = qapp.font()
@@ -206,7 +206,7 @@ def test_the_whole_job_can_be_done_by_keyboard(bench, qtbot, tmp_path, qapp, wid
 
 
 def test_the_whole_job_can_be_done_by_mouse(bench, qtbot, tmp_path):
-    """But for the name of the file, which nobody can point at."""
+    """Only the file name is typed."""
 
     def point_at(widget, place=None):
         qtbot.waitUntil(lambda: widget.isVisible() and widget.isEnabled(), timeout=PATIENCE_MS)
@@ -346,7 +346,7 @@ def test_the_live_plots_show_the_run(bench, qtbot):
     assert all(each.is_current for each in page.displayed_results)
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
-    # An abort goes before what waits in line.
+    # An abort precedes queued requests.
     qtbot.waitUntil(lambda: not bench.context.bridge.is_ordering, timeout=PATIENCE_MS)
     samples = bench.context.bridge.status.samples
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
@@ -375,7 +375,7 @@ def test_the_current_noise_average_can_be_rejected(bench, qtbot):
     assert analyse(Path(recorded(bench).file)).response.periodic.realisations == 11
 
 
-def test_an_error_message_disappears_when_its_cause_is_fixed(bench, qtbot):
+def test_an_error_message_disappears_when_its_request_is_fulfilled(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.start()
     assert "nothing is armed" in bench.strip.notices[-1].what

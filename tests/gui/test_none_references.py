@@ -1,4 +1,4 @@
-"""PySide6 must not give away references it does not own: 6.12.0 ends the process that way."""
+"""PySide6 must not release references that it does not own: 6.12.0 crashes that way."""
 
 import sys
 

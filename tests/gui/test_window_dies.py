@@ -1,4 +1,4 @@
-"""A window that is killed or frozen during a run: silence soon after, and the recording kept."""
+"""After a window is killed or frozen, the drive is soon silent and the recording is kept."""
 
 import os
 import signal
@@ -26,14 +26,14 @@ from vibench.gui.widgets.notice import RUN
 
 ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = {"SIGKILL": 1.0, "SIGSTOP": USUAL_PATIENCE_S + 1.0}
-"""From the signal to zero drive, on the wall's clock: the end of a process is known at once."""
+"""Time from the signal to zero drive in real time [s]; the end of a process is seen at once."""
 PATIENCE_S = 60.0
 PAUSE = Event()
 
 
 @contextmanager
 def measuring_window(folder, attendance, state, patience_s=USUAL_PATIENCE_S):
-    """A process whose window measures, until killed at the end."""
+    """Run a measuring window in a process, killed at the end."""
     child = Path(__file__).with_name("window_child.py")
     rig = ROOT / "hardware_configs" / "virtual_rig.toml"
     window = subprocess.Popen(
@@ -72,7 +72,7 @@ def test_the_drive_is_silenced_when_the_window_dies_or_freezes(tmp_path, number)
 )
 @pytest.mark.timeout(900)
 def test_a_busy_computer_does_not_stop_a_drive_but_a_dead_window_does(tmp_path, number, attended_s):
-    """A thread of the window was to say that it is there: it waited up to 1.6 s for Python's lock."""
+    """The window's heartbeat thread waited up to 1.6 s for Python's global lock."""
     with (
         measuring_window(tmp_path, Supervision.ATTENDED, tmp_path / "state", VIEWER_PATIENCE_S) as window,
         busy_cores(),
@@ -84,7 +84,7 @@ def test_a_busy_computer_does_not_stop_a_drive_but_a_dead_window_does(tmp_path, 
 
 @contextmanager
 def busy_cores():
-    """Four programs a core calculate, each in a session of its own: Linux gives it as much as the window."""
+    """Run four busy programs per core, each in a session, so that Linux schedules it like the window."""
     others = [
         subprocess.Popen([sys.executable, "-c", "while True: pass"], start_new_session=True)
         for _ in range(4 * os.cpu_count())
@@ -98,7 +98,7 @@ def busy_cores():
 
 
 def silent_after_s(window, number, folder):
-    """Send a signal to a window that measures; the time from there to silence in the recording."""
+    """Send a signal to a measuring window; return the time to silence in the recording [s]."""
     window.send_signal(number)
     signalled_s = time.time()
     path = folder / "recordings" / "run.h5"
@@ -108,8 +108,7 @@ def silent_after_s(window, number, folder):
     with open_recording(path) as recording:
         assert recording.state is RecordingState.STOPPED
         assert "nobody has looked" in recording.reason or "has ended" in recording.reason
-        # Noted when the last, verified setting of the ramp has been made; the tests of the engine look at
-        # the drive itself.
+        # The time when the last setting of the ramp was verified; tests of the engine measure the drive.
         silent_s = next(event.unix_time_s for event in recording.events if event.kind == "silence")
         assert recording.samples > 0
     return silent_s - signalled_s
@@ -124,7 +123,7 @@ def test_the_next_window_shows_and_attends_an_unattended_run(window, qtbot, tmp_
         window.look_for_left_campaign()
         qtbot.waitUntil(lambda: not window.context.background.is_busy, timeout=100_000)
         assert bridge.engine_pid is None, "it has a window that looks after it"
-    # The engine learns at its next look that its window is gone.
+    # The engine sees at its next poll that the window is gone.
     qtbot.waitUntil(lambda: left_alone() is not None, timeout=60_000)
     window.look_for_left_campaign()
     qtbot.waitUntil(lambda: bridge.state is EngineState.RUNNING, timeout=100_000)
@@ -137,7 +136,7 @@ def test_the_next_window_shows_and_attends_an_unattended_run(window, qtbot, tmp_
     qtbot.waitUntil(lambda: bridge.state is EngineState.READY, timeout=10_000)
     with open_recording(left / "recordings" / "run.h5") as recording:
         assert recording.state is RecordingState.STOPPED
-    qtbot.wait(1000)  # as long as its engine would take to see that it has nothing more to do alone
+    qtbot.wait(1000)  # longer than an idle engine takes to end itself
     assert bridge.state is EngineState.READY
     assert [each.pid for each in announced_engines()] == [bridge.engine_pid]
     bridge.close()

@@ -1,4 +1,4 @@
-"""A real window that runs a long measurement on the wall's clock, to be killed or frozen by a test."""
+"""A real window with a long measurement in real time, to be killed or frozen by a test."""
 
 import sys
 from pathlib import Path
@@ -20,7 +20,7 @@ PLAN = {
 
 
 def main(folder: Path, config: Path, attendance: Supervision, patience_s: float) -> None:
-    """Open the window, and let it measure until it is killed."""
+    """Open the window and measure until killed."""
     rig = load_rig(config)
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     app = application(["vibench"])
@@ -31,7 +31,7 @@ def main(folder: Path, config: Path, attendance: Supervision, patience_s: float)
     done: list[str] = []
 
     def go_on() -> None:
-        """Do what comes next, once the engine is where it has to be."""
+        """Take the next step when the engine has reached the required state."""
         run = None if bridge.status is None else bridge.status.run
         match done, bridge.state:
             case [], EngineState.READY:
@@ -49,7 +49,7 @@ def main(folder: Path, config: Path, attendance: Supervision, patience_s: float)
                 bridge.order(EngineClient.start)
             case ["armed", "started"], EngineState.RUNNING if run is not None and run.segment == "dwell":
                 done.append("told")
-                print("running", flush=True)  # noqa: T201 - its word to the test
+                print("running", flush=True)  # noqa: T201 - output for the test
 
     timer = QTimer()
     timer.timeout.connect(go_on)

@@ -1,4 +1,4 @@
-"""Work in another process: its answer and its error come back, and what is dropped stays away."""
+"""Background processes: they return answers and errors, and dropped requests return nothing."""
 
 import os
 import re
@@ -25,14 +25,14 @@ def test_errors_keep_their_type_and_dropped_answers_are_not_delivered(context, q
     answers, errors = [], []
     context.background.ask(factorial, answers.append, errors.append, 5).drop()
     context.background.ask(factorial, answers.append, errors.append, -1)
-    # The process with the dropped question may be the later one.
+    # The process with the dropped request may be the later one.
     qtbot.waitUntil(lambda: bool(errors) and not context.background.is_busy, timeout=100_000)
     assert isinstance(errors[0], ValueError)
     assert answers == []
 
 
 def leave(_number):
-    """End the process that was asked, without a word."""
+    """End the worker process without an answer."""
     os._exit(1)
 
 
@@ -69,13 +69,13 @@ def test_closing_ends_an_unresponsive_process(background, qtbot):
 
 
 def large(path):
-    """Begin to hand over an answer that fills every pipe."""
+    """Return an answer larger than any pipe buffer."""
     Path(path).write_text("")
     return bytes(300 << 20)
 
 
 def is_being_read(thread):
-    """Whether the thread that takes answers in has read the beginning of one, and waits for its end."""
+    """Return whether the receiving thread has read the beginning of an answer and waits for the rest."""
     frame = sys._current_frames().get(thread.ident)
     while frame is not None and frame.f_code.co_name != "_recv":
         frame = frame.f_back
@@ -84,7 +84,7 @@ def is_being_read(thread):
 
 @pytest.mark.timeout(60)
 def test_closing_ends_a_process_that_is_sending_its_answer(background, qtbot, tmp_path):
-    """The end of an answer that never came was waited for: the window hung for ever."""
+    """The window waited for ever for the rest of an answer."""
     background.ask(large, lambda _: None, lambda _: None, str(tmp_path / "begun"))
     qtbot.waitUntil((tmp_path / "begun").exists, timeout=100_000)
     (worker,) = background.workers
@@ -96,7 +96,7 @@ def test_closing_ends_a_process_that_is_sending_its_answer(background, qtbot, tm
 
 
 def for_ever(path):
-    """Say who works, and do not end."""
+    """Report the number of the process, and never return."""
     Path(path).write_text(str(os.getpid()))
     while True:
         pass
@@ -155,7 +155,7 @@ def test_a_job_ends_only_after_its_answer_was_delivered(background, qtbot):
 
 
 def test_previews_are_computed_while_all_other_processes_are_busy(context, qtbot):
-    """Analyses that took minutes had the Test page wait behind them."""
+    """The Test page waited for analyses that took minutes."""
     for _ in range(4):
         context.background.ask(sleep, lambda _: None, lambda _: None, 3600.0)
     answers = []

@@ -1,4 +1,4 @@
-"""Every field of every form takes 34 bad values, and answers in a sentence with its name and its unit."""
+"""Every field of every form refuses 34 bad values in a sentence with its name and unit."""
 
 from pathlib import Path
 
@@ -86,7 +86,7 @@ def type_into(widget, text):
 def test_the_error_of_a_bad_value_has_the_name_and_unit_of_its_field(qtbot, name):
     form = FORMS[name]()
     qtbot.addWidget(form)
-    assert form.value is not None, form.complaint  # a kind that is chosen begins with a test that can be made
+    assert form.value is not None, form.complaint  # a newly chosen kind begins with valid values
     asked = 0
     for field, row in rows(form.form):
         widget = row.editor.widget

@@ -1,4 +1,4 @@
-"""Every value of every plan has a field, and goes through the form unchanged."""
+"""Every value of every plan has a field, and the form returns it unchanged."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ def test_the_form_returns_an_unedited_measurement_unchanged(form, name):
 
 
 def leaves(form):
-    """Every field of a form, those of models inside included."""
+    """Every field of a form, including fields of nested models."""
     for name, editor in form.editors.items():
         inner = getattr(editor, "form", None)
         if inner is None:

@@ -1,4 +1,4 @@
-"""What is wrong with a value is said at its field, also where only the whole model can find it out."""
+"""Errors are shown at the field that causes them, also errors that only the whole model finds."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN
 
 HIDDEN = BRANCHES.hidden | CHAIN.hidden
 GIVEN = {"start": 60.0, "stop": 62.0}
-"""What no request can do without."""
+"""Required values of a request."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What people type is read, and what is shown reads back as the same number."""
+"""Common ways to write quantities are parsed, and displayed text parses to the same number."""
 
 import pytest
 from hypothesis import given, strategies as st
@@ -47,7 +47,7 @@ def test_a_gap_is_shown_in_micrometres():
     assert quantity_text(45e-6, "m") == "45 µm"
 
 
-def typed(qtbot, edit, text, *keys):
+def type_text(qtbot, edit, text, *keys):
     edit.setFocus()
     edit.lineEdit().setText(text)
     for key in keys or (Qt.Key.Key_Return,):
@@ -57,14 +57,14 @@ def typed(qtbot, edit, text, *keys):
 
 @pytest.fixture
 def field(qtbot):
-    def made(unit, value, kind=float):
+    def make(unit, value, kind=float):
         edit = QuantityEdit(unit, kind)
         qtbot.addWidget(edit)
         edit.show()
         edit.set_value(value)
         return edit
 
-    return made
+    return make
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def field(qtbot):
 )
 def test_a_number_without_unit_is_in_the_displayed_unit(qtbot, field, unit, value, taken):
     edit = field(unit, value)
-    assert typed(qtbot, edit, "7") == taken
+    assert type_text(qtbot, edit, "7") == taken
     assert edit.complaint == ""
 
 
@@ -98,14 +98,14 @@ def test_numbers_without_unit_in_a_list_are_in_the_displayed_unit(qtbot):
 
 def test_a_value_a_thousand_times_larger_must_be_confirmed(qtbot, field):
     edit = field("m", 5e-6)
-    assert typed(qtbot, edit, "7 mm") == 5e-6
+    assert type_text(qtbot, edit, "7 mm") == 5e-6
     assert "1.4e+03 times" in edit.complaint
     assert "Return" in edit.complaint
-    typed(qtbot, edit, "7 mm", Qt.Key.Key_Tab)
+    type_text(qtbot, edit, "7 mm", Qt.Key.Key_Tab)
     edit.clearFocus()
     assert edit.value() == 5e-6, "to leave the field is no yes"
-    assert typed(qtbot, edit, "8 mm") == 5e-6, "another value is asked about again"
-    assert typed(qtbot, edit, "8 mm") == 8e-3
+    assert type_text(qtbot, edit, "8 mm") == 5e-6, "another value is asked about again"
+    assert type_text(qtbot, edit, "8 mm") == 8e-3
     assert edit.complaint == ""
 
 
@@ -113,8 +113,8 @@ def test_an_unconfirmed_value_does_not_enter_the_form(qtbot, field):
     form = ValidatedForm(Dwell, "dwell")
     qtbot.addWidget(form)
     form.show_value(Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=8.0))
-    typed(qtbot, form.form.editors["duration_s"].widget, "9000")
+    type_text(qtbot, form.form.editors["duration_s"].widget, "9000")
     assert form.value is None
     assert "press Return again" in form.complaint
-    typed(qtbot, form.form.editors["duration_s"].widget, "9000")
+    type_text(qtbot, form.form.editors["duration_s"].widget, "9000")
     assert form.value.duration_s == 9000.0

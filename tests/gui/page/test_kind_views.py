@@ -1,4 +1,4 @@
-"""Every kind of excitation has its live pictures."""
+"""Every kind of excitation has its live plots."""
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Family
 from vibench.gui.page.kind_views import KIND_VIEWS, LivePicture

@@ -1,4 +1,4 @@
-"""Recordings to look at: small, real, of a motion that is known."""
+"""Small real recordings of known motions."""
 
 import time
 
@@ -42,14 +42,14 @@ def _header(name, plan):
 
 
 @pytest.fixture(scope="session")
-def waited():
-    """Wait, with events, until something is so."""
+def wait_for():
+    """Process events until a condition holds."""
 
     def wait(is_so, within_s=90.0):
         until = time.monotonic() + within_s
         while not is_so():
             assert time.monotonic() < until, "it did not come true in time"
-            # Asking for events without a pause would take the time of the processes that it waits for.
+            # Polling without a pause would take processor time from the worker processes.
             pause = QEventLoop()
             QTimer.singleShot(10, pause.quit)
             pause.exec()
@@ -59,7 +59,7 @@ def waited():
 
 @pytest.fixture(scope="session")
 def shared_context(qapp, tmp_path_factory):
-    """A desk whose processes serve all tests: they take seconds to begin."""
+    """A context whose worker processes are shared by all tests: starting takes seconds."""
     context = AppContext(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
     yield context
     context.background.close()
@@ -90,7 +90,7 @@ def record():
 
 @pytest.fixture(scope="session")
 def begin_recording():
-    """Begin a recording that grows until somebody finishes it: gives its writer and its name so far."""
+    """Begin a growing recording; return its writer and temporary path."""
 
     def begin(folder, name, samples=6400):
         plan = Dwell(amplitude_vpp=1.0, frequency_hz=260.0, settle_s=1.0, duration_s=8.0)
@@ -104,7 +104,7 @@ def begin_recording():
 
 @pytest.fixture(scope="session")
 def record_noise():
-    """Write ten seconds of streamed noise, over which the mass moves a known number of times as far."""
+    """Write ten seconds of streamed noise with a known displacement ratio of the mass."""
 
     def write(folder, name, factor):
         omega = 2j * np.pi * np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)

@@ -1,4 +1,4 @@
-"""Nothing that a person does on a page holds the window up for long."""
+"""No user action on a page blocks the event loop for long."""
 
 import json
 import os
@@ -36,9 +36,9 @@ LONG_CHANNELS = (
     ("m0_velocity", "velocity", "m s-1"),
 )
 MANY, LISTED = 240, 120
-"""Recordings of a night: rows of a queue; and files of a folder, fewer, for to read them takes its time."""
+"""Rows of a queue (one night), and fewer files in a folder, since reading them takes time."""
 SIMULATED = 500
-"""Frequencies of a simulation, for each of two models."""
+"""Number of frequencies simulated for each of two models."""
 
 
 def curve(number):
@@ -97,7 +97,7 @@ def simulated():
 
 @dataclass(frozen=True)
 class Action:
-    """What a person does, and what shows that it is done."""
+    """A user action and the condition that shows its completion."""
 
     name: str
     act: Callable[[], object]
@@ -194,7 +194,7 @@ def of_run(window):
         for picture in (run.watch_card, run.frequency_response, run.spectrum):
             picture.show_view(view)
 
-    # As the bridge does when a bench is opened.
+    # As the engine bridge does when a bench is opened.
     warm_up()
     timer = QTimer(window, interval=50)
     timer.timeout.connect(draw)
@@ -218,7 +218,7 @@ def of_frame(window):
 
 
 def actions(window, recording, long_recording, folder):
-    """What a person does that was, or may become, slow."""
+    """User actions that were slow or may become slow."""
     yield from first_looks(window)
     yield from of_files(window, recording, long_recording)
     yield from of_compare(window, recording, folder)
@@ -230,18 +230,18 @@ def actions(window, recording, long_recording, folder):
 
 
 @pytest.mark.thorough
-@pytest.mark.timeout(300)  # all that can be done: a minute idle, two with cold kernels beside other work
+@pytest.mark.timeout(300)  # one minute on an idle machine, two with cold kernels on a busy one
 @pytest.mark.usefixtures("_without_leftovers")
 def test_no_action_on_a_page_blocks_the_event_loop_longer_than_its_bound(
-    window, record, long_recording, tmp_path, qtbot, held_up
+    window, record, long_recording, tmp_path, qtbot, longest_blocking
 ):
     window.context.folder.mkdir()
-    load_ahead()  # a thread does it as soon as the window has been painted
+    load_ahead()  # the window does so in a thread after its first paint
     recording = record(window.context.folder, "whole")
     qtbot.waitUntil(lambda: window.pages[TEST].is_done, timeout=120_000)
     slow = {}
     for action in actions(window, recording, long_recording, tmp_path):
-        busiest_s, bound_s = held_up(window, action.act, action.is_done)
+        busiest_s, bound_s = longest_blocking(window, action.act, action.is_done)
         if busiest_s > bound_s:
             slow[action.name] = busiest_s
     assert slow == {}

@@ -1,4 +1,4 @@
-"""Units are chosen once: no page keeps a number in the old one, and no value changes."""
+"""A change of units applies to every page and changes no value."""
 
 import re
 
@@ -32,7 +32,7 @@ from vibench.gui.widgets.units import CHOICES, UNITS, prefixed_unit
 from vibench.gui.window.menus import SettingsDialog
 
 OLD = re.compile(r"(?:\d|\()\s?(?:µm|m/s²|m/s2|m s-[12]|mm/s)(?![\w/²·])")
-"""A number, or the label of an axis, in a unit that was not chosen."""
+"""Pattern of a number or axis label in a unit that is not chosen."""
 DWELL = Dwell(amplitude_vpp=0.5, frequency_hz=260.0, settle_s=1.0, duration_s=6.0)
 OTHERS = {"displacements_in": "mm", "velocities_in": "m/s", "accelerations_in": "g"}
 USUAL = {"displacements_in": "automatic", "velocities_in": "mm/s", "accelerations_in": "m/s²"}
@@ -45,8 +45,8 @@ def _usual_again():
 
 
 @pytest.fixture
-def filled(window, record, tmp_path, qtbot):
-    """Something that has displacements, velocities and accelerations on every page."""
+def full_window(window, record, tmp_path, qtbot):
+    """A window with displacements, velocities and accelerations on every page."""
     pages, context = window.pages, window.context
     rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
     context.selection.choose_rig(rig)
@@ -90,7 +90,7 @@ def filled(window, record, tmp_path, qtbot):
     return window
 
 
-def chosen_in(window, units):
+def choose_units(window, units):
     dialog = SettingsDialog(window.context, window)
     dialog.form.form.show_content({**dialog.form.form.content(), **units})
     dialog.accept()
@@ -98,7 +98,7 @@ def chosen_in(window, units):
 
 
 def texts_of(page):
-    """Everything that a page writes: labels, fields, lists, tables, axes, tips."""
+    """All texts of a page: labels, fields, lists, tables, axes, tooltips."""
     for widget in (page, *page.findChildren(QWidget)):
         yield widget.toolTip()
         match widget:
@@ -133,17 +133,17 @@ def numbers_of(page):
     return [edit.value() for edit in page.findChildren(QuantityEdit)]
 
 
-def test_a_change_of_units_converts_every_number_and_can_be_undone(filled):
-    before = {name: list(texts_of(page)) for name, page in filled.pages.items()}
-    values = {name: numbers_of(page) for name, page in filled.pages.items()}
-    told = {name for name, texts in before.items() if any(map(OLD.search, texts))}
-    assert told >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
-    chosen_in(filled, OTHERS)
-    for name, page in filled.pages.items():
+def test_a_change_of_units_converts_every_number_and_can_be_undone(full_window):
+    before = {name: list(texts_of(page)) for name, page in full_window.pages.items()}
+    values = {name: numbers_of(page) for name, page in full_window.pages.items()}
+    converted = {name for name, texts in before.items() if any(map(OLD.search, texts))}
+    assert converted >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
+    choose_units(full_window, OTHERS)
+    for name, page in full_window.pages.items():
         left = [text for text in texts_of(page) if OLD.search(text)]
         assert left == [], name
         assert numbers_of(page) == values[name], name
-    now = " | ".join(text for page in filled.pages.values() for text in texts_of(page))
+    now = " | ".join(text for page in full_window.pages.values() for text in texts_of(page))
     for text in (
         "stroke 0.05 mm of 5 mm",
         "acceleration 1.27 g of 6.12 g",
@@ -151,8 +151,8 @@ def test_a_change_of_units_converts_every_number_and_can_be_undone(filled):
         "(g)",
     ):
         assert text in now, text
-    chosen_in(filled, USUAL)
-    assert {name: list(texts_of(page)) for name, page in filled.pages.items()} == before
+    choose_units(full_window, USUAL)
+    assert {name: list(texts_of(page)) for name, page in full_window.pages.items()} == before
 
 
 @pytest.mark.parametrize("kind", EXCITATION_KINDS)
@@ -181,18 +181,18 @@ def test_lists_are_read_in_the_displayed_unit(qtbot):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_chosen_units_are_kept_after_a_restart(filled, tmp_path):
-    chosen_in(filled, OTHERS)
+def test_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
+    choose_units(full_window, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
     assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
     again.background.close()
 
 
-def test_axis_numbers_are_in_the_unit_of_the_label(filled):
-    plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
+def test_axis_numbers_are_in_the_unit_of_the_label(full_window):
+    plot = next(each for each in full_window.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
-    chosen_in(filled, OTHERS)
+    choose_units(full_window, OTHERS)
     assert plot.up.labelText == "g"
     assert plot.up.tickStrings([0.0, STANDARD], 1.0, STANDARD) == ["0", "1"] != usual
 
@@ -229,7 +229,7 @@ def test_a_value_keeps_its_digits_in_coarser_units(qtbot):
 
 
 @pytest.mark.parametrize(
-    ("sentence", "told"),
+    ("sentence", "converted"),
     [
         ("gaps 45 and 45 µm, 12.5 to 20 µm", "gaps 0.045 and 0.045 mm, 0.0125 to 0.020 mm"),
         ("(12.3 ± 0.4) µm at 260 Hz and 5 µm", "(0.0123 ± 0.0004) mm at 260 Hz and 0.005 mm"),
@@ -239,9 +239,9 @@ def test_a_value_keeps_its_digits_in_coarser_units(qtbot):
         ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
     ],
 )
-def test_sentences_are_converted_to_the_chosen_units_only(sentence, told):
+def test_sentences_are_converted_to_the_chosen_units_only(sentence, converted):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
-    assert UNITS.convert(sentence) == told
+    assert UNITS.convert(sentence) == converted
 
 
 @pytest.mark.parametrize("unit", CHOICES)

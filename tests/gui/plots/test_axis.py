@@ -1,4 +1,4 @@
-"""Ticks of a logarithmic axis carry 1, 2 and 5 of every decade, and never overlap."""
+"""Labels of a logarithmic axis are at 1, 2 and 5 of every decade and do not overlap."""
 
 from math import log10
 
@@ -27,7 +27,7 @@ def test_tick_numbers_have_common_formats(value, text):
     assert number_text(value) == text
 
 
-def test_the_label_shows_the_unit_with_one_prefix_at_most(qapp):
+def test_frequency_labels_use_hertz_without_prefix(qapp):
     item = AxisItem("bottom", LOG_FREQUENCY)
     item.setRange(10, 20000)
     assert item.labelText == "Frequency (Hz)"

@@ -1,4 +1,4 @@
-"""A curve is as wide on a fine screen as on a coarse one."""
+"""A line has the same width at high and low screen resolution."""
 
 import os
 import subprocess
@@ -32,7 +32,7 @@ for x, y in (([0.0, 10.0], [4.3, 4.3]), ([4.3, 4.3], [0.0, 10.0])):
 @pytest.mark.parametrize(("scale", "pixels"), [("1", "1"), ("2", "2")])
 def test_horizontal_and_vertical_lines_are_one_logical_pixel_wide(scale, pixels):
     environment = {**os.environ, "QT_SCALE_FACTOR": scale}
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", WIDTHS],
         env=environment,
         capture_output=True,
@@ -40,4 +40,4 @@ def test_horizontal_and_vertical_lines_are_one_logical_pixel_wide(scale, pixels)
         check=True,
         timeout=60,
     )
-    assert told.stdout.split() == [pixels, pixels]
+    assert result.stdout.split() == [pixels, pixels]

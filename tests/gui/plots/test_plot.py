@@ -1,4 +1,4 @@
-"""A plot says what will be in it while it is empty, and names its curves above the axes."""
+"""An empty plot shows a hint; the legend is above the axes."""
 
 import sys
 
@@ -26,7 +26,7 @@ def plot(qapp, qtbot):
 
 
 def dark_pixels(plot):
-    """Pixels of letters in the middle of the plot, where nothing else is drawn."""
+    """Count dark (text) pixels in the middle of the empty plot."""
     picture = plot.grab().toImage()
     middle = range(picture.height() * 2 // 5, picture.height() * 3 // 5)
     return sum(
@@ -108,7 +108,7 @@ def test_unit_changes_ignore_closed_plots(qtbot):
     assert raised == []
 
 
-def test_a_linked_axis_without_numbers_stays_blank(plot, qapp):
+def test_an_axis_that_shows_nothing_has_no_label(plot, qapp):
     bare = Plot("bare", LOG_FREQUENCY, PlotAxis("x"), LIGHT)
     bare.across.show_nothing()
     bare.resize(600, 200)
@@ -173,7 +173,7 @@ def read_at_one(plot):
 
 
 def test_readings_belong_to_the_current_curve(plot):
-    """It stayed under the pointer while another curve was drawn, or none."""
+    """The reading stayed when the curve was replaced or removed."""
     curve = plot.curve(curve_style(0), "mass")
     curve.setData([0.0, 1.0], [0.0, 0.004])
     assert "mass: 4 mm/s" in read_at_one(plot)
@@ -189,7 +189,7 @@ def test_readings_belong_to_the_current_curve(plot):
 
 
 def test_readings_and_copies_use_the_current_unit_of_the_axis(plot):
-    """A plot that was taken for another channel read, and copied, in the unit of the first one."""
+    """A plot reused for another channel kept the unit of the first channel."""
     plot.curve(curve_style(0), "base").setData([0.0, 1.0], [0.0, 2.0])
     plot.up.show_unit(PlotAxis("Acceleration", "m/s²"))
     assert "base: 2 m/s²" in read_at_one(plot)

@@ -1,4 +1,4 @@
-"""A signal is drawn with every impact in it, at any zoom."""
+"""Signals are drawn with every impact at any zoom."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Stripes and lines across a plot are seen however thin, and however many there are."""
+"""Vertical stripes and lines are visible, also if they are thin and many."""
 
 import pytest
 
@@ -22,7 +22,7 @@ def plot(qapp):
 
 
 def red_columns(plot, qapp):
-    """Columns of the picture that are red half way up, as values of the axis."""
+    """Axis values of the columns that are red at half height."""
     qapp.processEvents()
     picture = plot.grab().toImage()
     box = plot.mapFromScene(plot.getViewBox().sceneBoundingRect()).boundingRect()

@@ -1,4 +1,4 @@
-"""Names and messages of files and instruments take no effect as markup or control characters."""
+"""Markup and control characters in names and messages have no effect."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ SHOWN = r"<img src='x'><h1>a\x1b[2J\u202eb\x9d</h1>"
 
 
 def read(tip):
-    """What a tooltip shows."""
+    """Return the text that a tooltip shows."""
     document = QTextDocument()
     if Text.mightBeRichText(tip):
         document.setHtml(tip)

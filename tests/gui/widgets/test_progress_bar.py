@@ -1,4 +1,4 @@
-"""What a bar says is never cut in the middle of a letter."""
+"""The text of a progress bar is elided, not cut."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every table is copied from, by its key and by its context menu."""
+"""Every table can be copied by key and by context menu."""
 
 import pytest
 from PySide6.QtCore import Qt

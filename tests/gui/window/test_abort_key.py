@@ -1,4 +1,4 @@
-"""Esc and Pause are heard once, wherever the focus is."""
+"""Esc and Pause abort once from any focus."""
 
 import pytest
 from PySide6.QtCore import Qt
@@ -8,7 +8,7 @@ from vibench.gui.window.menus import AbortKey
 
 
 @pytest.fixture
-def heard(qapp):
+def abort_signals(qapp):
     presses = []
     owner = QWidget()
     key = AbortKey(qapp, owner)
@@ -18,17 +18,17 @@ def heard(qapp):
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Pause])
-def test_the_abort_key_works_in_a_field(qtbot, heard, key):
+def test_the_abort_key_works_in_a_field(qtbot, abort_signals, key):
     window = QWidget()
     field = QLineEdit(window)
     qtbot.addWidget(window)
     window.show()
     field.setFocus()
     qtbot.keyClick(field, key)
-    assert heard == ["abort"]
+    assert abort_signals == ["abort"]
 
 
-def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, heard):
+def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, abort_signals):
     window = QWidget()
     qtbot.addWidget(window)
     window.show()
@@ -39,29 +39,29 @@ def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, heard):
     dialog.open()
     assert QApplication.activeModalWidget() is dialog
     qtbot.keyClick(field, Qt.Key.Key_Escape)
-    assert heard == ["abort"]
+    assert abort_signals == ["abort"]
     assert not dialog.isVisible()
 
 
-def test_the_abort_key_works_in_an_open_menu(qtbot, heard):
+def test_the_abort_key_works_in_an_open_menu(qtbot, abort_signals):
     menu = QMenu()
     menu.addAction("one")
     qtbot.addWidget(menu)
     menu.popup(menu.pos())
     qtbot.keyClick(menu, Qt.Key.Key_Escape)
-    assert heard == ["abort"]
+    assert abort_signals == ["abort"]
 
 
-def test_other_keys_do_not_abort(qtbot, heard):
+def test_other_keys_do_not_abort(qtbot, abort_signals):
     field = QLineEdit()
     qtbot.addWidget(field)
     qtbot.keyClicks(field, "stop 123")
-    assert heard == []
+    assert abort_signals == []
 
 
-def test_repeated_presses_all_count(qtbot, heard):
+def test_repeated_presses_all_count(qtbot, abort_signals):
     field = QLineEdit()
     qtbot.addWidget(field)
     for _ in range(3):
         qtbot.keyClick(field, Qt.Key.Key_Escape)
-    assert len(heard) == 3
+    assert len(abort_signals) == 3

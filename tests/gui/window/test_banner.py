@@ -1,4 +1,4 @@
-"""The banner says the state by symbol and word, and STOP is part of it."""
+"""The banner shows the state by symbol and word and contains STOP."""
 
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton

@@ -1,4 +1,4 @@
-"""The loop's own watch sees what holds the window up."""
+"""The event loop monitor detects blocking work."""
 
 from time import thread_time
 

@@ -1,4 +1,4 @@
-"""What the window saves on a full disk: one sentence, and every file is as it was."""
+"""Saving on a full disk gives one sentence and leaves every file unchanged."""
 
 from contextlib import contextmanager
 
@@ -90,7 +90,7 @@ def test_settings_on_a_full_disk_are_reported_and_the_old_ones_kept(qapp, own):
 
 
 def test_the_bench_check_works_without_a_recording_folder(window, own, monkeypatch):
-    """A folder that cannot be made raised in the window, before the engine could report it."""
+    """An impossible folder raised an error in the window before the engine could report it."""
     orders = []
     (own / "file").touch()
     window.context.choose_folder(own / "file" / "recordings")

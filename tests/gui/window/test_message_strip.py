@@ -1,4 +1,4 @@
-"""A message says what happened, what was done and what to do, and stays until it is read."""
+"""A message shows event, reaction and advice, and stays until it is dismissed."""
 
 import pytest
 from PySide6.QtCore import QPoint
@@ -63,7 +63,7 @@ def test_a_message_disappears_after_success_and_remains_in_details(qtbot):
 
 @pytest.mark.thorough
 def test_messages_do_not_move_clickable_widgets(window, qapp):
-    """A page that moved down put "Check bench" where "Find instruments" had been."""
+    """The page moved down and put "Check bench" in the place of "Find instruments"."""
 
     def places():
         qapp.processEvents()

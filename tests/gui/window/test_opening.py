@@ -1,4 +1,4 @@
-"""Files that are dropped or opened come up on the page that takes them; edits are taken back; help."""
+"""Opening and dropping files, undoing edits, settings and help."""
 
 from pathlib import Path
 
@@ -159,8 +159,8 @@ def test_control_characters_in_a_bench_name_have_no_effect(tmp_path, capsys):
     assert r"a\x1b[2J\u202e.toml: name = 1" in capsys.readouterr().err
 
 
-def test_the_start_message_names_the_window(qapp):
-    """The program's file stood there."""
+def test_the_window_of_the_start_message_is_titled_vibench(qapp):
+    """The title was the name of the program file."""
     label = _sign_of_life()
     assert label.windowTitle() == "vibench"
     label.close()

@@ -1,4 +1,4 @@
-"""The frame: pages by key, themes, settings that are kept, and nothing armed after a start."""
+"""The window frame: page keys, themes, kept settings, and nothing armed after a start."""
 
 import pytest
 from PySide6.QtCore import Qt

@@ -1,4 +1,4 @@
-"""The Compare page lays real recordings and predictions over one another, and writes what it shows."""
+"""The Compare page overlays recordings and predictions and exports them."""
 
 import re
 
@@ -34,7 +34,7 @@ def page(context, qtbot):
 
 @pytest.fixture(scope="module")
 def working(shared_context):
-    """A page whose processes serve the tests that need them."""
+    """One page with worker processes, shared by tests."""
     page = ComparePage(shared_context)
     page.resize(1300, 800)
     page.show()
@@ -43,7 +43,7 @@ def working(shared_context):
 
 
 @pytest.fixture
-def laid(page):
+def overlaid(page):
     page.add_prediction((mode("one"),))
     page.add_prediction((mode("half", 0.5, 100.0, 500.0),))
     return page
@@ -55,15 +55,15 @@ def texts(table):
     ]
 
 
-def test_curves_are_drawn_as_they_are(laid):
-    lines = [each.getOriginalDataset() for each in laid.plots.magnitudes.getPlotItem().listDataItems()]
+def test_curves_are_drawn_as_they_are(overlaid):
+    lines = [each.getOriginalDataset() for each in overlaid.plots.magnitudes.getPlotItem().listDataItems()]
     assert any(np.array_equal(y, mode("one").magnitude) for _, y in lines)
     assert any(np.array_equal(y, mode("half", 0.5, 100.0, 500.0).magnitude) for _, y in lines)
-    assert laid.is_done
+    assert overlaid.is_done
 
 
-def test_the_table_lists_peaks_with_damping(laid):
-    first, second = texts(laid.peaks)
+def test_the_table_lists_peaks_with_damping(overlaid):
+    first, second = texts(overlaid.peaks)
     assert first[0] == "one, Response I, predicted"
     assert float(first[1]) == pytest.approx(266.0, abs=0.2)
     assert float(first[2]) == pytest.approx(50.0, rel=0.01)
@@ -71,38 +71,38 @@ def test_the_table_lists_peaks_with_damping(laid):
     assert float(second[2]) == pytest.approx(25.0, rel=0.01)
 
 
-def test_the_second_curve_is_compared_with_the_first(laid):
-    curve, reference = laid.pair_box.pair()
+def test_the_second_curve_is_compared_with_the_first(overlaid):
+    curve, reference = overlaid.pair_box.pair()
     assert (curve.source, reference.source) == ("half", "one")
-    assert laid.pair_box.summary.startswith("Median 6 dB")
-    (line,) = laid.plots.differences.getPlotItem().listDataItems()
+    assert overlaid.pair_box.summary.startswith("Median 6 dB")
+    (line,) = overlaid.plots.differences.getPlotItem().listDataItems()
     frequency_hz, decibel = line.getOriginalDataset()
     assert np.median(decibel) == pytest.approx(-6.02, abs=0.02)
     assert frequency_hz[0] >= 100.0
 
 
-def test_unticked_curves_are_neither_drawn_nor_listed(laid):
-    laid.curves.tick("half, Response I, predicted", Qt.CheckState.Unchecked)
-    assert len(texts(laid.peaks)) == 1
-    assert len(laid.curves.curves) == 2
+def test_unticked_curves_are_neither_drawn_nor_listed(overlaid):
+    overlaid.curves.tick("half, Response I, predicted", Qt.CheckState.Unchecked)
+    assert len(texts(overlaid.peaks)) == 1
+    assert len(overlaid.curves.curves) == 2
 
 
-def test_markers_read_every_curve(laid):
-    laid._markers.setChecked(True)
-    laid.plots.put_marker(0, 150.0)
-    laid.plots.put_marker(1, 300.0)
-    assert laid.plots.markers_hz == (150.0, 300.0)
-    first, second = texts(laid.readings)
+def test_markers_read_every_curve(overlaid):
+    overlaid._markers.setChecked(True)
+    overlaid.plots.put_marker(0, 150.0)
+    overlaid.plots.put_marker(1, 300.0)
+    assert overlaid.plots.markers_hz == (150.0, 300.0)
+    first, second = texts(overlaid.readings)
     assert float(first[1]) == pytest.approx(2 * float(second[1]), rel=1e-3)
     expected = mode("one").at(np.array([150.0, 300.0])).magnitude
     assert float(first[3]) == pytest.approx(20 * np.log10(expected[1] / expected[0]), abs=0.01)
 
 
-def test_removed_curves_are_no_longer_drawn_or_listed(laid):
-    laid.curves.setCurrentRow(0)
-    laid._remove()
-    assert [each.source for each in laid.curves.curves] == ["half"]
-    assert laid.pair_box.pair() is None
+def test_removed_curves_are_no_longer_drawn_or_listed(overlaid):
+    overlaid.curves.setCurrentRow(0)
+    overlaid._remove()
+    assert [each.source for each in overlaid.curves.curves] == ["half"]
+    assert overlaid.pair_box.pair() is None
 
 
 def test_invalid_options_are_refused_with_an_explanation(page):
@@ -115,22 +115,22 @@ def test_invalid_options_are_refused_with_an_explanation(page):
     assert page.panel.options().request.noise_ratio == 2.0
 
 
-def test_curves_follow_the_theme(laid):
-    laid.retheme(DARK)
-    assert laid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
+def test_curves_follow_the_theme(overlaid):
+    overlaid.retheme(DARK)
+    assert overlaid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
 
 
 @pytest.mark.thorough
 def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
-    working, record_noise, tmp_path, waited
+    working, record_noise, tmp_path, wait_for
 ):
-    """The road of the page: two recordings, their curves, a picture with a known point, a report."""
+    """The whole use of the page: two recordings, curves, a picture with a known point, a report."""
     paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))
     notices = []
     working.context.noticed.connect(notices.append)
     working.context.comparison_requested.emit(paths)
     assert working.is_busy
-    waited(lambda: not working.is_busy, 90.0)
+    wait_for(lambda: not working.is_busy, 90.0)
     assert notices == []
     by_name = {each.name: each for each in working.curves.curves}
     for name, factor in (("twice", 2.0), ("thrice", 3.0)):
@@ -140,7 +140,7 @@ def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
     working.add_prediction((mode("model"),))
     for ending in ("svg", "csv", "html"):
         working.export_to(tmp_path / f"out.{ending}")
-    waited(lambda: len(notices) == 3, 60.0)
+    wait_for(lambda: len(notices) == 3, 60.0)
     assert {each.what for each in notices} == {
         f"Written: {tmp_path / f'out.{e}'}" for e in ("svg", "csv", "html")
     }
@@ -150,14 +150,14 @@ def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
 
 
 @pytest.mark.thorough
-def test_failed_analyses_and_exports_are_reported_and_keep_the_other_curves(working, tmp_path, waited):
+def test_failed_analyses_and_exports_are_reported_and_keep_the_other_curves(working, tmp_path, wait_for):
     notices = []
     working.context.noticed.connect(notices.append)
     working.add_prediction((mode("model"),))
     known = len(working.curves.curves)
     working.add_recordings((tmp_path / "missing.h5",))
     working.export_to(tmp_path / "out.docx")
-    waited(lambda: len(notices) == 2, 60.0)
+    wait_for(lambda: len(notices) == 2, 60.0)
     said = " ".join(each.what for each in notices)
     assert "missing.h5 does not exist" in said
     assert ".png, .svg" in said

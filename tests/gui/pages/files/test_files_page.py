@@ -33,7 +33,7 @@ IMPACT_S = 40_002 / 6400.0
 
 
 def _begin_campaign(folder):
-    """A journal of three points: one is done, one has failed, one waits."""
+    """Write a journal of three points: done, failed and waiting."""
     rig = load_toml(shipped("hardware_configs/virtual_rig.toml"), Rig)
     played = Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1)
     plans = tuple(Measurement(name=name, excitation=played) for name in ("whole", "stopped", "later"))
@@ -63,35 +63,35 @@ def folder(tmp_path_factory, record):
 
 
 @pytest.fixture(scope="module")
-def shown(shared_context, folder, waited):
-    """One page for all tests: its processes take seconds to begin."""
+def shared_page(shared_context, folder, wait_for):
+    """One page for all tests: starting its processes takes seconds."""
     shared_context.choose_folder(folder)
     page = FilesPage(shared_context)
     page.resize(1200, 800)
     page.show()
     page.enter()
-    waited(lambda: len(page.table.recordings.entries) == 4 and not shared_context.background.is_busy)
+    wait_for(lambda: len(page.table.recordings.entries) == 4 and not shared_context.background.is_busy)
     yield page
     page.time_histories.show_recording(None)
     page.close()
 
 
 @pytest.fixture
-def page(shown, folder, waited):
-    if (shown.context.folder, shown._folder) != (folder, folder):
-        shown.context.choose_folder(folder)
-    waited(lambda: not shown.context.background.is_busy)
-    shown.table.search("")
-    return shown
+def page(shared_page, folder, wait_for):
+    if (shared_page.context.folder, shared_page._folder) != (folder, folder):
+        shared_page.context.choose_folder(folder)
+    wait_for(lambda: not shared_page.context.background.is_busy)
+    shared_page.table.search("")
+    return shared_page
 
 
 @pytest.fixture
-def opened(page, folder, waited):
+def opened(page, folder, wait_for):
     """Open a recording by its row, and wait for its lanes."""
 
     def open_row(name):
         page.table.choose(folder / name)
-        waited(lambda: bool(page.time_histories.plots) and page._opened.path == folder / name)
+        wait_for(lambda: bool(page.time_histories.plots) and page._opened.path == folder / name)
         return page
 
     return open_row
@@ -126,28 +126,28 @@ def test_a_recording_without_its_seal_gets_a_warning(opened):
     assert page._facts.sentence.startswith("✖ seal gone: its seal is gone")
 
 
-def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_path, waited):
-    """A quick look at the seal reads no samples of a large file."""
+def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_path, wait_for):
+    """The quick check of a seal reads no samples of a large file."""
     path = tmp_path / "changed.h5"
     shutil.copyfile(folder / "whole.h5", path)
     with h5py.File(path, "r+") as file:
         file["m0_velocity"][...] = file["m0_velocity"][...] // 2
     page.open_path(path)
-    waited(lambda: "as it was sealed, samples not checked" in page._facts.sentence)
-    waited(lambda: page._facts.sentence.startswith("✖ damaged: not as it was sealed: data of /m0_velocity"))
+    wait_for(lambda: "as it was sealed, samples not checked" in page._facts.sentence)
+    wait_for(lambda: page._facts.sentence.startswith("✖ damaged: not as it was sealed: data of /m0_velocity"))
     page.open_path(folder / "whole.h5")
-    waited(lambda: "  ·  as it was sealed  ·  " in page._facts.sentence)
+    wait_for(lambda: "  ·  as it was sealed  ·  " in page._facts.sentence)
 
 
-def test_control_characters_in_names_have_no_effect(page, folder, waited, tmp_path):
+def test_control_characters_in_names_have_no_effect(page, folder, wait_for, tmp_path):
     shutil.copyfile(folder / "whole.h5", tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
     page._go_to(tmp_path)
-    waited(lambda: len(page.table.recordings.entries) == 1 and not page.context.background.is_busy)
+    wait_for(lambda: len(page.table.recordings.entries) == 1 and not page.context.background.is_busy)
     index = page.table.recordings.index(0, HEADINGS.index("Name"))
     assert index.data() == r"a\x1b[2J\u202eb\n<b>c"
     assert r"a\x1b[2J\u202eb\n&lt;b&gt;c.h5" in index.data(Qt.ItemDataRole.ToolTipRole)
     page.table.choose(tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
-    waited(lambda: page._title.text() == r"a\x1b[2J\u202eb\n<b>c.h5")
+    wait_for(lambda: page._title.text() == r"a\x1b[2J\u202eb\n<b>c.h5")
     page._go_to(folder)
 
 
@@ -250,31 +250,31 @@ def test_a_recording_from_another_folder_can_be_opened(page, record, tmp_path, q
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
-def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(opened, waited):
+def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(opened, wait_for):
     page = opened("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
     for spacing in range(view.spacing.count()):
         view.spacing.setCurrentIndex(spacing)
-        waited(lambda: not view.is_busy and view.image.item.image is not None)
-        shown = view.image.item
-        box = shown.mapRectToParent(shown.boundingRect())
-        loudest = int(np.argmax(np.median(shown.image, axis=1)))
-        place = box.top() + (loudest + 0.5) / shown.image.shape[0] * box.height()
+        wait_for(lambda: not view.is_busy and view.image.item.image is not None)
+        item = view.image.item
+        box = item.mapRectToParent(item.boundingRect())
+        loudest = int(np.argmax(np.median(item.image, axis=1)))
+        place = box.top() + (loudest + 0.5) / item.image.shape[0] * box.height()
         assert (10**place if spacing else place) == pytest.approx(260.0, abs=25)  # lines are 25 Hz apart
-        struck = int(np.argmax(np.sum(shown.image, axis=0)))
-        at_s = box.left() + (struck + 0.5) / shown.image.shape[1] * box.width()
+        struck = int(np.argmax(np.sum(item.image, axis=0)))
+        at_s = box.left() + (struck + 0.5) / item.image.shape[1] * box.width()
         assert at_s == pytest.approx(IMPACT_S, abs=0.1)
     assert "dB re 1 (m/s)²/Hz" in view.image.bar.axis.labelText
     assert view.plot.isEnabled()
     view.channel.setCurrentIndex(0)
     assert not view.plot.isEnabled(), "a picture of another channel"
-    waited(lambda: not view.is_busy)
+    wait_for(lambda: not view.is_busy)
     assert view.plot.isEnabled()
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_opening_by_path_reads_the_recording_once(opened, folder, waited, monkeypatch):
+def test_opening_by_path_reads_the_recording_once(opened, folder, wait_for, monkeypatch):
     page, read = opened("stopped.h5"), []
 
     def counted(path):
@@ -283,20 +283,20 @@ def test_opening_by_path_reads_the_recording_once(opened, folder, waited, monkey
 
     monkeypatch.setattr(_files_page, "open_recording", counted)
     page.open_path(folder / "whole.h5")
-    waited(lambda: page._opened.path == folder / "whole.h5" and len(page.time_histories.plots) == 3)
+    wait_for(lambda: page._opened.path == folder / "whole.h5" and len(page.time_histories.plots) == 3)
     assert read == [folder / "whole.h5"]
 
 
-def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp_path, waited):
+def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp_path, wait_for):
     writer, part = begin_recording(tmp_path, "growing")
     page.context.choose_folder(tmp_path)
     page.list_folder()
-    waited(lambda: [entry.path for entry in page.table.recordings.entries] == [part])
+    wait_for(lambda: [entry.path for entry in page.table.recordings.entries] == [part])
     said = []
     page.context.noticed.connect(said.append)
     final = writer.finish(RecordingState.COMPLETE, "the plan was carried out")
     page.open_path(part)
-    waited(lambda: len(page.time_histories.plots) == 3 and page.table.chosen_paths() == (final,))
+    wait_for(lambda: len(page.time_histories.plots) == 3 and page.table.chosen_paths() == (final,))
     assert page._opened.path == final
     assert set(read_levels(part)) == set(page._opened.roles)
     assert thumbnail(part) is not None
@@ -316,28 +316,28 @@ def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
     assert page.time_histories.plots[0].backgroundBrush().color().name() == DARK.base
 
 
-def test_a_late_file_list_keeps_the_current_selection(page, shared_context, waited):
+def test_a_late_file_list_keeps_the_current_selection(page, shared_context, wait_for):
     page.table.selectAll()
     chosen = page.table.chosen_paths()
     assert len(chosen) > 1
     page.list_folder()
-    waited(lambda: not shared_context.background.is_busy)
+    wait_for(lambda: not shared_context.background.is_busy)
     assert page.table.chosen_paths() == chosen
 
 
-def test_browsing_a_folder_does_not_change_where_recordings_are_saved(page, folder, tmp_path, waited):
-    shown = page.table.recordings
-    assert shown.entries
+def test_browsing_a_folder_does_not_change_where_recordings_are_saved(page, folder, tmp_path, wait_for):
+    listed = page.table.recordings
+    assert listed.entries
     page._folder_line.setText(str(tmp_path))
     page._typed_folder()
-    # The list of before does not stand under the name of another folder.
-    assert not shown.entries
-    waited(lambda: page._count.text() == "0 recordings")
+    # The old list is not shown under the name of the new folder.
+    assert not listed.entries
+    wait_for(lambda: page._count.text() == "0 recordings")
     assert page.context.folder == folder
     assert page._goes_to.text() == f"new recordings go to {folder}"
     page._folder_line.setText(str(folder))
     page._typed_folder()
-    waited(lambda: len(shown.entries) >= 4)
+    wait_for(lambda: len(listed.entries) >= 4)
     assert page._goes_to.text() == ""
 
 
@@ -348,20 +348,20 @@ def test_an_impossible_folder_name_is_refused(page, typed):
     assert page._folder_line.text() == str(page._folder)
 
 
-def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, waited, qtbot):
+def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, wait_for, qtbot):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
     page = FilesPage(shared_context)
     qtbot.addWidget(page)
     page.list_folder()
     assert page.table.is_listing
-    waited(lambda: len(page.table.recordings.entries) == 2)
+    wait_for(lambda: len(page.table.recordings.entries) == 2)
     assert not page.table.is_listing
     gone.unlink()
     page._looked_s = 0.0
     page.refresh()
-    waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
-    waited(lambda: not shared_context.background.is_busy)
+    wait_for(lambda: [each.path for each in page.table.recordings.entries] == [kept])
+    wait_for(lambda: not shared_context.background.is_busy)
 
 
 def test_a_forged_note_is_not_shown(record, tmp_path):
@@ -383,10 +383,10 @@ def test_the_summary_shows_the_state_once(begin_recording, tmp_path):
         assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_its_data_size_not_the_reserved_size(begin_recording, tmp_path, waited):
-    """512 MB were shown a second after a long run had begun."""
+def test_a_growing_file_shows_its_data_size_not_the_reserved_size(begin_recording, tmp_path, wait_for):
+    """A long run was shown as 512 MB one second after its start."""
     writer, part = begin_recording(tmp_path, "grows")
-    waited(lambda: writer.committed_samples == 6400)
+    wait_for(lambda: writer.committed_samples == 6400)
     (entry,) = read_listing(tmp_path).recordings
     assert entry.catalogue_entry.size_bytes == 3 * 6400 * 4 < part.stat().st_size
     writer.finish(RecordingState.COMPLETE, "the plan was carried out")
@@ -412,11 +412,11 @@ def test_no_hint_asks_for_a_recording_when_one_is_selected(
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, waited, qtbot):
+def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, wait_for, qtbot):
     page = opened("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
-    waited(lambda: not view.is_busy and view.image.item.image is not None)
+    wait_for(lambda: not view.is_busy and view.image.item.image is not None)
     view.plot.reading.show_at(QPointF(5.0, np.log10(260.0)))
     assert re.search(r"-?\d+\.\d dB re 1 \(m/s\)²/Hz", view.plot.reading.text)
     before = page.time_histories.view_s
@@ -425,29 +425,29 @@ def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, 
     box.sigRangeChangedManually.emit(box.state["mouseEnabled"])
     after = page.time_histories.view_s
     assert after[1] - after[0] == pytest.approx(0.5 * (before[1] - before[0]), rel=0.01)
-    waited(lambda: not view.is_busy)
+    wait_for(lambda: not view.is_busy)
     assert view.image.item.mapRectToParent(view.image.item.boundingRect()).width() < 6
     page.time_histories.show_all()
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_recordings_can_be_exported_and_annotated(page, folder, tmp_path, waited, monkeypatch):
+def test_recordings_can_be_exported_and_annotated(page, folder, tmp_path, wait_for, monkeypatch):
     path = tmp_path / "mine.h5"
     shutil.copyfile(folder / "whole.h5", path)
     notices = []
     page.context.noticed.connect(notices.append)
     page.open_path(path)
-    waited(lambda: page.table.chosen_paths() == (path,))
+    wait_for(lambda: page.table.chosen_paths() == (path,))
     for ending in ("uff", "mat", "csv"):
         given = str(tmp_path / f"out.{ending}")
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, given=given, **__: (given, ""))
         page._export.click()
-        waited((tmp_path / f"out.{ending}").exists)
-    waited(lambda: len(notices) == 3)
+        wait_for((tmp_path / f"out.{ending}").exists)
+    wait_for(lambda: len(notices) == 3)
     assert all(each.what.startswith("Written: ") for each in notices)
     for text in ("glue was still wet", "repeat it tomorrow"):
         monkeypatch.setattr(QInputDialog, "getMultiLineText", lambda *_, text=text: (text, True))
         page._note.click()
-        waited(lambda text=text: f"note: {text}" in page._facts.sentence)
+        wait_for(lambda text=text: f"note: {text}" in page._facts.sentence)
     assert "glue was still wet" in page._facts.sentence
     page._go_to(folder)

@@ -1,4 +1,4 @@
-"""The hidden motion on the Files page: p between its stops in what is in sight, or a sentence."""
+"""Hidden motion on the Files page: p and its stops in the visible range, or an explanation."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def shaken(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shaken, waited):
+def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shaken, wait_for):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
     pictures.setCurrentWidget(pictures.hidden_motion)
@@ -26,10 +26,10 @@ def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shake
     with open_recording(shaken.path) as recording:
         levels = {role: kept_levels(recording, role) for role in recording.roles}
         pictures.show_recording(RecordingOverview(recording, levels), "")
-        waited(lambda: not view.is_busy)
+        wait_for(lambda: not view.is_busy)
         assert "Zoom in" in view.plot._hint
         pictures.time_histories.show_range(1.0, 1.4)
-        waited(lambda: "tracked in 100 %" in view.caption.text())
+        wait_for(lambda: "tracked in 100 %" in view.caption.text())
         time_s, p = view.tracked.getData()
         true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
         assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
@@ -39,8 +39,10 @@ def test_p_is_drawn_between_its_stops_in_the_visible_range(shared_context, shake
 
 
 @pytest.mark.thorough
-def test_choosing_another_specimen_identifies_its_gaps(shared_context, shaken, waited, tmp_path, monkeypatch):
-    """A file whose gaps are 1 um too small: as described the track is lost, and collisions tell the gaps."""
+def test_choosing_another_specimen_identifies_its_gaps(
+    shared_context, shaken, wait_for, tmp_path, monkeypatch
+):
+    """With gaps 1 um too small the track is lost; collisions then identify the gaps."""
     described = tmp_path / "tight.toml"
     described.write_text('name = "tight"\nabout = "1 um less"\nmodel = "gong2025"\ngap_m = 44e-6\n')
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(described), ""))
@@ -53,14 +55,16 @@ def test_choosing_another_specimen_identifies_its_gaps(shared_context, shaken, w
         levels = {role: kept_levels(recording, role) for role in recording.roles}
         pictures.show_recording(RecordingOverview(recording, levels), "")
         pictures.time_histories.show_range(0.6, 2.2)
-        waited(lambda: "tracked in 100 %" in view.caption.text())
+        wait_for(lambda: "tracked in 100 %" in view.caption.text())
         last = view.specimen.count() - 1
         view.specimen.setCurrentIndex(last)
         view.specimen.activated.emit(last)
         assert view.specimen.currentText() == "tight.toml"
-        waited(lambda: "elsewhere" in view.caption.text())
+        wait_for(lambda: "elsewhere" in view.caption.text())
         view.find_numbers.click()
-        waited(lambda: "upper gap (45.0" in view.caption.text() or "upper gap (44.99" in view.caption.text())
+        wait_for(
+            lambda: "upper gap (45.0" in view.caption.text() or "upper gap (44.99" in view.caption.text()
+        )
         assert "tracked in 100 %" in view.caption.text()
         pictures.show_recording(None, "")
     pictures.close()

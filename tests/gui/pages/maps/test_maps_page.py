@@ -1,4 +1,4 @@
-"""The Maps page: a map that grows, a part of it computed finer, and the motion at a point."""
+"""The Maps page: a growing map, refinement of a part, and the motion at a point."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SMALL = {
 
 @pytest.fixture(scope="module")
 def page(shared_context):
-    """One page, whose process serves all tests."""
+    """One page with its worker process, shared by all tests."""
     page = MapsPage(shared_context)
     page.resize(1300, 900)
     page.show()
@@ -33,15 +33,15 @@ def page(shared_context):
     page.close()
 
 
-def mapped(page, waited, **changes):
+def compute_map(page, wait_for, **changes):
     page.form.show_value(MapRequest(**{**SMALL, **changes}))
     page.begin()
-    waited(lambda: not page.simulator.is_busy, 100.0)
+    wait_for(lambda: not page.simulator.is_busy, 100.0)
     page.refresh()
 
 
-def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
-    mapped(page, waited)
+def test_a_map_is_drawn_and_every_point_has_a_kind(page, wait_for):
+    compute_map(page, wait_for)
     assert page.is_done
     assert page.picture.classes.shape == (5, 7)
     assert 0 <= page.picture.classes.min() <= page.picture.classes.max() < len(MOTION_CLASSES)
@@ -53,12 +53,12 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
     assert not np.array_equal(page.map.image.image, before)
 
 
-def test_the_visible_part_can_be_refined(page, waited):
-    mapped(page, waited)
+def test_the_visible_part_can_be_refined(page, wait_for):
+    compute_map(page, wait_for)
     page.map.plot.setXRange(110.0, 120.0, padding=0.0)
     page.map.plot.setYRange(-5.2, -5.0, padding=0.0)
     page.begin_in_sight()
-    waited(lambda: not page.simulator.is_busy, 100.0)
+    wait_for(lambda: not page.simulator.is_busy, 100.0)
     asked = page.form.value
     assert (asked.start_hz, asked.stop_hz) == pytest.approx((110.0, 120.0), rel=1e-3)
     assert (asked.lowest_m, asked.highest_m) == pytest.approx((10**-5.2, 1e-5), rel=1e-3)
@@ -67,8 +67,8 @@ def test_the_visible_part_can_be_refined(page, waited):
 
 
 @pytest.mark.thorough
-def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, waited):
-    mapped(page, waited)
+def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, wait_for):
+    compute_map(page, wait_for)
     wanted, pages = [], []
     page.context.scene_requested.connect(lambda *point: wanted.append(point))
     page.context.page_requested.connect(pages.append)
@@ -78,7 +78,7 @@ def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, waited
         page.map.plot.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(round(place.x()), round(place.y()))
     )
     assert page.motion.caption.text() == "Following the motion…"
-    waited(lambda: "from rest" in page.motion.caption.text(), 100.0)
+    wait_for(lambda: "from rest" in page.motion.caption.text(), 100.0)
     assert page.motion.caption.text().startswith("120")
     assert all(len(curve.getOriginalDataset()[0]) > 10 for curve in page.motion.curves)
     page._open.click()
@@ -104,10 +104,10 @@ def test_the_page_follows_the_dark_theme(page):
     assert page.map.plot.backgroundBrush().color().name() == DARK.base
 
 
-def test_map_and_motion_of_another_specimen_are_greyed_out(page, waited):
-    mapped(page, waited)
+def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
+    compute_map(page, wait_for)
     page.pick(120.0, 1e-5)
-    waited(lambda: page._motion_of is not None and page.motion.isEnabled(), 100.0)
+    wait_for(lambda: page._motion_of is not None and page.motion.isEnabled(), 100.0)
     assert page.map.isEnabled()
     before = page.form.form.content()
     page.form.form.show_content({**before, "gap_m": 60e-6})
@@ -123,7 +123,7 @@ def test_map_and_motion_of_another_specimen_are_greyed_out(page, waited):
 
 
 def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot):
-    """With a recorded level they ran from 10 to 10^6 um."""
+    """With a recorded level the axis ran from 10 to 10^6 um."""
     page = MapsPage(context)
     qtbot.addWidget(page)
     page.resize(900, 700)

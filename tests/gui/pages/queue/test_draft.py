@@ -1,4 +1,4 @@
-"""A campaign is put together entry by entry, and stays whole at every step."""
+"""A campaign is edited entry by entry and is valid after every step."""
 
 import pytest
 

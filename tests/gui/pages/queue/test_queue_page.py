@@ -1,4 +1,4 @@
-"""Edits of the Queue page act on the campaign that its rows are of."""
+"""Edits of the Queue page change the displayed campaign."""
 
 import pytest
 
@@ -13,11 +13,11 @@ def page(shared_context, qtbot):
     return made
 
 
-def test_rows_of_an_earlier_campaign_cannot_be_removed(page, waited):
-    """Remove, twice in a row: the second one took what stood elsewhere by then, or nothing that there was."""
+def test_rows_of_an_earlier_campaign_cannot_be_removed(page, wait_for):
+    """The second of two quick removals removed a wrong entry or raised an error."""
     page.open_file(shipped("campaigns/quick.toml"))
     first = load_campaign(shipped("campaigns/quick.toml"))
-    waited(lambda: page.entries.rowCount() > 1)
+    wait_for(lambda: page.entries.rowCount() > 1)
     last = page.entries.rowCount() - 1
     page.entries.selectRow(last)
     page._remove()
@@ -26,7 +26,7 @@ def test_rows_of_an_earlier_campaign_cannot_be_removed(page, waited):
     page._remove()
     page._move_up()
     assert page.context.selection.campaign == shorter
-    waited(page.entries.isEnabled)
+    wait_for(page.entries.isEnabled)
     assert page.entries.rowCount() == last
     page._remove()
     assert page.context.selection.campaign != shorter

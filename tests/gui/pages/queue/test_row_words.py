@@ -1,4 +1,4 @@
-"""Rows of a campaign say what is held where something is held."""
+"""Rows of a campaign show held levels and states."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ def test_rows_show_the_base_level_and_the_kind_of_sweep():
 
 
 def test_rows_show_levels_and_existing_recordings(tmp_path):
-    """After the window was opened again everything was said to be planned."""
+    """After a restart of the window all rows were shown as planned."""
     campaign = load_campaign(CAMPAIGNS / "quick.toml")
     seen = replace(preview_campaign((campaign, None, tmp_path)), complete=frozenset({"dwell"}))
     rows = {name: (sign, level, said) for sign, name, level, said in point_rows(seen, (), EngineState.READY)}

@@ -1,4 +1,4 @@
-"""Findings are written with prefixes, where that says no less."""
+"""Findings are written with unit prefixes without loss of digits."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The bench of the command line: one that cannot be used says why, and is not remembered."""
+"""The bench given on the command line: an unusable one is explained and not remembered."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Knobs of a real bench are confirmed one by one, by somebody with a name."""
+"""Knobs of a real bench are confirmed one by one by a named operator."""
 
 from pathlib import Path
 

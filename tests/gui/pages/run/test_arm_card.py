@@ -1,4 +1,4 @@
-"""What will happen is read to its end before it can be started, however small the window is."""
+"""A run can start only after the whole plan was shown, also in a small window."""
 
 import pytest
 from PySide6.QtCore import Qt
@@ -27,7 +27,7 @@ def armed_status(campaign, lines):
 
 @pytest.fixture
 def small(window, qapp, qtbot):
-    """The Run page of a small window with large letters, with something armed that fills more than it."""
+    """The Run page of a small window with a large font; the armed plan does not fit."""
     font = QFont(qapp.font())
     large = QFont(font)
     large.setPointSize(14)

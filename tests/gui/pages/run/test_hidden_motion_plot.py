@@ -1,4 +1,4 @@
-"""The Run page's picture of the hidden motion, from what a live twin tells."""
+"""The Run page's plot of the hidden motion estimated by a live twin."""
 
 from itertools import pairwise
 
@@ -24,7 +24,7 @@ ERROR_M = tuple(np.geomspace(1e-8, 1.05e-5, 60).tolist())
 
 
 def status(**twin):
-    told = TwinStatus(
+    twin = TwinStatus(
         **{
             "state": "tracked",
             "run_id": 1,
@@ -38,7 +38,7 @@ def status(**twin):
         }
         | twin
     )
-    return EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED, twin=told)
+    return EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED, twin=twin)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The lanes of a run say which channel they show, in its unit, also when the channels change."""
+"""Time histories are labelled with channel and unit, also after the channels change."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_only_the_last_lane_has_a_time_axis(time_histories, qapp):
 
 @pytest.mark.parametrize("width", [833, 872, 905])
 def test_the_envelope_of_a_growing_sine_is_drawn_without_gaps(time_histories, qapp, width):
-    """Where two columns fell on one pixel the next one stayed empty: a comb of one pixel at 1280."""
+    """Rounding left every second pixel column empty at a width of 1280."""
     time_s = np.arange(round(2.0 * RATE_HZ)) / RATE_HZ
     phase = 2 * np.pi * (290.0 + 6.75 * time_s) * time_s
     sine = ((0.55 + 0.035 * time_s) * np.sin(phase)).astype(np.float32)
@@ -60,7 +60,7 @@ def test_the_envelope_of_a_growing_sine_is_drawn_without_gaps(time_histories, qa
     (plot,) = time_histories.plots
     picture = plot.grab().toImage()
     box = plot.mapFromScene(plot.getViewBox().sceneBoundingRect()).boundingRect()
-    # Grey is the grid, which lies over the signal.
+    # The grid is grey and drawn over the signal.
     tops = [
         next(y for y in range(box.top(), box.bottom()) if picture.pixelColor(x, y).saturation() > 100)
         for x in range(box.left() + 5, box.right() - 5)

@@ -1,4 +1,4 @@
-"""The tabs Branches and Exponents of the Simulate page ask, draw, say error and cost, lay over recordings."""
+"""The tabs Branches, Exponents and Chain of the Simulate page compute, draw and overlay."""
 
 import re
 
@@ -24,7 +24,7 @@ from vibench.sim import Parameter
 
 @pytest.fixture(scope="module")
 def page(shared_context):
-    """One page, whose processes serve all tests."""
+    """One page with worker processes, shared by all tests."""
     page = SimulatePage(shared_context)
     page.resize(1300, 800)
     page.show()
@@ -49,17 +49,17 @@ def line(multipliers=(0.5, 0.9, 1.5, 2.0)):
     )  # fmt: skip
 
 
-def asked(view, request):
+def start_request(view, request):
     view.form.show_value(request)
     view.begin()
 
 
 @pytest.mark.thorough
-def test_branches_are_drawn_with_error_and_cost(page, waited):
+def test_branches_are_drawn_with_error_and_cost(page, wait_for):
     view = page.branches
-    asked(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
+    start_request(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
     assert view.simulator.is_busy
-    waited(lambda: not view.simulator.is_busy, 100.0)
+    wait_for(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
     assert view.summary.startswith("Complete. 1 branches")
     assert "of the fundamental of p" in view.summary
@@ -72,7 +72,7 @@ def test_branches_are_drawn_with_error_and_cost(page, waited):
 def test_stable_branches_are_solid_and_unstable_ones_dashed(page, along):
     view = page.branches
     start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
-    asked(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
+    start_request(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
     view.cancel()
     view._grow((line(),))
     page.refresh()
@@ -86,20 +86,20 @@ def test_stable_branches_are_solid_and_unstable_ones_dashed(page, along):
 def test_branches_can_be_overlaid_on_recordings(page):
     view = page.branches
     view.form.show_value(BranchRequest(start=100.0, stop=110.0))
-    asked(view, BranchRequest(start=100.0, stop=110.0, places=2, starts=0))
+    start_request(view, BranchRequest(start=100.0, stop=110.0, places=2, starts=0))
     view.cancel()
     view._grow((line(),))
-    laid, wanted = [], []
-    page.context.prediction_made.connect(laid.append)
+    predictions, wanted = [], []
+    page.context.prediction_made.connect(predictions.append)
     page.context.page_requested.connect(wanted.append)
     view._hand_to_compare()
-    assert {each.origin for each in laid[0]} == {CurveOrigin.STABLE, CurveOrigin.UNSTABLE}
+    assert {each.origin for each in predictions[0]} == {CurveOrigin.STABLE, CurveOrigin.UNSTABLE}
     assert wanted == [COMPARE]
 
 
 def test_exponents_are_drawn_with_their_intervals(page):
     view = page.spectrum
-    asked(view, SpectrumRequest(start=250.0, stop=260.0, step=10.0))
+    start_request(view, SpectrumRequest(start=250.0, stop=260.0, step=10.0))
     view.cancel()
     six = (100.0, 40.0, 0.0, -80.0, -130.0, -190.0)
     low, high = tuple(x - 5.0 for x in six), tuple(x + 5.0 for x in six)
@@ -122,10 +122,10 @@ def test_exponents_are_drawn_with_their_intervals(page):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waited):
+def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, wait_for):
     view = page.chain
-    asked(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
-    waited(lambda: not view.simulator.is_busy, 280.0)
+    start_request(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
+    wait_for(lambda: not view.simulator.is_busy, 280.0)
     page.refresh()
     assert view.summary.startswith("Complete. Band gaps of the infinite chain: 96.07 to 110.4 Hz")
     assert "1 runs in" in view.summary
@@ -142,17 +142,17 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
 
 
 @pytest.mark.thorough
-def test_wave_dispersion_needs_no_run_and_forbidden_drives_are_reported(page, waited, tmp_path):
+def test_waves_need_no_run_and_missing_recordings_are_reported(page, wait_for, tmp_path):
     view = page.chain
-    asked(view, ChainRequest(lengths=(2, 5), drive="none"))
-    waited(lambda: not view.simulator.is_busy, 100.0)
+    start_request(view, ChainRequest(lengths=(2, 5), drive="none"))
+    wait_for(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
     assert len(lines(view.picture.across)) == 2
     assert not lines(view.picture.motion)
     said = []
     page.context.noticed.connect(said.append)
-    asked(view, ChainRequest(drive="recorded", recording=str(tmp_path / "nowhere.h5")))
-    waited(lambda: not view.simulator.is_busy, 100.0)
+    start_request(view, ChainRequest(drive="recorded", recording=str(tmp_path / "nowhere.h5")))
+    wait_for(lambda: not view.simulator.is_busy, 100.0)
     assert "nowhere.h5" in said[-1].what
     assert view.simulator.background.workers[0].process.is_alive()
 
@@ -173,7 +173,7 @@ def test_tabs_follow_the_dark_theme(page):
 
 @pytest.mark.parametrize("name", ["branches", "spectrum", "chain"])
 def test_a_running_search_is_shown_as_running_without_a_result(page, name):
-    """Branches said: no periodic motion was found; 0.0 s."""
+    """Branches showed "no periodic motion was found; 0.0 s" during the search."""
     view = getattr(page, name)
     view.begin()
     assert view.summary.strip().startswith("Computing")
@@ -183,7 +183,7 @@ def test_a_running_search_is_shown_as_running_without_a_result(page, name):
 
 @pytest.mark.parametrize("place", range(4))
 def test_start_buttons_are_visible_at_every_window_size(page, qapp, place):
-    """Simulate lay below the fold at 1280 x 800, Find half below the edge of the Chain tab."""
+    """At 1280 x 800 Simulate was hidden and Find was half hidden on the Chain tab."""
     for width, height in ((1040, 560), (1100, 640), (1300, 800)):
         page.resize(width, height)
         page.tabs.setCurrentIndex(place)

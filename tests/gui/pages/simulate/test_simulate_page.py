@@ -1,4 +1,4 @@
-"""The Simulate page asks another process, draws what comes, and stops at once."""
+"""The Simulate page computes in another process, draws results as they arrive, and stops at once."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz":
 
 @pytest.fixture(scope="module")
 def page(shared_context):
-    """One page, whose process serves all tests."""
+    """One page with its worker process, shared by all tests."""
     page = SimulatePage(shared_context)
     page.resize(1300, 800)
     page.show()
@@ -25,7 +25,7 @@ def page(shared_context):
     page.close()
 
 
-def asked(page, **changes):
+def simulate(page, **changes):
     page.form.show_value(SimulationRequest(**{**LINEAR, **changes}))
     page.begin()
 
@@ -38,10 +38,10 @@ def point(model, frequency_hz, response=2.0, impacts=0, exponent=None):
     return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, "periodic", exponent, 1e-6)
 
 
-def test_a_simulation_completes_and_is_drawn(page, waited):
-    asked(page)
+def test_a_simulation_completes_and_is_drawn(page, wait_for):
+    simulate(page)
     assert page.simulator.is_busy
-    waited(lambda: not page.simulator.is_busy, 60.0)
+    wait_for(lambda: not page.simulator.is_busy, 60.0)
     for _ in page.plots.plots:
         page.refresh()
     assert page.progress.done == page.progress.asked == 56
@@ -53,30 +53,30 @@ def test_a_simulation_completes_and_is_drawn(page, waited):
     assert page.is_done
 
 
-def test_cancelling_is_immediate_and_keeps_partial_results(page, waited):
-    asked(page, step_hz=0.05)
-    waited(lambda: page.progress.done > 0, 60.0)
+def test_cancelling_is_immediate_and_keeps_partial_results(page, wait_for):
+    simulate(page, step_hz=0.05)
+    wait_for(lambda: page.progress.done > 0, 60.0)
     page.cancel()
     assert not page.simulator.is_busy
     found = page.progress.done
     assert 0 < found < page.progress.asked
     assert page._state.text().startswith("Cancelled")
-    asked(page, step_hz=100.0)
-    waited(lambda: not page.simulator.is_busy, 60.0)
+    simulate(page, step_hz=100.0)
+    wait_for(lambda: not page.simulator.is_busy, 60.0)
     assert page.progress.done == page.progress.asked == 6
 
 
-def test_a_dead_process_is_reported_and_replaced(page, waited):
+def test_a_dead_process_is_reported_and_replaced(page, wait_for):
     said = []
     page.context.noticed.connect(said.append)
-    asked(page, step_hz=0.05)
-    waited(lambda: page.progress.done > 0, 60.0)
+    simulate(page, step_hz=0.05)
+    wait_for(lambda: page.progress.done > 0, 60.0)
     page.simulator.background.workers[0].process.kill()
-    waited(lambda: bool(said), 30.0)
+    wait_for(lambda: bool(said), 30.0)
     assert "has ended" in said[0].what
     assert not page.simulator.is_busy
-    asked(page, step_hz=100.0)
-    waited(lambda: not page.simulator.is_busy, 60.0)
+    simulate(page, step_hz=100.0)
+    wait_for(lambda: not page.simulator.is_busy, 60.0)
     assert page.progress.done == 6
 
 
@@ -100,7 +100,7 @@ def test_cost_and_error_are_shown_beside_the_accuracy(page):
 
 
 def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
-    asked(page, step_hz=100.0)
+    simulate(page, step_hz=100.0)
     page.cancel()
     page._grow(
         (point("a", 100.0, exponent=-3.0), point("a", 200.0, 4.0, 7, 90.0), point("b", 100.0, exponent=-3.5))
@@ -119,7 +119,7 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_computed(page):
 
 
 def test_coexisting_motions_are_dots_and_table_rows_with_their_shares(page):
-    asked(page, step_hz=100.0)
+    simulate(page, step_hz=100.0)
     page.cancel()
     motions = tuple(
         FoundMotion(kind, period, response, response, 1.0, 1.0, 1e-6, starts, Share(starts / 16, low, high))

@@ -1,4 +1,4 @@
-"""The Test page says how well a test will tell what it is made for, under what the specimen will do."""
+"""The Test page shows the predicted motion and the expected uncertainty of a test."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def test_a_branch_beyond_the_fast_loop_is_refused_with_the_reason(page):
 
 
 def test_every_exceeded_limit_is_among_the_reasons(page):
-    """49 of 45 N were missing beside an exceeded stroke."""
+    """The reason "49 of 45 N" was missing when the stroke was exceeded too."""
     seen = preview.preview_test(
         preview.TestPreview(
             Measurement(

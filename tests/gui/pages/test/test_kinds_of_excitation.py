@@ -1,4 +1,4 @@
-"""The list of excitations is grouped and explained; each kind begins with a name and allowed values."""
+"""The list of excitations is grouped and explained; each kind starts with a name and valid values."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def form(qapp, qtbot):
 
 
 def choose(form, word):
-    """Choose a kind as a person does."""
+    """Choose a kind as a user does."""
     box = form.form.editors["excitation"].kind_choice
     place = box.findData(word)
     box.setCurrentIndex(place)
@@ -72,7 +72,7 @@ def test_each_kind_remembers_its_own_duration(form):
     assert form.value.name == "dwell"
 
 
-def test_a_copied_test_keeps_its_name(form):
+def test_showing_a_named_test_keeps_its_name(form):
     named = next(each for each in shipped_tests() if each.measurement.excitation.kind == "sine_sweep")
     form.show_value(named.measurement)
     assert form.value == named.measurement
