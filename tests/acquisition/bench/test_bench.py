@@ -79,7 +79,7 @@ def output_of(virtual):
 
 
 class TestOpening:
-    def test_a_virtual_bench_needs_nothing_but_its_configuration(self, rig):
+    def test_a_virtual_bench_needs_only_its_configuration(self, rig):
         with open_bench(rig) as bench:
             assert bench.kind is BenchKind.SIMULATED
             assert bench.identities["generator"].model == "AFG1022"
@@ -92,7 +92,7 @@ class TestOpening:
         with open_bench(CONFIGS / "virtual_rig.toml") as bench:
             assert bench.digitizer.sample_rate_hz == 51200
 
-    def test_what_the_generator_plays_is_what_the_converter_reads(self, rig):
+    def test_the_converter_reads_the_output_of_the_generator(self, rig):
         with open_bench(rig) as bench:
             bench.generator.load_sine(160.0, 1.0)
             bench.generator.start()
@@ -101,7 +101,7 @@ class TestOpening:
             drive_v = bench.digitizer.read(5120).volts[0] * bench.channels[0].units_per_volt
         assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
 
-    def test_the_drivers_keep_the_promises_of_the_bench(self, rig):
+    def test_the_drivers_keep_the_contract_of_the_bench(self, rig):
         with open_bench(rig) as bench:
             generator: FunctionGenerator = bench.generator
             digitizer: Digitizer = bench.digitizer
@@ -133,7 +133,7 @@ class TestOpening:
         with laboratory_bench(laboratory), pytest.raises(InstrumentBusy):
             open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
 
-    def test_a_load_that_only_the_operator_knows_is_requested(self, rig):
+    def test_the_operator_must_confirm_a_load_that_cannot_be_read(self, rig):
         asked = []
 
         def confirm(knobs):
@@ -148,7 +148,7 @@ class TestOpening:
 
 
 class TestLeaving:
-    def test_leaving_silences_and_frees_everything(self, laboratory, virtual):
+    def test_leaving_silences_and_releases_every_instrument(self, laboratory, virtual):
         for _ in range(2):
             with laboratory_bench(laboratory):
                 assert output_of(virtual) == b"1\n"
@@ -160,18 +160,18 @@ class TestLeaving:
         bench.close()
 
     @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
-    def test_whatever_error_is_under_way_silences_and_continues(self, laboratory, virtual, error):
+    def test_every_error_inside_a_bench_silences_it_and_propagates(self, laboratory, virtual, error):
         with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
             raise error
         assert caught.value is error
         assert output_of(virtual) == b"0\n"
 
-    def test_an_overrun_silences(self, laboratory, virtual):
+    def test_an_overrun_silences_the_generator(self, laboratory, virtual):
         with pytest.raises(DataLost, match=r"has a hole and ends here"):
             read_after(laboratory, virtual.faults.overrun)
         assert output_of(virtual) == b"0\n"
 
-    def test_a_dead_daq_server_silences_and_its_failure_to_close_is_a_note(self, laboratory, virtual):
+    def test_a_dead_daq_server_silences_the_bench_and_notes_the_failed_close(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
             read_after(laboratory, virtual.faults.lose_daq_server)
         assert str(caught.value).startswith("reading samples 0 to 511")
@@ -183,11 +183,11 @@ class TestLeaving:
             read_after(laboratory, virtual.faults.overrun, virtual.faults.pull_usb_cable)
         assert any("MAY STILL BE ON" in note for note in caught.value.__notes__)
 
-    def test_a_pulled_cable_alone_is_shouted(self, laboratory, virtual):
+    def test_a_pulled_cable_at_closing_raises_an_error(self, laboratory, virtual):
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"), laboratory_bench(laboratory):
             virtual.faults.pull_usb_cable()
 
-    def test_the_converter_is_released_although_the_generator_is_gone(self, laboratory, virtual):
+    def test_the_converter_is_released_after_the_generator_was_lost(self, laboratory, virtual):
         with pytest.raises(InstrumentLost), laboratory_bench(laboratory):
             virtual.faults.pull_usb_cable()
         virtual.faults.heal()
@@ -197,38 +197,38 @@ class TestLeaving:
 
 
 class TestCalibration:
-    def test_a_calibration_that_has_run_out_keeps_the_bench_closed(self, laboratory):
+    def test_an_expired_calibration_keeps_the_bench_closed(self, laboratory):
         with pytest.raises(
             CheckFailed, match=r"Polytec PSV-500 DV-04 was calibrated on 2001-01-01.*730 days"
         ):
             open_bench(aged(laboratory, "2001-01-01"), confirm_simulated)
 
-    def test_it_may_be_waived(self, laboratory):
+    def test_an_expired_calibration_can_be_waived(self, laboratory):
         open_bench(aged(laboratory, "2001-01-01"), confirm_simulated, CalibrationRule.WAIVED).close()
 
     def test_a_virtual_rig_needs_no_calibration(self, rig):
         open_bench(aged(rig, "2001-01-01")).close()
 
     @pytest.mark.parametrize(("age_days", "is_valid"), [(-1, False), (0, True), (730, True), (731, False)])
-    def test_it_holds_from_its_day_for_as_long_as_the_rig_states(self, rig, age_days, is_valid):
+    def test_a_calibration_is_valid_for_the_time_stated_by_the_rig(self, rig, age_days, is_valid):
         today = rig.vibrometer.calibrated + timedelta(days=age_days)
         assert calibrations(rig, today)[0].is_valid is is_valid
 
-    def test_every_sensor_and_every_input_is_looked_at(self, rig):
+    def test_every_sensor_and_input_is_checked(self, rig):
         today = rig.vibrometer.calibrated + timedelta(days=10_000)
         with pytest.raises(CheckFailed) as caught:
             check_calibrations(rig, today)
         for what in ("PSV-500", "IEPE", *(channel.physical for channel in rig.daq.channels)):
             assert what in str(caught.value)
 
-    def test_the_sensor_in_front_of_an_input_is_looked_at_and_not_another(self, rig):
+    def test_only_the_sensor_of_each_input_is_checked(self, rig):
         left = tuple(each for each in rig.daq.channels if each.role.value != "base_acceleration")
         bare = rig.model_copy(update={"daq": rig.daq.model_copy(update={"channels": left})})
         named = [each.what for each in calibrations(bare, rig.vibrometer.calibrated)]
         assert not any("IEPE" in each for each in named)
         assert any("PSV-500" in each for each in named)
 
-    def test_a_recording_that_is_played_back_has_no_sensor_whose_calibration_could_run_out(self, laboratory):
+    def test_playback_needs_no_valid_calibration(self, laboratory):
         old = aged(laboratory, "2001-01-01")
         played = old.model_copy(update={"daq": old.daq.model_copy(update={"driver": "file"})})
         with pytest.raises(ConfigurationError, match="none is named"):
@@ -243,13 +243,13 @@ class TestKnobs:
         assert "2706: is the gain at 10 dB?" in asked[0]
         assert (sheet.operator, sheet.knobs) == ("B. Kjaer", rig.knobs)
 
-    def test_a_sheet_survives_its_file_and_confirms(self, rig, tmp_path):
+    def test_a_saved_knob_sheet_confirms_the_knobs(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         sheet = confirm_by_asking(lambda _: "yes", 'O. "Quote" \\ Back\nslash')(rig.knobs)
         save_knob_sheet(sheet, path)
         assert confirm_by_sheet(path)(rig.knobs) == sheet
 
-    def test_a_sheet_about_another_setting_does_not_confirm(self, rig, tmp_path):
+    def test_a_knob_sheet_with_other_settings_is_refused(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         save_knob_sheet(confirm_simulated(rig.knobs), path)
         turned = rig.model_copy(update={"amplifier": rig.amplifier.model_copy(update={"gain_db": 20.0})})
@@ -257,7 +257,7 @@ class TestKnobs:
             confirm_by_sheet(path)(turned.knobs)
 
     @pytest.mark.parametrize("age", [timedelta(hours=-1), timedelta(hours=37)])
-    def test_a_sheet_from_another_day_does_not_confirm(self, rig, tmp_path, age):
+    def test_a_knob_sheet_of_another_day_is_refused(self, rig, tmp_path, age):
         path = tmp_path / "knobs.toml"
         old = confirm_simulated(rig.knobs).model_copy(update={"confirmed": datetime.now(UTC) - age})
         save_knob_sheet(old, path)
@@ -279,7 +279,7 @@ class TestConfigurationFiles:
         with pytest.raises(ConfigurationError, match=r"nowhere\.toml"):
             open_bench(tmp_path / "nowhere.toml")
 
-    def test_the_laboratory_bench_states_which_instrument_it_misses(self):
+    def test_the_laboratory_bench_names_the_missing_instrument(self):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver"):
             open_bench(CONFIGS / "lab_rig.toml", confirm_simulated, CalibrationRule.WAIVED)
 

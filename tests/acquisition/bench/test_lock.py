@@ -65,7 +65,7 @@ def test_a_bench_that_another_user_drives_is_refused(user):
 
 @posix
 @pytest.mark.parametrize(("first", "second"), [(None, NOBODY), (NOBODY, None), (NOBODY, NOBODY - 1)])
-def test_anyone_who_comes_second_is_refused_and_the_next_day_comes_first(user, first, second):
+def test_a_second_program_is_refused_until_the_first_ends(user, first, second):
     if os.geteuid() != 0:
         pytest.skip("only root can be another user")
     for one, other in ((first, second), (second, first)):
@@ -118,9 +118,7 @@ def a_folder(path, aim):
 @posix
 @pytest.mark.timeout(10)
 @pytest.mark.parametrize("trap", [a_link, a_second_name, a_pipe, a_folder])
-def test_anything_that_lies_in_a_locks_place_is_refused_and_nothing_is_written_through_it(
-    shared, tmp_path, trap
-):
+def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path, trap):
     BenchLock.of(RIG).close()
     aim = tmp_path / "precious"
     aim.write_text("kept")
@@ -132,7 +130,7 @@ def test_anything_that_lies_in_a_locks_place_is_refused_and_nothing_is_written_t
     assert aim.read_text() == "kept"
 
 
-def test_anything_that_is_written_into_a_lock_is_not_shown_unless_it_is_a_process(shared, monkeypatch):
+def test_only_a_process_number_in_a_lock_is_shown(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():
@@ -142,6 +140,6 @@ def test_anything_that_is_written_into_a_lock_is_not_shown_unless_it_is_a_proces
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="systemd's")
-def test_who_tidies_up_a_shared_folder_leaves_a_lock_alone(shared):
+def test_cleaning_a_shared_folder_keeps_locks(shared):
     with closing(BenchLock.of(RIG)):
         assert all(path.stat().st_mode & 0o1777 == 0o1666 for path in shared.iterdir())

@@ -46,7 +46,7 @@ def reads(monkeypatch):
     return opened
 
 
-def test_it_states_what_when_and_how_large_also_of_folders_in_the_folder(folder):
+def test_the_catalogue_lists_plan_time_and_size_including_subfolders(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")
@@ -64,7 +64,7 @@ def test_a_tracked_resonance_is_listed_with_the_range_of_its_search():
     assert _band(plan.model_dump()) == (240, 290)
 
 
-def test_only_what_is_new_or_changed_is_read_again(folder, reads):
+def test_only_new_and_changed_files_are_read_again(folder, reads):
     before = list_recordings(folder)
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
     reads.clear()
@@ -76,7 +76,7 @@ def test_only_what_is_new_or_changed_is_read_again(folder, reads):
     assert sorted(reads) == ["moved.h5", "sweep.h5"]
 
 
-def test_it_can_be_made_again_from_the_files(folder, reads):
+def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     before = list_recordings(folder)
     (folder / CATALOGUE_NAME).unlink()
     assert list_recordings(folder) == before
@@ -85,7 +85,7 @@ def test_it_can_be_made_again_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
-def test_anything_that_needs_attention_is_the_verdict(bench, folder):
+def test_the_verdict_shows_what_needs_attention(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 
@@ -104,7 +104,7 @@ def test_anything_that_needs_attention_is_the_verdict(bench, folder):
     assert entry.reason == "seen enough"
 
 
-def test_a_recording_that_runs_is_listed_and_one_whose_program_died_is_interrupted(bench, folder):
+def test_running_recordings_are_listed_and_abandoned_ones_are_interrupted(bench, folder):
     with Run(bench, DWELL, folder / "now.h5") as run:
         next(iter(run))
         running = next(entry for entry in list_recordings(folder) if entry.path == "now.h5.part")
@@ -112,14 +112,14 @@ def test_a_recording_that_runs_is_listed_and_one_whose_program_died_is_interrupt
     assert "now.h5.part" not in [entry.path for entry in list_recordings(folder)]
 
 
-def test_a_file_that_is_no_recording_is_listed_with_what_is_wrong(folder):
+def test_a_file_that_is_no_recording_is_listed_with_its_fault(folder):
     (folder / "junk.h5").write_bytes(b"no HDF5")
     entry = next(entry for entry in list_recordings(folder) if entry.path == "junk.h5")
     assert entry.state == "unreadable"
     assert "junk.h5" in entry.reason
 
 
-def test_a_file_of_the_catalogue_s_name_that_is_none_is_left_alone_until_it_is_to_be_rebuilt(folder):
+def test_a_foreign_file_named_like_the_catalogue_is_kept_until_a_rebuild(folder):
     (folder / CATALOGUE_NAME).write_text("my notes " * 200)
     with pytest.raises(RecordingError, match="is not a catalogue"):
         list_recordings(folder)
@@ -127,12 +127,12 @@ def test_a_file_of_the_catalogue_s_name_that_is_none_is_left_alone_until_it_is_t
     assert len(list_recordings(folder, Refresh.ALL)) == 2
 
 
-def test_a_folder_that_may_not_be_written_is_listed_all_the_same(folder, monkeypatch):
+def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
     # A directory in the place of the database: what SQLite says of a folder that is read-only.
     (folder / CATALOGUE_NAME).mkdir()
     assert len(list_recordings(folder)) == 2
 
 
-def test_a_folder_that_does_not_exist_is_one_sentence(tmp_path):
+def test_a_missing_folder_gives_one_sentence(tmp_path):
     with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
         list_recordings(tmp_path / "nowhere")

@@ -60,7 +60,7 @@ def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_te
     assert "resting for 12 s before two" in told
 
 
-def test_a_rest_is_reported_in_the_plan_and_in_the_estimate(rig, tmp_path):
+def test_rests_are_part_of_plan_and_estimate(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three"), campaign("one", "two", "three", rest_s=0)
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
@@ -71,7 +71,7 @@ def test_a_rest_is_reported_in_the_plan_and_in_the_estimate(rig, tmp_path):
     )
 
 
-def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
+def test_a_stop_ends_a_rest(bench, tmp_path):
     switch = StopSwitch()
     idle = bench.idle
 
@@ -87,7 +87,7 @@ def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
     assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
 
 
-def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
+def test_a_hold_extends_a_rest_until_it_is_released(bench, tmp_path):
     switch = StopSwitch()
     idle = bench.idle
 
@@ -138,7 +138,7 @@ def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
     assert bench.idled_s == pytest.approx(LOOK_EVERY_S + REST_S)
 
 
-def test_a_rest_that_is_none_is_refused():
+def test_an_invalid_rest_is_refused():
     longest = timedelta(days=1).total_seconds()
     for given in (-1.0, longest + 1):
         with pytest.raises(ConfigurationError, match="rest_s"):

@@ -97,7 +97,7 @@ def outcomes(point_results):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_point_is_named_kept_and_made_again_beside_it(bench, folder, damage):
+def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, damage):
     damage(folder)
     left = (folder / "two.h5").read_bytes() if (folder / "two.h5").is_file() else None
     said = []
@@ -117,7 +117,7 @@ def test_a_damaged_point_is_named_kept_and_made_again_beside_it(bench, folder, d
 
 
 @pytest.mark.parametrize("damage", [truncated, with_another_sample, replaced_by_a_folder])
-def test_without_its_journal_a_campaign_does_not_count_on_a_damaged_recording_either(bench, folder, damage):
+def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, folder, damage):
     damage(folder)
     (folder / "c.campaign.sqlite").unlink()
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
@@ -126,7 +126,7 @@ def test_without_its_journal_a_campaign_does_not_count_on_a_damaged_recording_ei
 
 
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_stop_ends_the_look_through_the_folder_and_the_next_resume_looks_again(bench, folder, has_journal):
+def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, folder, has_journal):
     """A resumed campaign read every sample of hundreds of recordings before it saw that it was stopped."""
     with_another_sample(folder)
     journal = folder / "c.campaign.sqlite"
@@ -142,7 +142,7 @@ def test_a_stop_ends_the_look_through_the_folder_and_the_next_resume_looks_again
 
 
 @pytest.mark.parametrize("damage", [truncated, with_another_scale, exchanged, replaced_by_a_folder])
-def test_what_a_resume_would_make_is_known_before_it_plays(folder, damage):
+def test_a_resume_lists_its_points_before_it_plays(folder, damage):
     damage(folder)
     planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert [each.is_complete for each in planned] == [True, False, True]
@@ -157,7 +157,7 @@ def test_verifying_finds_every_damage(folder, damage):
     assert [each.path for each in bad] == ["two.h5"]
 
 
-def test_verifying_misses_a_recording_that_a_journal_counts_on(folder):
+def test_verifying_reports_a_missing_recording_of_the_journal(folder):
     (folder / "two.h5").unlink()
     assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
         ("two.h5", "missing")
@@ -173,7 +173,7 @@ def test_the_catalogue_does_not_call_a_damaged_recording_good(folder, damage):
     assert bad.verdict.startswith(("damaged", "cannot be read"))
 
 
-def test_a_change_that_hides_its_time_is_seen_by_the_catalogue(folder):
+def test_the_catalogue_detects_a_change_with_restored_file_time(folder):
     list_recordings(folder)
     path = folder / "two.h5"
     before = path.stat()
@@ -196,7 +196,7 @@ def test_the_journal_keeps_every_seal(folder):
     assert len({seal for (seal,) in seals}) == 3
 
 
-def test_a_journal_from_before_seals_is_gone_on_with(bench, folder):
+def test_a_journal_of_a_version_without_seals_can_be_resumed(bench, folder):
     connection = sqlite3.connect(folder / "c.campaign.sqlite")
     for table in ("points", "attempts"):
         connection.execute(f"ALTER TABLE {table} DROP COLUMN seal")
@@ -215,7 +215,7 @@ def test_a_journal_from_before_seals_is_gone_on_with(bench, folder):
     assert (one.seal, len(three.seal)) == ("", 64)
 
 
-def test_recordings_from_before_seals_are_kept_and_reported_as_such(bench, folder):
+def test_recordings_of_a_version_without_seals_are_kept_and_reported(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
@@ -227,7 +227,7 @@ def test_recordings_from_before_seals_are_kept_and_reported_as_such(bench, folde
     assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}
 
 
-def test_recordings_whose_seal_was_taken_away_are_made_again(bench, folder):
+def test_recordings_with_removed_seals_are_recorded_again(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
@@ -237,7 +237,7 @@ def test_recordings_whose_seal_was_taken_away_are_made_again(bench, folder):
     assert {each.outcome for each in made} == {PointOutcome.RECORDED}
 
 
-def test_another_recording_under_its_name_is_found_by_anyone_who_checks_a_seal(folder):
+def test_every_seal_check_detects_a_swapped_recording(folder):
     shutil.copy(folder / "one.h5", folder / "two.h5")
     with open_recording(folder / "two.h5") as recording:
         for depth in SealDepth:
@@ -312,7 +312,7 @@ def test_a_point_measured_again_under_a_deleted_name_is_intact_and_the_former_re
         said_by("ALTER TABLE points RENAME COLUMN file TO fine"),
     ],
 )
-def test_a_journal_that_states_what_cannot_be_is_refused_in_a_sentence(bench, folder, damage):
+def test_an_inconsistent_journal_is_refused_in_a_sentence(bench, folder, damage):
     damage(folder)
     older = sorted((folder / "older").iterdir())
     with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite cannot be understood"):
@@ -322,7 +322,7 @@ def test_a_journal_that_states_what_cannot_be_is_refused_in_a_sentence(bench, fo
 
 @pytest.mark.timeout(30)
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes as POSIX has them")
-def test_a_journal_that_is_a_pipe_is_not_waited_for(folder):
+def test_a_pipe_in_place_of_a_journal_does_not_block(folder):
     (folder / "c.campaign.sqlite").unlink()
     os.mkfifo(folder / "c.campaign.sqlite")
     with pytest.raises(RecordingError, match="is no file"):
@@ -335,7 +335,7 @@ def test_verifying_names_a_journal_that_cannot_be_read(folder):
     assert [(each.path, each.verdict) for each in bad] == [("c.campaign.sqlite", "unreadable")]
 
 
-def test_verifying_misses_recordings_of_a_folder_that_has_none_left(folder):
+def test_verifying_an_emptied_folder_reports_missing_recordings(folder):
     for path in (folder / "older").glob("*.h5"):
         path.unlink()
     bad = {each.path: each.verdict for each in verify_recordings(folder) if each.is_bad}
@@ -343,7 +343,7 @@ def test_verifying_misses_recordings_of_a_folder_that_has_none_left(folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
-def test_a_name_that_is_no_text_and_a_link_to_itself_spoil_no_list(folder):
+def test_undecodable_names_and_circular_links_do_not_break_a_listing(folder):
     shutil.copy(folder / "two.h5", os.fsdecode(os.fsencode(folder) + b"/\xff.h5"))
     (folder / "circle.h5").symlink_to("circle.h5")
     listed = {each.path: each.is_bad for each in list_recordings(folder) if "/" not in each.path}
@@ -356,14 +356,14 @@ def test_a_name_that_is_no_text_and_a_link_to_itself_spoil_no_list(folder):
 RENAMED = CAMPAIGN.model_copy(update={"name": "d"})
 
 
-def test_a_campaign_that_got_another_name_counts_on_nothing_that_its_former_journal_disowns(bench, folder):
+def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(bench, folder):
     exchanged_for_an_older_one(folder)
     made = run_campaign(bench, RENAMED, folder, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
 
 
-def test_without_a_journal_recordings_of_another_bench_are_not_taken_for_its_own(new_bench, rig, folder):
+def test_a_campaign_without_journal_ignores_recordings_of_another_bench(new_bench, rig, folder):
     other = new_bench(rig.model_copy(update={"name": "another bench"}))
     with pytest.raises(CheckFailed, match=r"name was .* and is 'another bench'"):
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
@@ -387,7 +387,7 @@ def refused_by_the_disk(bench, folder, stop):
 
 
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_what_the_disk_refused_once_is_recovered_beside_the_attempt_made_since(bench, tmp_path, has_journal):
+def test_a_recording_with_a_failed_ending_is_recovered_beside_its_repetition(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
@@ -404,7 +404,7 @@ def test_what_the_disk_refused_once_is_recovered_beside_the_attempt_made_since(b
 
 
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_complete_point_whose_end_the_disk_refuses_is_not_recorded_twice(bench, tmp_path, has_journal):
+def test_a_complete_point_with_a_failed_ending_is_not_recorded_twice(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()
@@ -416,7 +416,7 @@ def test_a_complete_point_whose_end_the_disk_refuses_is_not_recorded_twice(bench
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_complete_recording_counts_whatever_the_journal_states_of_its_attempt(bench, tmp_path):
+def test_a_complete_recording_counts_even_if_the_journal_disagrees(bench, tmp_path):
     """The journal could not be written after the recovery; or the user recovered it, as the error says."""
     refused_by_the_disk(bench, tmp_path, None)
     (tmp_path / "two.h5.tmp").rmdir()
@@ -430,7 +430,7 @@ def test_a_complete_recording_counts_whatever_the_journal_states_of_its_attempt(
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_recording_that_was_away_and_is_back_is_not_made_again(bench, folder):
+def test_a_restored_recording_is_not_repeated(bench, folder):
     (folder / "two.h5").rename(folder / "two.away")
     with pytest.raises(RecordingError, match="gone"):
         run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=leave)

@@ -29,7 +29,7 @@ CAMPAIGN = validated(
 )
 
 
-def test_the_bytes_match_the_samples_and_the_largest_is_the_last(rig, tmp_path):
+def test_estimated_bytes_match_the_samples(rig, tmp_path):
     expected = estimate_campaign(CAMPAIGN, rig, tmp_path)
     bytes_per_s = 5120 * 4 * 4
     assert expected.largest_bytes == pytest.approx((0.6 + 0.4 + 0.5 + 0.3) * bytes_per_s)
@@ -37,7 +37,7 @@ def test_the_bytes_match_the_samples_and_the_largest_is_the_last(rig, tmp_path):
     assert expected.fits
 
 
-def test_anything_that_is_there_already_is_not_counted(bench, rig, tmp_path):
+def test_existing_recordings_are_not_counted(bench, rig, tmp_path):
     point_results = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):
         estimate_campaign(CAMPAIGN, rig, tmp_path)

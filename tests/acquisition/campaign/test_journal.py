@@ -30,7 +30,7 @@ def states(points):
     return [(point.name, point.state) for point in points]
 
 
-def test_it_keeps_plan_and_bench(journal, bench):
+def test_the_journal_keeps_plan_and_bench(journal, bench):
     path = journal.path
     journal.close()
     with Journal.open(path) as again:
@@ -60,7 +60,7 @@ def test_attempts_are_counted_and_keep_their_files_and_reasons(journal):
     ]
 
 
-def test_further_points_stand_behind_the_one_that_asked(journal):
+def test_added_points_follow_the_point_that_requested_them(journal):
     journal.follow_up("one", (Point("between-1", dwell("between-1")), Point("between-2", dwell("between-2"))))
     points = journal.points()
     assert [point.name for point in points] == ["one", "between-1", "between-2", "two", "three"]
@@ -69,7 +69,7 @@ def test_further_points_stand_behind_the_one_that_asked(journal):
     assert not points[3].is_followed_up
 
 
-def test_a_further_point_of_a_name_that_exists_is_refused_and_nothing_is_changed(journal):
+def test_an_added_point_with_an_existing_name_is_refused(journal):
     with pytest.raises(RecordingError, match="give every further measurement its own name"):
         journal.follow_up("one", (Point("new", dwell("new")), Point("Three", dwell("Three"))))
     assert [point.name for point in journal.points()] == ["one", "two", "three"]
@@ -99,7 +99,7 @@ def test_a_process_that_dies_in_a_transaction_leaves_the_one_before_it(journal):
     ]
 
 
-def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp_path):
+def test_the_journal_can_be_read_during_writing_without_leftovers(journal, tmp_path):
     journal.start("one", "one.h5")
     assert read_journal(journal.path)[0].state is JournalPointState.RUNNING
     journal.end("one", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "")
@@ -108,13 +108,13 @@ def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp
     assert [path.name for path in tmp_path.iterdir()] == ["c.campaign.sqlite"]
 
 
-def test_a_journal_whose_program_died_before_its_first_commit_is_not_started(tmp_path):
+def test_a_journal_without_commit_counts_as_not_started(tmp_path):
     path = tmp_path / "c.campaign.sqlite"
     path.touch()
     assert not journal_exists(path)
 
 
-def test_anything_that_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
+def test_foreign_files_and_newer_journals_are_refused(journal, tmp_path):
     other = tmp_path / "other.sqlite"
     other.write_text("no database " * 100)
     with pytest.raises(RecordingError, match=r"other\.sqlite"):
@@ -142,7 +142,7 @@ def opened(path):
 @pytest.mark.parametrize(
     "use", [opened, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
 )
-def test_a_file_that_is_refused_is_let_go(connections, tmp_path, use):
+def test_a_refused_file_is_closed(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
     path.write_text("no database " * 100)
     with pytest.raises(RecordingError) as caught:

@@ -56,7 +56,7 @@ def settings(tmp_path, port, security="none"):
     return load_toml(path, MailSettings)
 
 
-def test_no_word_of_a_file_or_an_instrument_breaks_a_message(server, tmp_path):
+def test_control_characters_do_not_break_a_message(server, tmp_path):
     hostile = NOTICE | {"campaign": "c\nBcc: all@lab.example", "folder": "\udcff", "reason": "\x1b[2J\r\n."}
     said = MailMessenger(settings(tmp_path, server.server_address[1])).send(hostile)
     assert said == "mail sent to me@lab.example"
@@ -72,19 +72,19 @@ def test_a_notice_becomes_one_message(server, tmp_path):
     assert "recorded: 3" in server.heard
 
 
-def test_a_server_that_is_not_there_is_stated_and_raises_nothing(server, tmp_path):
+def test_a_missing_mail_server_is_reported_without_an_exception(server, tmp_path):
     with socketserver.TCPServer(("127.0.0.1", 0), None) as closed:
         port = closed.server_address[1]
     assert MailMessenger(settings(tmp_path, port)).send(NOTICE).startswith("mail through 127.0.0.1 failed")
 
 
-def test_a_server_without_encryption_is_not_used_when_it_is_requested(server, tmp_path):
+def test_a_server_without_requested_encryption_is_not_used(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1], "starttls")).send(NOTICE)
     assert said.startswith("mail through 127.0.0.1 failed")
     assert not any(line.startswith("Subject") for line in server.heard)
 
 
-def test_a_password_is_never_shown_and_has_no_place_in_a_campaign(tmp_path):
+def test_passwords_are_never_shown_or_stored_in_a_campaign(tmp_path):
     shown = MailSettings(host="h", sender="a@b", recipients=("c@d",), user="me", password="secret!")
     assert "secret!" not in repr(shown)
     path = tmp_path / "mail.toml"

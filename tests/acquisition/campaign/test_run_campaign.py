@@ -46,7 +46,7 @@ def failing_in(bench, name, fault):
     return watch
 
 
-def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(bench, tmp_path):
+def test_a_file_in_place_of_the_folder_is_refused_before_output(bench, tmp_path):
     taken = tmp_path / "taken"
     taken.write_text("mine")
     with pytest.raises(RecordingError, match=r"taken cannot be made a folder .* Nothing was played"):
@@ -55,7 +55,7 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
     assert not any(name == "start" for name, _, _ in bench.world.calls)
 
 
-def test_points_that_are_played_alike_are_checked_against_the_limits_once(bench, tmp_path, monkeypatch):
+def test_points_with_equal_excitation_are_checked_against_limits_once(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
         _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
@@ -66,7 +66,7 @@ def test_points_that_are_played_alike_are_checked_against_the_limits_once(bench,
     assert [each.name for each in checked] == ["one", "louder"]
 
 
-def test_a_recording_may_be_moved_as_soon_as_it_is_complete(bench, tmp_path, monkeypatch):
+def test_a_complete_recording_can_be_moved_at_once(bench, tmp_path, monkeypatch):
     def measured_and_moved(*arguments, **named):
         outcome = run_measurement(*arguments, **named)
         if outcome.path.name == "two.h5":
@@ -95,7 +95,7 @@ def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(ben
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_not(bench, tmp_path):
+def test_resuming_keeps_complete_points_and_repeats_the_others(bench, tmp_path):
     with pytest.raises(DataLost):
         run_campaign(
             bench, CAMPAIGN, tmp_path, on_progress=failing_in(bench, "two", lambda: DataLost("a hole"))
@@ -122,7 +122,7 @@ def test_resuming_with_another_plan_is_refused(bench, tmp_path):
         run_campaign(bench, changed, tmp_path, ExistingRecordings.RESUME)
 
 
-def test_a_campaign_that_continues_after_failures_passes_a_failed_measurement(bench, tmp_path):
+def test_a_campaign_can_skip_a_failed_measurement(bench, tmp_path):
     point_results = run_campaign(
         bench,
         CAMPAIGN,
@@ -139,9 +139,7 @@ def test_a_campaign_that_continues_after_failures_passes_a_failed_measurement(be
 
 
 @pytest.mark.parametrize("lost", [InstrumentLost("gone"), RecordingError("the disk is full")])
-def test_a_lost_instrument_or_disk_ends_a_campaign_even_when_it_continues_after_failures(
-    bench, tmp_path, lost
-):
+def test_a_lost_instrument_or_disk_always_ends_a_campaign(bench, tmp_path, lost):
     with pytest.raises(type(lost)):
         run_campaign(
             bench,
@@ -153,7 +151,7 @@ def test_a_lost_instrument_or_disk_ends_a_campaign_even_when_it_continues_after_
     assert [path.name for path in tmp_path.glob("*.h5*")] == ["one.h5"]
 
 
-def test_a_campaign_with_one_plan_past_a_limit_does_not_begin(bench, tmp_path):
+def test_a_campaign_with_one_plan_beyond_a_limit_does_not_start(bench, tmp_path):
     campaign = Campaign(
         name="c", measurements=(dwell("one"), dwell("hard", 10, 20.0), dwell("harder", 10, 21.0))
     )
@@ -163,7 +161,7 @@ def test_a_campaign_with_one_plan_past_a_limit_does_not_begin(bench, tmp_path):
     assert bench.world.calls == []
 
 
-def test_ctrl_c_ends_the_measurement_softly_and_the_campaign_with_it(bench, tmp_path):
+def test_ctrl_c_ramps_down_the_measurement_and_ends_the_campaign(bench, tmp_path):
     def press_once(progress):
         if progress.name == "two" and progress.run.state is RunState.SETTLING:
             signal.raise_signal(signal.SIGINT)
@@ -178,7 +176,7 @@ def test_ctrl_c_ends_the_measurement_softly_and_the_campaign_with_it(bench, tmp_
         assert recording.reason.startswith("SIGINT")
 
 
-def test_a_second_ctrl_c_insists_and_further_ones_cannot_disturb_the_silencing(bench, tmp_path):
+def test_a_second_ctrl_c_stops_faster_and_further_ones_have_no_effect(bench, tmp_path):
     def press_on(progress):
         if progress.state is RunState.RECORDING or progress.state is RunState.RAMPING_DOWN:
             signal.raise_signal(signal.SIGINT)

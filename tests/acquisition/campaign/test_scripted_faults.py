@@ -20,7 +20,7 @@ SCRIPT = [
 
 
 @pytest.mark.thorough
-def test_every_point_of_a_rehearsed_campaign_is_recorded_past_cable_overrun_server_and_knob(rig, tmp_path):
+def test_a_campaign_records_every_point_despite_scripted_faults(rig, tmp_path):
     lines = [
         ["[[faults]]", *(f"{key} = {json.dumps(value)}" for key, value in each.items())] for each in SCRIPT
     ]

@@ -58,7 +58,7 @@ def log(folder):
 
 
 class TestRetries:
-    def test_lost_data_is_measured_again_into_another_file(self, bench, tmp_path):
+    def test_a_measurement_with_lost_data_is_repeated_in_a_new_file(self, bench, tmp_path):
         point_results = run_campaign(
             bench,
             campaign("one", "two", attempts=2),
@@ -75,7 +75,7 @@ class TestRetries:
         ]
         assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
 
-    def test_what_the_policy_leaves_out_is_not_tried_again(self, bench, tmp_path):
+    def test_faults_outside_the_retry_policy_are_not_retried(self, bench, tmp_path):
         with pytest.raises(DataLost):
             run_campaign(
                 bench,
@@ -91,7 +91,7 @@ class TestRetries:
             1,
         )
 
-    def test_a_lost_instrument_is_opened_again(self, bench, new_bench, rig, tmp_path):
+    def test_a_lost_instrument_is_reopened(self, bench, new_bench, rig, tmp_path):
         opened = []
 
         def reopen():
@@ -113,7 +113,7 @@ class TestRetries:
         assert any(name == "start" for name, _, _ in opened[0].world.calls)
         assert "bench_reopened" in [line["event"] for line in log(tmp_path)]
 
-    def test_an_instrument_that_does_not_come_back_ends_the_campaign(self, bench, tmp_path):
+    def test_a_permanently_lost_instrument_ends_the_campaign(self, bench, tmp_path):
         def reopen():
             raise InstrumentLost("still gone")
 
@@ -132,7 +132,7 @@ class TestRetries:
             JournalPointState.QUEUED,
         ]
 
-    def test_a_bench_that_comes_back_as_another_one_is_not_used(self, bench, new_bench, rig, tmp_path):
+    def test_a_bench_that_reopens_with_other_instruments_is_not_used(self, bench, new_bench, rig, tmp_path):
         other = new_bench(rig)
         other.identities = {**other.identities, "generator": other_serial(other.identities["generator"])}
         with pytest.raises(CheckFailed, match=r"instruments\.generator\.serial was"):
@@ -162,14 +162,14 @@ class TestAnotherBench:
             )
         return tmp_path
 
-    def test_it_is_refused_with_what_differs(self, begun, new_bench, rig):
+    def test_another_bench_is_refused_with_the_differences(self, begun, new_bench, rig):
         heavier = rig.model_copy(update={"shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.2})})
         bench = new_bench(heavier)
         with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is 0\.2"):
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
-    def test_it_is_used_when_accepted_and_then_counts_as_the_campaign_s(self, begun, new_bench, rig):
+    def test_an_accepted_bench_becomes_the_bench_of_the_campaign(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
         point_results = run_campaign(
@@ -183,7 +183,7 @@ class TestAnotherBench:
 
 
 class TestFurtherMeasurements:
-    def test_they_are_made_next_and_requested_once_also_over_a_resume(self, bench, tmp_path):
+    def test_further_measurements_come_next_and_are_requested_once(self, bench, tmp_path):
         asked = []
 
         def after(finished, recording):
@@ -213,7 +213,7 @@ class TestFurtherMeasurements:
             ("two", ["one", "more", "two"], True),
         ]
 
-    def test_a_result_is_asked_again_when_the_program_ended_before_its_answer_was_kept(self, bench, tmp_path):
+    def test_a_result_is_analysed_again_if_its_answer_was_not_stored(self, bench, tmp_path):
         def broken(finished, recording):
             raise ZeroDivisionError
 
@@ -235,7 +235,7 @@ class TestFurtherMeasurements:
 
 
 class TestResuming:
-    def test_a_recording_that_was_taken_away_is_made_again(self, bench, tmp_path):
+    def test_a_removed_recording_is_recorded_again(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         (tmp_path / "one.h5").unlink()
         point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
@@ -244,7 +244,7 @@ class TestResuming:
             PointOutcome.KEPT,
         ]
 
-    def test_a_lost_journal_is_made_again_from_the_recordings(self, bench, tmp_path):
+    def test_a_lost_journal_is_rebuilt_from_the_recordings(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         journal_path(tmp_path, "c").unlink()
         point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
@@ -293,7 +293,7 @@ class TestWatching:
         last = (tmp_path / "c.status").read_text().splitlines()[-1]
         assert "c is through (2 done, about 0:00:00 left)" in last
 
-    def test_words_of_an_instrument_move_no_cursor_of_who_follows_the_status(self, bench, tmp_path):
+    def test_control_characters_of_instruments_do_not_reach_the_status(self, bench, tmp_path):
         lost = failing_once(bench, lambda: DataLost("it replied \x1b[2J\udcff\nc is through"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
@@ -301,13 +301,13 @@ class TestWatching:
         assert r"it replied \x1b[2J\udcff\nc is through" in text
         assert "\x1b" not in text
 
-    def test_half_a_line_of_a_killed_program_does_not_spoil_the_next(self, bench, tmp_path):
+    def test_an_incomplete_log_line_does_not_damage_the_next_one(self, bench, tmp_path):
         (tmp_path / "c.log.jsonl").write_text('{"utc": "2026-01-01T00:00:00", "eve')
         run_campaign(bench, campaign("one"), tmp_path)
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
-    def test_a_command_is_told_of_faults_and_of_the_end_and_its_failure_harms_nothing(self, bench, tmp_path):
+    def test_a_notification_command_gets_faults_and_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (

@@ -46,7 +46,7 @@ def real(bench_of, rig, state_folder):
         yield bench, virtual
 
 
-def test_a_real_bench_that_was_never_checked_is_not_armed_and_nothing_plays(real, tmp_path):
+def test_an_unchecked_real_bench_is_not_armed(real, tmp_path):
     bench, virtual = real
     before_s = virtual.world.time_s
     with pytest.raises(CheckFailed, match=r"was never checked on this account.*bench check.*--check waived"):
@@ -70,7 +70,7 @@ def test_an_old_or_failed_check_does_not_arm_a_real_bench(real, tmp_path, age_h,
 
 
 @pytest.mark.parametrize("verdict", [Verdict.OK, Verdict.WARN])
-def test_a_recent_check_that_passed_arms_and_is_not_made_again(real, tmp_path, verdict):
+def test_a_recent_passed_check_is_not_repeated(real, tmp_path, verdict):
     bench, virtual = real
     result = kept_result(bench.rig, 11.9, verdict)
     before_s = virtual.world.time_s
@@ -86,14 +86,14 @@ def test_a_check_of_another_configuration_does_not_arm(real, tmp_path):
         require_fresh(bench, tmp_path, clock=lambda: NOW)
 
 
-def test_the_time_that_a_check_holds_is_the_rigs_to_state(rig, state_folder):
+def test_the_rig_sets_how_long_a_check_is_valid(rig, state_folder):
     patient = rig.model_copy(update={"check_valid_h": 48.0})
     result = kept_result(rig, 30.0)
     assert "12 h are allowed" in why_not(result, rig, NOW)
     assert why_not(result, patient, NOW) is None
 
 
-def test_a_check_made_now_arms_and_stands_in_the_recording(real, tmp_path):
+def test_a_new_check_arms_the_bench_and_is_recorded(real, tmp_path):
     bench, _ = real
     result = require_fresh(bench, tmp_path, CheckRule.NOW)
     assert result == last_check(bench.rig.name)
@@ -103,7 +103,7 @@ def test_a_check_made_now_arms_and_stands_in_the_recording(real, tmp_path):
         assert recording.bench_check["verdict"] in ("ok", "warn")
 
 
-def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
+def test_a_failed_new_check_does_not_arm_and_is_stored(real, tmp_path):
     bench, virtual = real
     virtual.faults.turn_amplifier_gain(20.0)
     with pytest.raises(
@@ -115,7 +115,7 @@ def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
         require_fresh(bench, tmp_path)
 
 
-def test_a_check_that_finds_the_drive_playing_on_does_not_state_that_it_is_off(real, tmp_path):
+def test_a_check_with_continuing_drive_does_not_report_silence(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
     with pytest.raises(
@@ -124,7 +124,7 @@ def test_a_check_that_finds_the_drive_playing_on_does_not_state_that_it_is_off(r
         require_fresh(bench, tmp_path, CheckRule.NOW)
 
 
-def test_a_waived_check_arms_and_the_recording_states_that_there_was_none(real, tmp_path):
+def test_a_waived_check_is_noted_in_the_recording(real, tmp_path):
     bench, _ = real
     assert require_fresh(bench, tmp_path, CheckRule.WAIVED) is None
     run_measurement(bench, DWELL, tmp_path / "run.h5")
@@ -132,7 +132,7 @@ def test_a_waived_check_arms_and_the_recording_states_that_there_was_none(real, 
         assert recording.bench_check == {}
 
 
-def test_a_virtual_bench_is_checked_unasked_once_and_then_trusted(rig, state_folder, tmp_path):
+def test_a_virtual_bench_is_checked_once_automatically(rig, state_folder, tmp_path):
     with open_bench(rig) as bench:
         first = require_fresh(bench, tmp_path)
     with open_bench(rig) as bench:
@@ -140,7 +140,7 @@ def test_a_virtual_bench_is_checked_unasked_once_and_then_trusted(rig, state_fol
         assert bench.last_check == first
 
 
-def test_anything_that_has_changed_since_the_last_check_is_stated_in_decibels_and_days(real, tmp_path):
+def test_changes_since_the_last_check_are_reported_in_decibels_and_days(real, tmp_path):
     bench, virtual = real
     check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
     virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)
@@ -154,14 +154,14 @@ def test_anything_that_has_changed_since_the_last_check_is_stated_in_decibels_an
     assert result.report["amplifier gain"].verdict is Verdict.OK
 
 
-def test_another_configuration_is_not_compared_with(real, tmp_path):
+def test_checks_of_different_configurations_are_not_compared(real, tmp_path):
     bench, _ = real
     kept_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))
     assert not [each for each in check_bench(bench, tmp_path).findings if "since" in each.name]
 
 
 class TestKeeping:
-    def test_each_rig_has_its_own_file_and_only_the_last_check_is_kept(self, rig, state_folder):
+    def test_only_the_last_check_of_each_rig_is_stored(self, rig, state_folder):
         other = rig.model_copy(update={"name": "another: rig/1"})
         kept_result(rig, 3.0)
         last, apart = kept_result(rig, 2.0), kept_result(other)
@@ -169,7 +169,7 @@ class TestKeeping:
         assert last_check(other.name) == apart
         assert len(list(state_folder.rglob("*"))) == 1 + 2 * 2, "the last, and the last that passed"
 
-    def test_a_check_is_compared_with_the_last_that_passed_until_the_change_is_meant(self, real, tmp_path):
+    def test_a_check_is_compared_with_the_last_passed_check(self, real, tmp_path):
         """A fault that is still there was no fault the second time, and a repaired bench failed."""
         bench, _ = real
         healthy = check_bench(bench, tmp_path)
@@ -195,12 +195,12 @@ class TestKeeping:
         archive_path(rig.name).write_bytes(content.encode("latin-1"))
         assert last_check(rig.name) is None
 
-    def test_a_folder_that_cannot_be_written_is_a_sentence(self, rig, state_folder):
+    def test_an_unwritable_folder_gives_one_sentence(self, rig, state_folder):
         state_folder.write_text("a file in the way")
         with pytest.raises(RecordingError, match="VIBENCH_STATE_DIR"):
             kept_result(rig)
 
-    def test_how_fast_a_virtual_rig_is_played_makes_it_no_other_rig(self, rig):
+    def test_the_pace_does_not_change_the_identity_of_a_virtual_rig(self, rig):
         fast = rig.virtual.model_copy(update={"pace": "wall", "speed": 3.0})
         noisy = rig.virtual.model_copy(update={"seed": 99})
         assert rig_digest(rig) == rig_digest(rig.model_copy(update={"virtual": fast}))

@@ -35,7 +35,7 @@ def failed(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
-def test_a_healthy_bench_fails_nothing_and_its_figures_match_the_configuration(checked, rig, tmp_path):
+def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_path):
     report = checked(rig, tmp_path)
     assert failed(report) == set()
     clock = report["drive's clock"]
@@ -96,7 +96,7 @@ def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, nam
     assert report.verdict is Verdict.FAIL
 
 
-def test_a_laser_that_loses_its_light_is_named_as_such_and_hum_is_not(checked, rig, tmp_path):
+def test_a_laser_drop_out_is_distinguished_from_hum(checked, rig, tmp_path):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 10.0})
     dark = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
     assert dark.verdict is not Verdict.OK
@@ -106,7 +106,7 @@ def test_a_laser_that_loses_its_light_is_named_as_such_and_hum_is_not(checked, r
     assert "look for hum" in loud.advice
 
 
-def test_a_vibrometer_whose_sign_is_reversed_is_warned_of(checked, rig, tmp_path):
+def test_a_reversed_vibrometer_sign_gives_a_warning(checked, rig, tmp_path):
     assert checked(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
     report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
     assert report["sign of m0_velocity"].verdict is Verdict.WARN
@@ -128,7 +128,7 @@ class PressedOnceItSounds(StopSwitch):
         return super().request
 
 
-def test_a_check_can_be_stopped_while_it_sounds_and_leaves_silence(bench_of, rig, tmp_path):
+def test_a_stop_during_a_check_silences_the_drive(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual):
         switch = PressedOnceItSounds(virtual.generator)
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
@@ -143,7 +143,7 @@ class StalledOnceItSounds(PressedOnceItSounds):
         super().ask(StopRequest.by(Cause.FAULT, "the run read no samples for 5 s"))
 
 
-def test_a_check_that_stalls_has_failed_and_nobody_has_stopped_it(bench_of, rig, tmp_path):
+def test_a_stalled_check_counts_as_failed_and_not_as_stopped(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual), pytest.raises(RunStalled, match="no samples for 5 s"):
         bench_report(bench, tmp_path, StalledOnceItSounds(virtual.generator))
 
@@ -162,18 +162,18 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
-def test_a_wrong_load_at_the_panel_is_named_as_such(checked, rig, tmp_path):
+def test_a_wrong_load_setting_is_named(checked, rig, tmp_path):
     # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
     report = checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
     assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
     assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
 
 
-def test_a_right_load_that_nobody_can_request_passes(checked, rig, tmp_path):
+def test_a_right_load_setting_passes_even_if_it_cannot_be_read(checked, rig, tmp_path):
     assert failed(checked(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
 
 
-def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):
+def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual):
         virtual.faults.pull_usb_cable()
         with pytest.raises(InstrumentLost):
@@ -181,7 +181,7 @@ def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):
         virtual.faults.heal()
 
 
-def test_the_report_reads_as_a_table_and_survives_json(checked, rig, tmp_path):
+def test_the_report_is_a_table_and_round_trips_through_json(checked, rig, tmp_path):
     report = checked(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
     assert BenchReport.model_validate_json(report.model_dump_json()) == report
     lines = report.text().splitlines()
@@ -192,7 +192,7 @@ def test_the_report_reads_as_a_table_and_survives_json(checked, rig, tmp_path):
         report["nonsense"]
 
 
-def test_a_bench_whose_output_plays_sines_is_checked_by_its_output(tmp_path):
+def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_path):
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig_streaming.toml")
     with open_bench(rig) as bench:
         report = bench_report(bench, tmp_path)
@@ -224,7 +224,7 @@ class TestSineFit:
         assert (fit.amplitude, fit.phase_rad) == pytest.approx((2.0, 0.7), rel=1e-12)
         assert fit.uncertainty * np.sqrt(time_s.size / 2) < 1e-12
 
-    def test_the_uncertainty_is_how_far_the_amplitude_scatters_in_noise(self):
+    def test_the_stated_uncertainty_matches_the_scatter_in_noise(self):
         rng = np.random.default_rng(7)
         sine = np.sin(2 * np.pi * 160.0 * np.arange(1000) / 5000.0)
         fits = [fit_sine(sine + 0.1 * rng.standard_normal(1000), 160.0, 5000.0) for _ in range(400)]

@@ -33,14 +33,14 @@ def check(rig):
     return check
 
 
-def test_the_tail_of_what_was_cut_off_before_is_no_fault(check):
+def test_a_decaying_signal_of_the_previous_run_passes_the_check(check):
     tail = sine(0.5, 5120)
     tail[100:] = 0.0
     figures = check(tail)
     assert figures.drive_v == pytest.approx(figures.expected_drive_v, rel=1e-3)
 
 
-def test_another_source_at_the_checks_frequency_is_found_before_anything_plays(check):
+def test_an_interfering_source_is_found_before_output(check):
     with pytest.raises(
         CheckFailed, match=r"the drive voltage shows 0\.005 V at 160 Hz before anything plays"
     ):

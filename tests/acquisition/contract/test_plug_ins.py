@@ -67,30 +67,30 @@ def installed(tmp_path_factory):
     return target
 
 
-def test_every_row_of_ours_names_something_that_is_there():
+def test_every_registered_driver_exists():
     for row in OURS:
         assert plug_in(PlugInKind(row.group), row.name) is row.load()
 
 
-def test_a_name_that_nobody_offers_is_refused_with_those_that_there_are():
+def test_an_unknown_driver_is_refused_with_the_known_ones():
     with pytest.raises(ConfigurationError, match=r"'afg' is not a name of vibench\.generators: afg1022x"):
         plug_in(PlugInKind.GENERATOR, "afg")
 
 
-def test_a_configuration_that_names_what_is_not_installed_is_refused_before_anything_opens():
+def test_a_configuration_with_a_missing_driver_is_refused_before_opening():
     with pytest.raises(
         ConfigurationError, match=r"generator\.driver = 'plain_scpi' is not installed: afg1022x"
     ):
         load_rig(BENCH)
 
 
-def test_a_package_that_cannot_be_imported_reports_it(tmp_path, monkeypatch):
+def test_a_failing_import_of_a_plug_in_is_reported(tmp_path, monkeypatch):
     offer(tmp_path, monkeypatch, "broken", "no_such_module_of_anyone:Driver")
     with pytest.raises(ConfigurationError, match=r"no_such_module_of_anyone:Driver, which cannot be loaded"):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_a_module_that_raises_when_it_is_imported_is_reported_in_a_sentence(tmp_path, monkeypatch):
+def test_an_exception_while_importing_a_plug_in_gives_one_sentence(tmp_path, monkeypatch):
     (tmp_path / "raises_at_once.py").write_text('raise RuntimeError("the firmware is too old")')
     offer(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
     said = r"raises_at_once:Driver, which cannot be loaded \(RuntimeError: the firmware is too old\)"
@@ -98,13 +98,13 @@ def test_a_module_that_raises_when_it_is_imported_is_reported_in_a_sentence(tmp_
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_two_packages_with_one_name_are_distinguished_by_nobody(tmp_path, monkeypatch):
+def test_two_plug_ins_with_one_name_are_refused(tmp_path, monkeypatch):
     offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"offered more than once \(somebody:Else, vibench"):
         plug_in(PlugInKind.GENERATOR, "afg1022x")
 
 
-def test_installed_packages_are_looked_at_once_and_again_when_the_path_changes(tmp_path, monkeypatch):
+def test_plug_ins_are_searched_once_per_path(tmp_path, monkeypatch):
     looks = []
     monkeypatch.setattr(_guarded, "entry_points", lambda: looks.append("look") or EntryPoints())
     monkeypatch.syspath_prepend(tmp_path / "first")
@@ -126,7 +126,7 @@ def offer(folder, monkeypatch, name, target):
 
 
 @pytest.mark.thorough
-def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp_path):
+def test_third_party_instruments_measure_without_changes_to_vibench(installed, tmp_path):
     done = run("-c", MEASURES, BENCH, tmp_path / "dwell.h5", path=installed)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split(maxsplit=2) == ["complete", "AFG1022", "base acceleration (charge amplifier)\n"]
@@ -134,7 +134,7 @@ def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
-def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
+def test_third_party_instruments_can_run_the_contract_tests(installed, tmp_path, name):
     """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
     done = contract(name, f"--vibench-bench={BENCH}", path=installed, folder=tmp_path)
     assert done.returncode == 0, done.stdout
@@ -142,7 +142,7 @@ def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
 
 
 @pytest.mark.thorough
-def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
+def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
     broken = (installed / "example_instruments.py").read_text()
     broken = broken.replace("self._stretch = peak", "self._stretch = 1.0").replace(
         '"OUTP1:STAT OFF"', '"*WAI"'
@@ -179,7 +179,7 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         ),
     ],
 )
-def test_the_contract_states_once_what_is_wrong_with_its_command(tmp_path, options, sentence):
+def test_a_wrong_contract_command_gives_one_message(tmp_path, options, sentence):
     bench = CONFIGS / "virtual_rig.toml"
     done = run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
@@ -192,7 +192,7 @@ def test_the_contract_states_once_what_is_wrong_with_its_command(tmp_path, optio
     assert "no tests ran" in done.stdout
 
 
-def test_a_project_may_define_options_of_the_names_that_benches_suggest(tmp_path):
+def test_contract_options_may_have_the_names_of_project_options(tmp_path):
     (tmp_path / "conftest.py").write_text(
         "def pytest_addoption(parser):\n"
         "    for name in ('--bench', '--instrument', '--rig'):\n"
@@ -212,7 +212,7 @@ OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcar
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", OUR_INSTRUMENTS)
-def test_our_own_instruments_keep_the_contract(name):
+def test_own_instruments_keep_the_contract(name):
     done = contract(name)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout

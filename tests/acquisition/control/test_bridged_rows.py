@@ -19,7 +19,7 @@ def velocity(seconds=2.0):
 
 
 @pytest.mark.parametrize("block", [900, 1925, 5000])
-def test_anything_that_is_handed_on_is_the_motion_once_and_in_order(block):
+def test_samples_are_passed_on_once_and_in_order(block):
     light = velocity()
     dark = light.copy()
     begins = np.random.default_rng(block).integers(2_000, light.size - 3_000, 14)
@@ -37,7 +37,7 @@ def test_anything_that_is_handed_on_is_the_motion_once_and_in_order(block):
     assert np.max(np.abs(together - light[: together.size])) < 0.02 * np.max(light)
 
 
-def test_without_a_suspicion_nothing_waits():
+def test_samples_without_suspected_drop_outs_are_not_delayed():
     light, rows = velocity(), BridgedRows(RATE_HZ)
     for first in range(0, 50_000, 2_000):
         part = light[first : first + 2_000]
@@ -46,7 +46,7 @@ def test_without_a_suspicion_nothing_waits():
         assert np.array_equal(handed_on, [part, 2 * part, 3 * part])
 
 
-def test_after_a_hole_and_after_a_change_it_begins_again():
+def test_a_gap_or_a_changed_tone_restarts_the_bridge():
     light, rows = velocity(), BridgedRows(RATE_HZ)
     dark = light[:2_000].copy()
     dark[-15:] = 0.6
@@ -60,7 +60,7 @@ def test_after_a_hole_and_after_a_change_it_begins_again():
 
 
 @pytest.mark.thorough
-def test_a_mode_is_tracked_by_a_vibrometer_that_loses_its_light(rig, tmp_path):
+def test_a_mode_is_tracked_despite_vibrometer_drop_outs(rig, tmp_path):
     """Six times a second; "natural frequency 263.4 +- 2.2 Hz, damping ratio -0.0013" was told."""
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 6.0})
     daq = rig.daq.model_copy(update={"sample_rate_hz": RATE_HZ})

@@ -13,7 +13,7 @@ CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)
 
 @pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
 @pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
-def test_a_harmonic_of_m0_is_measured_under_a_sinusoidal_base(harmonic, shift_rad):
+def test_a_harmonic_of_m0_is_measured_with_sinusoidal_base_motion(harmonic, shift_rad):
     """Base U sin(w t), m0 X sin(n w t - 1.2), the vibrometer late: X/U exp(-1.2 i) from any moment on."""
     omega, order = 2 * np.pi * HERTZ, harmonic * 2 * np.pi * HERTZ
     base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
@@ -25,7 +25,7 @@ def test_a_harmonic_of_m0_is_measured_under_a_sinusoidal_base(harmonic, shift_ra
 
 @pytest.mark.parametrize("drives", [2, 3])
 @pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
-def test_a_subharmonic_is_known_except_for_the_drive_it_began_with(drives, shift_rad):
+def test_a_subharmonic_phase_is_known_up_to_whole_drive_periods(drives, shift_rad):
     omega = 2 * np.pi * HERTZ
     base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
     late = shift_rad / drives - 1.2 - omega / drives * DELAY_S
@@ -35,7 +35,7 @@ def test_a_subharmonic_is_known_except_for_the_drive_it_began_with(drives, shift
 
 
 @pytest.mark.parametrize("harmonic", [1, 3])
-def test_capacitors_before_the_converter_turn_no_phase(harmonic):
+def test_ac_coupling_does_not_shift_the_phase(harmonic):
     """A first-order high-pass turns the base by 0.9 degrees at 31 Hz: three times that at 3:1."""
     channels = replace(CHANNELS, base_cut_hz=0.5, response_cut_hz=0.5, response_delay_s=0.0)
     order = harmonic * 2 * np.pi * HERTZ
@@ -45,7 +45,7 @@ def test_capacitors_before_the_converter_turn_no_phase(harmonic):
     assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j), rel=1e-12)
 
 
-def test_a_base_that_shows_nothing_has_no_ratio():
+def test_a_silent_base_gives_no_ratio():
     assert CHANNELS.transmissibility(np.zeros(3, complex), np.ones(3, complex), HERTZ, 3) == 0
 
 

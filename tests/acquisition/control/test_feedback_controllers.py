@@ -71,7 +71,7 @@ def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
         assert low - 0.3 <= fold <= high + 0.3
 
 
-def test_every_step_states_its_pass_branch_and_where_it_came_from(swept):
+def test_every_step_records_pass_branch_and_direction(swept):
     steps = [numbers for label, numbers, *_ in swept.segments if label == "step"]
     assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]
     assert [each["pass"] for each in steps] == [1] * 9 + [2] * 9
@@ -84,7 +84,7 @@ def test_every_step_states_its_pass_branch_and_where_it_came_from(swept):
     assert max(len(json.dumps(each)) for each in steps) < 480
 
 
-def test_steps_lie_on_the_branch_that_the_closed_form_has(swept):
+def test_steps_lie_on_the_branches_of_the_closed_form(swept):
     up = [each for each in said(swept, "achieved") if each["segment"] == "step"][:9]
     lower, upper = folds_hz(swept.oscillator, LEVEL)
     for step in up:
@@ -94,11 +94,11 @@ def test_steps_lie_on_the_branch_that_the_closed_form_has(swept):
             assert step["response_ii"] == pytest.approx(highest / base_m, rel=0.01)
 
 
-def test_it_takes_no_longer_than_planned(swept, both_ways):
+def test_a_feedback_measurement_ends_within_the_planned_time(swept, both_ways):
     assert swept.sample / 5120 <= duration_s(both_ways["measurement"])
 
 
-def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_states(new_control_bench):
+def test_a_level_is_reached_with_a_wrong_shaker_model(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.6 + 0.3 * (frequency_hz > 125))
     plan = SettledSine(
         amplitude_vpp=1.0,
@@ -119,7 +119,7 @@ def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_stat
     assert max(b / a for a, b in pairwise(loudest[2:-1])) <= 1.25 * (1 + 1e-9)
 
 
-def test_a_level_out_of_reach_is_flagged_and_the_plan_s_setting_never_passed(new_control_bench):
+def test_an_unreachable_level_is_flagged_within_the_planned_setting(new_control_bench):
     bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.2)
     plan = HeldDwell(
         amplitude_vpp=0.05,
@@ -136,7 +136,7 @@ def test_a_level_out_of_reach_is_flagged_and_the_plan_s_setting_never_passed(new
     assert max(setting for *_, setting in bench.settings) == pytest.approx(0.05)
 
 
-def test_a_sweep_holds_its_level_over_a_shaker_resonance_and_states_where_not(new_control_bench):
+def test_a_sweep_holds_its_level_over_a_shaker_resonance(new_control_bench):
     bench = new_control_bench(
         shaker_factor=lambda frequency_hz: 1 + 0.5 / (1 + ((frequency_hz - 150) / 4) ** 2)
     )
@@ -186,7 +186,7 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
     assert found[-1]["frequency_hz"] > found[0]["frequency_hz"] + 0.05
 
 
-def test_a_strongly_bent_resonance_is_followed_though_each_level_moves_it_by_half_widths(new_control_bench):
+def test_a_strongly_bent_resonance_is_followed(new_control_bench):
     """From 120 to 127 Hz, by up to four half-widths (0.48 Hz) a level."""
     bench = new_control_bench(hardening=HARDENING)
     plan = ResonanceTracking(
@@ -205,7 +205,7 @@ def test_a_strongly_bent_resonance_is_followed_though_each_level_moves_it_by_hal
     assert found[-1]["at_hz"] > 127
 
 
-def test_where_the_motion_does_not_settle_no_resonance_is_reported_nor_that_it_was_locked_on_to(
+def test_an_unsettled_motion_gives_no_resonance(
     new_control_bench,
 ):
     """Phase and level are met, and a thousand like periods are not waited for."""
@@ -227,7 +227,7 @@ def test_where_the_motion_does_not_settle_no_resonance_is_reported_nor_that_it_w
     assert (found["motion"], found["lock"], found["frequency_hz"]) == ("unsettled", "not met", None)
 
 
-def test_without_a_level_the_plan_s_setting_is_played_from_end_to_end(new_control_bench):
+def test_without_a_level_the_planned_setting_is_played_throughout(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
     bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))
@@ -236,7 +236,7 @@ def test_without_a_level_the_plan_s_setting_is_played_from_end_to_end(new_contro
     assert {each["level"] for each in said(bench, "achieved")} == {"not controlled"}
 
 
-def test_a_branch_that_no_way_leads_back_to_is_found_again_from_rest(new_control_bench):
+def test_an_isolated_branch_is_reached_again_from_rest(new_control_bench):
     """From 123 Hz down the lower branch ends; led back to 123 Hz the motion stays on the upper one."""
     bench = new_control_bench(hardening=HARDENING)
     plan = SettledSine(

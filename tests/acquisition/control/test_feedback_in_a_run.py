@@ -44,7 +44,7 @@ def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL)
 
 
 @pytest.mark.parametrize("check", LowLevelCheck)
-def test_it_ends_silent_and_complete_with_its_level_in_the_recording(bench, tmp_path, check):
+def test_a_feedback_run_ends_silent_with_its_level_recorded(bench, tmp_path, check):
     states = {progress.state for progress in run_of(bench, tmp_path, check=check)}
     assert states >= {RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN}
     assert not bench.world.is_on
@@ -58,7 +58,7 @@ def test_it_ends_silent_and_complete_with_its_level_in_the_recording(bench, tmp_
     assert dwell["last"] - dwell["first"] + 1 == 5120
 
 
-def test_it_is_no_longer_than_its_header_states(bench, tmp_path):
+def test_a_feedback_run_is_not_longer_than_its_header_states(bench, tmp_path):
     list(run_of(bench, tmp_path))
     planned = round((CHECK_S + duration_s(DWELL)) * 5120)
     assert bench.recorder.header.expected_samples == planned
@@ -77,7 +77,7 @@ def test_a_stop_in_any_state_silences_it(bench, tmp_path, state, cause):
     assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
 
 
-def test_a_hold_while_settling_changes_nothing_that_is_heard(bench, tmp_path):
+def test_a_hold_during_settling_keeps_the_output(bench, tmp_path):
     run = run_of(bench, tmp_path)
     held = 0
     for progress in run:
@@ -93,7 +93,7 @@ def test_a_hold_while_settling_changes_nothing_that_is_heard(bench, tmp_path):
     assert {each["level"] for each in level} == {"within tolerance"}
 
 
-def test_a_sensor_that_comes_off_ends_the_run_before_the_setting_has_risen_far(bench, tmp_path):
+def test_a_detached_sensor_ends_the_run_early(bench, tmp_path):
     run = run_of(bench, tmp_path)
     while next(iter(run)).state is not RunState.RECORDING:
         pass
@@ -106,7 +106,7 @@ def test_a_sensor_that_comes_off_ends_the_run_before_the_setting_has_risen_far(b
     assert max(settings) < 0.5
 
 
-def test_a_level_beyond_the_plan_s_setting_is_refused_before_anything_moves(bench, tmp_path):
+def test_a_level_beyond_the_planned_setting_is_refused_before_output(bench, tmp_path):
     loud = DWELL.excitation.model_copy(update={"base_level": BaseLevel(acceleration_m_per_s2=50.0)})
     with pytest.raises(LimitExceeded, match=r"the setting that holds the base's level \(at 200 Hz\)"):
         list(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": loud})))
@@ -126,7 +126,7 @@ def test_a_level_beyond_the_plan_s_setting_is_refused_before_anything_moves(benc
         ),
     ],
 )
-def test_limits_are_checked_for_the_loudest_that_feedback_may_play(bench, tmp_path, excitation):
+def test_limits_are_checked_at_the_largest_setting_of_feedback(bench, tmp_path, excitation):
     """A micrometre asks for millivolts; the plan allows ten volts, which at 20 Hz pass the stroke."""
     with pytest.raises(LimitExceeded, match="the stroke"):
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))

@@ -23,32 +23,32 @@ def tracked(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
     return np.array(achieved), estimator
 
 
-def test_a_constant_answer_is_right_from_the_second_step_on():
+def test_a_constant_gain_is_exact_from_the_second_step():
     achieved, estimator = tracked(lambda time_s: 0.6)
     assert achieved[0] == pytest.approx(0.6)
     np.testing.assert_allclose(achieved[1:], 1.0, rtol=1e-12)
     assert estimator.level == pytest.approx(1.0)
 
 
-def test_a_steady_trend_is_foreseen():
+def test_a_steady_trend_of_the_gain_is_extrapolated():
     achieved, _ = tracked(lambda time_s: 1 + 0.3 * time_s)
     np.testing.assert_allclose(achieved[5:], 1.0, atol=1e-9)
 
 
-def test_chance_is_averaged_and_not_chased():
+def test_random_errors_are_averaged():
     achieved, _ = tracked(lambda time_s: 1.0, steps=600, noise=0.05)
     # Six answers in the memory, 5 % in phase with the level: 2 %, seldom more when a line is drawn.
     assert np.std(achieved[10:]) < 0.035
 
 
-def test_a_jump_is_forgotten_within_the_memory():
+def test_a_gain_jump_decays_within_the_memory():
     achieved, estimator = tracked(lambda time_s: 1.0 if time_s < 3 else 1.5)
     after = achieved[30:]
     assert np.all(np.abs(after[8:] - 1) < 0.01)
     assert abs(estimator.level - 1) < 0.01
 
 
-def test_nothing_heard_is_nothing_known():
+def test_without_measurement_the_gain_is_unknown():
     estimator = GainEstimator(0.5)
     estimator.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
     assert not estimator.is_known

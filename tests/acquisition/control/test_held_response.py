@@ -29,7 +29,7 @@ def held(tmp_path):
     return carry_out
 
 
-def test_the_base_gives_what_the_linear_specimen_needs_for_its_response(rig, held):
+def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, held):
     plan = HeldResponse(amplitude_vpp=1, frequencies_hz=(88, 90, 92), response_m=1e-6, record_s=0.5)
     specimen = specimen_of(rig)
     for each in held(rig, plan):
@@ -43,7 +43,7 @@ def test_the_base_gives_what_the_linear_specimen_needs_for_its_response(rig, hel
         assert each.base_m_per_s2 == pytest.approx(1e-6 / against * omega**2, rel=0.03)
 
 
-def test_what_ten_decisions_a_second_do_not_hold_is_recorded_and_flagged(rig, held):
+def test_an_unstable_branch_is_recorded_and_flagged(rig, held):
     # Between the folds of a hardening spring: under this table's voltage the motion leaves quicker than that.
     hard = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
     hardening = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=hard)})

@@ -36,7 +36,7 @@ def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
 
 
 @given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))
-def test_the_bracket_holds_the_jump_and_is_as_narrow_as_asked(jump_hz, resolution_hz, height):
+def test_the_bracket_contains_the_jump_with_the_requested_width(jump_hz, resolution_hz, height):
     for ends in ((100.0, 110.0), (110.0, 100.0)):
         jump, asked = found(jump_hz, resolution_hz, *ends, height)
         low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))
@@ -45,14 +45,14 @@ def test_the_bracket_holds_the_jump_and_is_as_narrow_as_asked(jump_hz, resolutio
         assert len(asked) <= 8
 
 
-def test_a_bracket_that_is_narrow_enough_requests_nothing():
+def test_a_narrow_enough_bracket_needs_no_measurement():
     jump, asked = found(105.0, 10.0)
     assert asked == []
     assert jump == LocatedJump(jump.before, jump.after)
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_half_the_factor_in_decibels_distinguishes_two_branches(response, expected):
+def test_branches_are_separated_at_half_the_factor_in_decibels(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 

@@ -12,7 +12,7 @@ CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0, leas
 
 
 @given(gain=st.floats(3.0, 300.0), start_vpp=st.floats(0.01, 5.0))
-def test_it_converges_on_any_shaker_whose_level_is_within_reach(gain, start_vpp):
+def test_level_control_converges_whenever_the_level_is_reachable(gain, start_vpp):
     setting_vpp = start_vpp
     for _ in range(60):
         measured = MeasuredLevel(gain * setting_vpp, 0.0)
@@ -23,17 +23,17 @@ def test_it_converges_on_any_shaker_whose_level_is_within_reach(gain, start_vpp)
     assert setting_vpp <= 5.0
 
 
-def test_the_plan_s_setting_is_the_end():
+def test_level_control_never_exceeds_the_planned_setting():
     assert CONTROL.next_vpp(4.9, MeasuredLevel(1.0, 0.0), 10.0) == 5.0
     assert CONTROL.next_vpp(2.1e-3, MeasuredLevel(100.0, 0.0), 10.0) == 2e-3
 
 
-def test_an_error_that_chance_explains_changes_nothing():
+def test_an_insignificant_level_error_changes_nothing():
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.3), 10.0) == 1.0
     assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.1), 10.0) > 1.0
 
 
-def test_a_level_s_uncertainty_matches_repetitions_also_when_neighbours_depend_on_each_other():
+def test_the_level_uncertainty_matches_repetitions_with_correlated_periods():
     random = np.random.default_rng(3)
     means, stated = [], []
     for _ in range(200):
@@ -46,6 +46,6 @@ def test_a_level_s_uncertainty_matches_repetitions_also_when_neighbours_depend_o
     assert np.sqrt(np.mean(np.square(stated))) == pytest.approx(np.std(means), rel=0.2)
 
 
-def test_too_few_periods_know_nothing():
+def test_too_few_periods_give_no_level():
     few = measured_level(np.full(10, 3.0 + 0j))
     assert few.uncertainty == few.amplitude == 3.0

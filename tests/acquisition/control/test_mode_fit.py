@@ -23,9 +23,7 @@ def points(natural_hz, damping, count=7):
 
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
 @pytest.mark.parametrize("turned", [0.0, 0.1])
-def test_frequency_and_damping_are_the_eigenvalue_s_whatever_phase_the_sensors_add(
-    natural_hz, damping, turned
-):
+def test_frequency_and_damping_do_not_depend_on_sensor_phase(natural_hz, damping, turned):
     frequency_hz, answers = points(natural_hz, damping)
     found = fit_mode(frequency_hz, answers * np.exp(1j * turned))
     assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-4)
@@ -33,7 +31,7 @@ def test_frequency_and_damping_are_the_eigenvalue_s_whatever_phase_the_sensors_a
 
 
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
-def test_the_stated_uncertainty_is_the_spread_of_repetitions(natural_hz, damping):
+def test_the_stated_mode_uncertainty_matches_repetitions(natural_hz, damping):
     random = np.random.default_rng(2)
     frequency_hz, answers = points(natural_hz, damping)
     found = []
@@ -49,7 +47,7 @@ def test_four_points_are_too_few():
     assert fit_mode(*points(*MODES[1], count=4)) is None
 
 
-def test_points_that_scatter_show_no_mode_that_nobody_damps():
+def test_scattered_points_give_no_undamped_mode():
     """A vibrometer without light led to "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
     random = np.random.default_rng(3)
     frequency_hz, answers = points(*MODES[1])

@@ -78,7 +78,7 @@ def test_the_base_has_the_spectrum_that_was_requested(recorded, spectrum):
         assert last["kurtosis"] == pytest.approx(np.mean(samples**4) / np.mean(samples**2) ** 2, rel=0.02)
 
 
-def test_a_shaker_that_the_model_does_not_know_is_equalised_all_the_same(recorded, rig):
+def test_an_unknown_shaker_is_equalised(recorded, rig):
     stiff = 2 * rig.shaker.suspension_stiffness_n_per_m
     with recorded(noise(spectrum=corners((40, 0.005))), suspension_stiffness_n_per_m=stiff) as recording:
         first, *_ = notes(recording)
@@ -87,7 +87,7 @@ def test_a_shaker_that_the_model_does_not_know_is_equalised_all_the_same(recorde
     assert np.mean(np.abs(10 * np.log10(density / 0.005)) < 3.0) > 0.95
 
 
-def test_the_base_is_lowered_where_m0_would_pass_its_limit_and_only_there(recorded):
+def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(recorded):
     limit = 5e-8
     with recorded(noise(response_limits=corners((40, limit)), realisations=6)) as recording:
         _, velocity = densities(recording, "m0_velocity")
@@ -99,7 +99,7 @@ def test_the_base_is_lowered_where_m0_would_pass_its_limit_and_only_there(record
         assert notes(recording)[-1]["notched"] > 0
 
 
-def test_a_spectrum_that_needs_more_than_the_plan_allows_is_ramped_down(recorded):
+def test_an_unreachable_spectrum_ends_with_a_ramp_down(recorded):
     with pytest.raises(LimitExceeded, match=r"needs .* Vpp at .* amplitude_vpp = 0\.1 is the most"):
         recorded(noise(amplitude_vpp=0.1))
 
@@ -120,11 +120,11 @@ def test_a_density_above_its_abort_line_ramps_the_run_down(recorded):
         ({"response_limits": corners((50, 1), (50, 2))}, "response_limits has corners"),
     ],
 )
-def test_a_plan_that_says_nothing_sensible_is_refused(changes, said):
+def test_an_inconsistent_noise_plan_is_refused(changes, said):
     with pytest.raises(ValueError, match=said):
         noise(**changes)
 
 
-def test_between_corners_a_spectrum_is_straight_over_logarithms():
+def test_a_spectrum_is_interpolated_logarithmically():
     spectrum = corners((10, 1.0), (100, 100.0))
     np.testing.assert_allclose(density_at(spectrum, np.array([5.0, 10**1.5, 200.0])), [1.0, 10.0, 100.0])

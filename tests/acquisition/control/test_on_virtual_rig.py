@@ -69,7 +69,7 @@ def simulated_period(frequency_hz, amplitude_m, longest=8):
     ("frequency_hz", "amplitude_m", "period"),
     [(260.0, 1e-6, 1), (74.0, 30e-6, 2), (70.0, 40e-6, 3), (260.0, 5e-6, 0)],
 )
-def test_the_period_of_a_steady_motion_is_the_simulation_s(carried_out, frequency_hz, amplitude_m, period):
+def test_the_measured_period_matches_the_simulation(carried_out, frequency_hz, amplitude_m, period):
     assert simulated_period(frequency_hz, amplitude_m) == period
     plan = HeldDwell(
         amplitude_vpp=4.0,
@@ -198,7 +198,7 @@ def test_linear_modes_are_tracked_to_their_phase_resonance(
 
 
 @pytest.mark.thorough
-def test_a_resonance_is_followed_among_impacts_as_far_as_the_model_has_a_steady_motion(carried_out):
+def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(carried_out):
     plan = ResonanceTracking(
         amplitude_vpp=1.0,
         start_hz=94.5,
@@ -244,7 +244,7 @@ def bumpers(below_m, above_m, stiffness=100):
 
 
 @pytest.mark.thorough
-def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carried_out):
+def test_a_superharmonic_resonance_matches_harmonic_balance(carried_out):
     """Beside harmonic balance of both together (`benchmarks/backbones.py --superharmonic`)."""
     k1 = 2.1e-3 * (2 * np.pi * 100) ** 2
     cubic = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * k1 * 1e-4 / 1e-9}
@@ -263,7 +263,7 @@ def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carri
 @pytest.mark.parametrize(
     ("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), pytest.param((30e-6, 60e-6), 90, marks=pytest.mark.slow)]
 )
-def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_out, gap_m, phase_deg):
+def test_the_phase_of_a_second_superharmonic_depends_on_the_nearer_bumper(carried_out, gap_m, phase_deg):
     """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
     plan = other_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
     found = said(carried_out(plan, **bumpers(*gap_m)), "resonance")
@@ -286,7 +286,7 @@ def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_
         ((60e-6, 30e-6), -60, 193.092, 2.417e-6),
     ],
 )
-def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_requested(
+def test_a_subharmonic_resonance_is_found_by_twice_its_phase(
     carried_out, gap_m, phase_deg, model_hz, model_m
 ):
     """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""
@@ -307,9 +307,7 @@ def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_request
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("subharmonic", "start_hz"), [(2, 192), (3, 290)])
-def test_where_m0_repeats_every_drive_no_subharmonic_is_met_however_wide_the_tolerance(
-    carried_out, subharmonic, start_hz
-):
+def test_no_subharmonic_is_found_in_a_period_one_motion(carried_out, subharmonic, start_hz):
     """Noise at half the drive has some phase, and one of thirty degrees' tolerance was met by it."""
     plan = other_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)
     found = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
@@ -318,7 +316,7 @@ def test_where_m0_repeats_every_drive_no_subharmonic_is_met_however_wide_the_tol
 
 
 @pytest.mark.thorough
-def test_a_search_ends_where_the_phase_leaps_from_one_motion_to_another(carried_out):
+def test_a_search_ends_at_a_phase_jump_between_motions(carried_out):
     """From 197 Hz downwards m0's half-drive motion is small until it jumps; it was halved 22 times there."""
     plan = other_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
     (found,) = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")

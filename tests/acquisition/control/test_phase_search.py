@@ -34,7 +34,7 @@ def searched(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
 
 @settings(max_examples=60)
 @given(damping=st.floats(0.004, 0.05), start=st.floats(0.93, 1.07))
-def test_it_locks_on_from_either_side_of_sharp_and_broad_modes(damping, start):
+def test_the_search_locks_on_from_both_sides_of_sharp_and_broad_modes(damping, start):
     search = searched(266.0, damping, 266.0 * start)
     assert abs(search.tries[-1].error_deg) < 1
     found = search.resonance(0.0)
@@ -42,7 +42,7 @@ def test_it_locks_on_from_either_side_of_sharp_and_broad_modes(damping, start):
     assert abs(found.frequency_hz - 266.0) <= 2 * found.uncertainty_hz + 1e-6
 
 
-def test_the_stated_uncertainty_covers_what_noise_does():
+def test_the_stated_frequency_uncertainty_covers_noise():
     found = [searched(266.0, 0.0167, 262.0, noise_deg=0.3, seed=seed).resonance(0.0) for seed in range(200)]
     away = np.array([each.frequency_hz - 266.0 for each in found])
     stated = np.array([each.uncertainty_hz for each in found])
@@ -55,12 +55,12 @@ def test_the_sensors_phase_widens_the_uncertainty_by_the_slope():
     assert search.resonance(0.3).uncertainty_hz == pytest.approx(0.3 / slope, rel=0.15)
 
 
-def test_it_stays_in_its_range():
+def test_the_phase_search_stays_in_its_range():
     search = PhaseSearch(260.0, 270.0, 4.0, [PhaseError(258.0 + 4, 80.0, 0.1), PhaseError(268.0, 70.0, 0.1)])
     assert search.next_hz() == 270.0
 
 
-def test_errors_beyond_a_right_angle_show_no_crossing():
+def test_phase_errors_beyond_90_degrees_are_no_crossing():
     tries = [PhaseError(100.0, 130.0, 1.0), PhaseError(101.0, 120.0, 1.0)]
     found = PhaseSearch(90.0, 110.0, 1.0, tries).resonance(0.3)
     assert found.frequency_hz == 101.0
@@ -68,7 +68,7 @@ def test_errors_beyond_a_right_angle_show_no_crossing():
     assert found.half_width_hz == 0.0
 
 
-def test_of_a_phase_that_is_no_mode_s_the_slope_is_taken_close_by():
+def test_the_slope_of_an_irregular_phase_is_taken_near_resonance():
     """It falls by 300 degrees a hertz at the resonance, and hardly at all further off."""
     tries = [PhaseError(192 + 0.25 * n, 18.0 - n, 0.1) for n in range(4)]
     tries += [PhaseError(193.09 + off, -300.0 * off + 0.3, 0.1) for off in (-0.02, 0.01, 0.0)]
@@ -92,7 +92,7 @@ def uncertainty_deg(response, **plan):
 
 
 @pytest.mark.parametrize("plan", [{"harmonic": 2}, {"harmonic": 3}, {"subharmonic": 2}, {"subharmonic": 3}])
-def test_noise_has_no_phase_and_what_rises_above_it_has(plan):
+def test_only_signals_above_noise_have_a_phase(plan):
     """Eight phases of noise scatter by 100 degrees, so that their mean seemed known to 30 or so."""
     known = []
     for seed in range(300):

@@ -29,7 +29,7 @@ def noise(count, share, seed=0):
 
 @settings(max_examples=30, deadline=None)
 @given(period=st.integers(1, 8), depth=st.floats(0.05, 0.5), seed=st.integers(0, 99))
-def test_a_motion_that_repeats_after_k_periods_has_period_k(period, depth, seed):
+def test_a_motion_repeating_after_k_periods_has_period_k(period, depth, seed):
     pattern = np.random.default_rng(seed).standard_normal(period)
     pattern[0] = np.abs(pattern).sum() + 3.0  # no shorter period, not even nearly and by chance
     signal = points(300, (0, depth * np.resize(pattern, 300))) + noise(300, 1e-3)
@@ -39,7 +39,7 @@ def test_a_motion_that_repeats_after_k_periods_has_period_k(period, depth, seed)
 
 
 @pytest.mark.parametrize("periods_of_decay", [20, 70, 200])
-def test_a_dying_transient_is_waited_for_until_it_is_small(periods_of_decay):
+def test_settling_waits_until_a_transient_has_decayed(periods_of_decay):
     decay = 0.5 * np.exp(-np.arange(3000) / periods_of_decay)
     turning = np.exp(0.3j * np.arange(3000))
     for transient in (decay, decay * turning):
@@ -67,7 +67,7 @@ def chaos(count, seed):
     return value - value.mean()
 
 
-def test_a_stationary_chaotic_motion_is_aperiodic_nineteen_times_of_twenty():
+def test_stationary_chaos_is_aperiodic_in_95_percent():
     verdicts = [
         judgement_of(points(400, (1, 0.4 * chaos(400, seed))), RULE).steadiness for seed in range(100)
     ]
@@ -75,7 +75,7 @@ def test_a_stationary_chaotic_motion_is_aperiodic_nineteen_times_of_twenty():
     assert Steadiness.PERIODIC not in verdicts
 
 
-def test_chaos_that_grows_or_drifts_is_not_settled():
+def test_growing_or_drifting_chaos_is_not_settled():
     growing = np.linspace(0.5, 1.5, 400)
     for seed in range(10):
         for motion in (0.4 * growing * chaos(400, seed), 0.4 * chaos(400, seed) + 0.6 * growing):
@@ -88,7 +88,7 @@ def test_a_quasi_periodic_motion_is_aperiodic():
     assert found.steadiness is Steadiness.APERIODIC
 
 
-def test_noise_of_the_channel_is_not_taken_for_chaos():
+def test_channel_noise_is_not_reported_as_chaos():
     loud = points(600) + noise(600, 0.05)
     assert judgement_of(loud, RULE).steadiness is Steadiness.APERIODIC
     found = judgement_of(loud, RULE, noise=0.05)
@@ -96,7 +96,7 @@ def test_noise_of_the_channel_is_not_taken_for_chaos():
     assert found.noise == pytest.approx(0.05, rel=0.01)
 
 
-def test_the_scatter_has_the_uncertainty_that_repetitions_show():
+def test_the_uncertainty_of_scatter_matches_repetitions():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
@@ -111,7 +111,7 @@ def test_too_few_periods_are_unsettled():
 @pytest.mark.parametrize(
     ("drives", "share", "period"), [(2, 0.1, 2), (3, 0.002, 3), (2, 0.0, 1), (3, 0.0, 1)]
 )
-def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drives, share, period):
+def test_periods_are_counted_in_drive_periods(drives, share, period):
     """Orders that are no multiples of the drive's tell whether the motion is as long as it was looked at."""
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
@@ -120,7 +120,7 @@ def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drive
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
-def test_a_single_order_that_wanders_is_checked_like_all_of_them(kept):
+def test_a_single_wandering_order_is_aperiodic(kept):
     """It keeps its statistics and does not repeat, by itself too."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))

@@ -23,12 +23,12 @@ def looked_at(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3, drives=1):
 
 
 @pytest.mark.parametrize("ppm", [-40.0, 0.0, 17.0])
-def test_the_drive_s_frequency_is_found_in_the_converter_s_time(ppm):
+def test_the_drive_frequency_is_measured_by_the_converter_clock(ppm):
     scope = looked_at(np.sin, ppm)
     assert scope.clock.frequency_hz == pytest.approx(NEAR_HZ * (1 + 1e-6 * ppm), rel=1e-9)
 
 
-def test_a_sine_in_phase_with_the_drive_is_real_and_a_later_one_turns_backwards():
+def test_a_delayed_sine_has_a_negative_phase():
     periods = looked_at(lambda angle: 3 * np.sin(angle)).periods()
     np.testing.assert_allclose(periods.response[:, 1], 3.0, atol=0.01)
     np.testing.assert_allclose(periods.response[FIRST_BLOCK:, 1], 3.0, atol=2e-4)
@@ -40,7 +40,7 @@ def test_no_period_is_lost_or_seen_twice_between_blocks():
     assert periods.count == int(12 * 0.2 * NEAR_HZ)
 
 
-def test_harmonics_and_mean_come_out_in_their_orders():
+def test_harmonics_and_mean_appear_in_their_orders():
     periods = looked_at(lambda a: 0.7 + np.sin(a) + 0.3 * np.sin(2 * a) + 0.1 * np.cos(4 * a)).periods()
     np.testing.assert_allclose(np.abs(periods.response.mean(axis=0)), [0.7, 1, 0.3, 0, 0.1], atol=1e-4)
 
@@ -54,7 +54,7 @@ def test_a_subharmonic_makes_periods_alternate():
 
 
 @pytest.mark.parametrize("drives", [2, 3])
-def test_a_motion_of_several_drives_has_one_row_for_all_of_them(drives):
+def test_a_motion_over_several_drive_periods_has_one_row(drives):
     motion = looked_at(lambda a: np.sin(a - 1) + 0.1 * np.sin(a / drives), drives=drives)
     periods = motion.periods()
     assert periods.count == int(12 * 0.2 * NEAR_HZ / drives)
@@ -66,7 +66,7 @@ def test_a_motion_of_several_drives_has_one_row_for_all_of_them(drives):
     np.testing.assert_allclose(turned, 1.0, atol=0.01)
 
 
-def test_the_noise_of_silence_is_what_it_makes_of_a_period():
+def test_noise_in_silence_equals_noise_per_period():
     noise = 1e-3 * np.random.default_rng(1).standard_normal(20_000)
     per_period = RATE_HZ / NEAR_HZ
     # Each order above the mean: variance 4 s^2 / n of a complex amplitude; the mean: s^2 / n.

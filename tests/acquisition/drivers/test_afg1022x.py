@@ -31,7 +31,7 @@ def largest_peak_v(states):
 
 
 class TestOpening:
-    def test_the_first_command_is_to_be_silent(self, plugged):
+    def test_the_first_command_switches_the_output_off(self, plugged):
         AFG1022X.open(plugged.config).close()
         assert plugged.log.messages[0] == "OUTP1:STAT OFF"
 
@@ -43,7 +43,7 @@ class TestOpening:
         assert generator.identity.reply.startswith("TEKTRONIX,AFG1022,")
         generator.close()
 
-    def test_whatever_it_was_before_it_is_a_quiet_sine_without_modes_afterwards(self, plugged):
+    def test_opening_resets_the_generator_to_a_quiet_sine(self, plugged):
         for message in (
             "SOUR1:VOLT 3VPP",
             "SOUR1:VOLT:OFFS 0.5",
@@ -59,7 +59,7 @@ class TestOpening:
         assert state.amplitude_vpp == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
         generator.close()
 
-    def test_old_complaints_do_not_keep_it_from_opening(self, plugged):
+    def test_old_errors_in_the_queue_do_not_prevent_opening(self, plugged):
         plugged.instrument.execute(b"NONSENSE")
         AFG1022X.open(plugged.config).close()
 
@@ -68,7 +68,7 @@ class TestOpening:
         with pytest.raises(InstrumentLost, match=r"NOBODY.*power and cable"):
             AFG1022X.open(config)
 
-    def test_another_instrument_is_named_and_left_alone(self, impostor):
+    def test_an_unknown_instrument_is_named_and_not_commanded(self, impostor):
         with pytest.raises(InstrumentError, match=r"AFG1062.*TEKTRONIX,AFG1022 is needed"):
             AFG1022X.open(impostor.config)
         assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
@@ -84,20 +84,20 @@ class TestLoad:
         assert math.isinf(plugged.instrument.settings(1).declared_load_ohm)
         assert generator.unconfirmed == ()
 
-    def test_a_load_that_only_the_panel_knows_is_for_the_operator_to_confirm(self, bus):
+    def test_an_unreadable_load_must_be_confirmed_by_the_operator(self, bus):
         plugged = bus.plug_in(Quirks(panel_load_ohm=math.inf))
         generator = AFG1022X.open(plugged.config)
         assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
         generator.close()
 
-    def test_a_load_that_is_wrong_at_the_panel_keeps_it_closed_and_states_what_to_do(self, panel_load):
+    def test_a_wrong_load_at_the_panel_is_refused_with_advice(self, panel_load):
         with pytest.raises(
             SettingRefused, match=r"expects a load of 50 ohm.*factor of two.*high-z on its panel"
         ):
             AFG1022X.open(panel_load.config)
         assert not panel_load.is_on
 
-    def test_a_load_that_is_right_at_the_panel_needs_no_confirmation(self, panel_load):
+    def test_a_right_load_at_the_panel_needs_no_confirmation(self, panel_load):
         generator = AFG1022X.open(panel_load.config.model_copy(update={"load_ohm": 50.0}))
         assert generator.unconfirmed == ()
         generator.close()
@@ -117,7 +117,7 @@ class TestPlaying:
         assert (generator.frequency_hz, generator.panel_vpp) == (266.2, 1.5)
         assert not plugged.is_on
 
-    def test_the_dialogue_is_the_manuals(self, plugged, generator):
+    def test_the_dialogue_follows_the_manual(self, plugged, generator):
         generator.load_sine(260.0, 1.5)
         generator.start()
         assert plugged.log.commands() == [
@@ -166,7 +166,7 @@ class TestPlaying:
         volts = (held / 8191.5 - 1) * plugged.instrument.settings(1).amplitude_vpp / 2
         assert volts == pytest.approx(values - values.mean(), abs=2 / 16383)
 
-    def test_from_one_thing_to_the_next_no_step_is_larger_than_the_larger_of_them(self, plugged, generator):
+    def test_changes_between_signals_have_no_overshoot(self, plugged, generator):
         generator.load_sine(20e6, 2.0)
         generator.start()
         for change in (
@@ -183,7 +183,7 @@ class TestPlaying:
             assert largest_peak_v(plugged.log.states) <= allowed + 1e-9
             assert plugged.is_on
 
-    def test_the_memory_never_changes_while_it_is_heard(self, plugged, generator):
+    def test_the_memory_is_never_changed_during_output(self, plugged, generator):
         generator.load_waveform(SINE, 1.0, 3.0)
         generator.start()
         plugged.log.forget()
@@ -234,16 +234,14 @@ class TestLimits:
             (lambda g: g.arm_burst(0), "0 cycles"),
         ],
     )
-    def test_anything_that_is_not_allowed_is_refused_before_anything_is_sent(
-        self, plugged, generator, act, complaint
-    ):
+    def test_invalid_settings_are_refused_before_sending(self, plugged, generator, act, complaint):
         generator.load_sine(100.0, 1.0)
         plugged.log.forget()
         with pytest.raises(LimitExceeded, match=complaint):
             act(generator)
         assert plugged.log.messages == []
 
-    def test_the_bench_allows_less_than_the_instrument_and_is_obeyed(self, plugged):
+    def test_limits_of_the_bench_override_those_of_the_instrument(self, plugged):
         generator = AFG1022X.open(plugged.config.model_copy(update={"amplitude_limit_vpp": 0.5}))
         generator.load_sine(100.0, 0.5)
         with pytest.raises(LimitExceeded, match=r"amplitude_limit_vpp = 0.5"):
@@ -252,7 +250,7 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_default_that_slipped_in_is_a_fault_and_silences(self, plugged, generator):
+    def test_a_silently_replaced_setting_is_a_fault_and_silences(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         # Somebody turns to 10 ohm at the panel: 10 Vpp is now out of range, and silently becomes 1 Vpp.
@@ -262,7 +260,7 @@ class TestFaults:
         assert not plugged.is_on
         assert "The output was switched off." in caught.value.__notes__
 
-    def test_a_complaint_is_a_fault_and_silences(self, bus):
+    def test_an_instrument_error_is_a_fault_and_silences(self, bus):
         plugged = bus.plug_in(Quirks(out_of_range_becomes_default=False))
         generator = AFG1022X.open(plugged.config)
         generator.load_sine(260.0, 0.1)
@@ -273,7 +271,7 @@ class TestFaults:
         assert not plugged.is_on
         generator.close()
 
-    def test_a_memory_that_reads_back_differently_is_a_fault(self, plugged, generator):
+    def test_a_memory_with_wrong_content_is_a_fault(self, plugged, generator):
         def spoil(message):
             if message.startswith(b"DATA:DATA EMEM"):
                 spoilt = plugged.instrument.memory.codes("EMEM").copy()
@@ -284,7 +282,7 @@ class TestFaults:
         with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):
             generator.load_waveform(SINE, 1.0, 0.1)
 
-    def test_a_spoilt_answer_is_an_error_and_silences(self, plugged, generator):
+    def test_a_corrupted_answer_is_an_error_and_silences(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         plugged.instrument.corrupt_next_reply()
@@ -321,7 +319,7 @@ class TestFaults:
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"):
             generator.stop()
 
-    def test_a_cable_that_was_out_for_a_moment_ends_in_silence(self, plugged, generator):
+    def test_a_short_disconnection_ends_in_silence(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         plugged.usb.pull_cable()
@@ -332,7 +330,7 @@ class TestFaults:
         generator.stop()
         assert not plugged.is_on
 
-    def test_closing_without_the_instrument_complains_and_a_later_stop_still_works(self, plugged, generator):
+    def test_closing_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         plugged.usb.pull_cable()
@@ -342,7 +340,7 @@ class TestFaults:
         generator.stop()
         assert not plugged.is_on
 
-    def test_closing_silences_and_what_comes_after_is_legal(self, plugged, generator):
+    def test_closing_silences_and_may_be_repeated(self, plugged, generator):
         generator.load_sine(260.0, 0.1)
         generator.start()
         generator.close()

@@ -23,20 +23,20 @@ def half_a_step(made):
 
 
 @given(waveforms)
-def test_what_the_codes_play_is_the_waveform_without_its_mean_within_half_a_step(values):
+def test_codes_reproduce_the_zero_mean_waveform_within_half_a_step(values):
     made = AFG1022_MODEL.codes(values)
     assert np.max(np.abs(achieved(made) - (values - values.mean()))) <= half_a_step(made) * (1 + 1e-9)
 
 
 @given(waveforms)
-def test_the_largest_magnitude_takes_an_outermost_code_and_none_is_beyond(values):
+def test_the_largest_magnitude_maps_to_the_outermost_code(values):
     codes = AFG1022_MODEL.codes(values).codes
     assert codes.min() == 0 or codes.max() == AFG1022_MODEL.top_code
     assert codes.max() <= AFG1022_MODEL.top_code
 
 
 @given(waveforms)
-def test_the_dc_that_is_left_is_less_than_half_a_step(values):
+def test_the_remaining_dc_is_below_half_a_step(values):
     made = AFG1022_MODEL.codes(values)
     assert abs(achieved(made).mean()) <= half_a_step(made) * (1 + 1e-9)
 
@@ -48,7 +48,7 @@ def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
     assert abs(achieved(made).mean()) < 1e-7
 
 
-def test_an_uneven_waveform_shows_by_how_much_the_panel_must_be_higher():
+def test_an_asymmetric_waveform_needs_a_larger_panel_amplitude():
     values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
     made = AFG1022_MODEL.codes(values)
     assert made.panel_factor == pytest.approx(0.96)
@@ -66,6 +66,6 @@ def test_an_uneven_waveform_shows_by_how_much_the_panel_must_be_higher():
         (np.full(8, 0.3), "constant"),
     ],
 )
-def test_what_the_memory_cannot_play_is_refused_before_anything_is_sent(values, complaint):
+def test_an_impossible_waveform_is_refused_before_sending(values, complaint):
     with pytest.raises(LimitExceeded, match=complaint):
         AFG1022_MODEL.codes(values)

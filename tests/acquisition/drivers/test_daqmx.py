@@ -86,7 +86,7 @@ class TestReading:
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
 
-    def test_the_rate_is_the_one_that_the_hardware_takes(self, rig, opened):
+    def test_the_reported_rate_is_the_rate_of_the_hardware(self, rig, opened):
         digitizer = opened(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
 
@@ -102,7 +102,7 @@ class TestReading:
         row = np.concatenate([digitizer.read(samples).volts[0] for samples in (7, 512, 1, 1000, 1000)])
         assert np.max(np.abs(row - sine_fit(row, 100.0))) < A_LOST_SAMPLE_V / 10
 
-    def test_a_read_longer_than_one_piece_is_whole(self, rig, virtual, opened):
+    def test_a_read_of_several_pieces_is_complete(self, rig, virtual, opened):
         digitizer = opened(with_daq(rig, buffer_s=0.2))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
         digitizer.start()
@@ -118,7 +118,7 @@ class TestReading:
         digitizer.start()
         assert digitizer.read(10).first_sample == 0
 
-    def test_the_volts_are_whole_counts_of_the_step_that_the_device_tells(self, digitizer):
+    def test_volts_are_multiples_of_the_device_step(self, digitizer):
         digitizer.start()
         block = digitizer.read(2000)
         for row, step_v in zip(block.volts, digitizer.volts_per_count, strict=True):
@@ -204,7 +204,7 @@ class TestConfiguration:
             (lambda rig: with_daq(rig, sample_rate_hz=1e6), ConfigurationError, r"does not support"),
         ],
     )
-    def test_what_the_device_cannot_do_is_reported_when_the_bench_opens(self, rig, change, kind, complaint):
+    def test_unsupported_settings_are_reported_when_the_bench_opens(self, rig, change, kind, complaint):
         with pytest.raises(kind, match=complaint):
             DaqmxDigitizer.open(change(rig))
         DaqmxDigitizer.open(rig).close()  # nothing stayed reserved
@@ -213,7 +213,7 @@ class TestConfiguration:
         with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
             DaqmxDigitizer.open(with_daq(configured, server="127.0.0.1:9"))
 
-    def test_no_driver_on_this_computer_is_stated_plainly(self, configured):
+    def test_a_missing_driver_is_reported(self, configured):
         with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver.*daq\.server"):
             DaqmxDigitizer.open(configured)
 
@@ -234,7 +234,7 @@ class TestFaults:
             (-200088, InstrumentLost, r"no longer knows the task"),
         ],
     )
-    def test_a_failed_read_states_what_happened_and_ends_the_run(
+    def test_a_failed_read_is_explained_and_ends_the_run(
         self, rig, virtual, digitizer, code, kind, complaint
     ):
         digitizer.start()
@@ -250,7 +250,7 @@ class TestFaults:
         assert digitizer.read(100).first_sample == 0
 
     @pytest.mark.parametrize("call", ["CreateAIVoltageChan", "CfgSampClkTiming", "TaskControl"])
-    def test_whatever_fails_while_opening_nothing_stays_reserved(self, rig, virtual, call):
+    def test_a_failure_during_opening_leaves_nothing_reserved(self, rig, virtual, call):
         virtual.faults.fail_daq(call, -50103)
         with pytest.raises(InstrumentBusy):
             DaqmxDigitizer.open(rig)

@@ -68,7 +68,7 @@ def tone(first, count, amplitude_v=1.0):
     return amplitude_v * np.sin(2 * np.pi * 100.0 * (first + np.arange(count)) / RATE_HZ)
 
 
-def test_anything_that_is_streamed_is_heard_from_the_first_sample_on_without_a_gap(digitizer, output):
+def test_the_stream_is_played_from_its_first_sample_without_gaps(digitizer, output):
     written = 0
     output.write(tone(0, 6400))
     written += 6400
@@ -88,7 +88,7 @@ def test_anything_that_is_streamed_is_heard_from_the_first_sample_on_without_a_g
     assert np.max(np.abs(drive_v[late] - basis @ fitted)) < NOISE_V
 
 
-def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output):
+def test_an_output_underflow_is_lost_data_and_ends_at_zero(digitizer, output):
     output.write(np.full(1280, 1.0))
     output.arm()
     digitizer.start()
@@ -102,17 +102,17 @@ def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output
 @pytest.mark.parametrize(
     ("device", "idle"), [("Dev1", IdleOutput.ZERO), ("Dev2", IdleOutput.HELD)], ids=["USB-4431", "USB-6211"]
 )
-def test_an_output_is_commanded_to_idle_at_zero_and_states_when_it_cannot(virtual, device, idle):
+def test_an_output_idles_at_zero_or_reports_that_it_cannot(virtual, device, idle):
     with nidaqmx.Task(grpc_options=daqmx_session(virtual.daq_address).options) as task:
         channel = task.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-2, max_val=2)
         assert _set_idle_output(channel) is idle
 
 
-def test_the_output_of_a_4431_goes_to_zero_by_itself(output):
+def test_the_output_of_a_4431_returns_to_zero_automatically(output):
     assert output.idle is IdleOutput.ZERO
 
 
-def test_stopping_goes_to_zero_at_once(digitizer, output):
+def test_stopping_an_output_sets_it_to_zero(digitizer, output):
     output.write(np.full(6400, 1.0))
     output.arm()
     digitizer.start()
@@ -194,9 +194,7 @@ def test_an_output_that_the_device_does_not_have_is_refused_in_one_sentence(
     opened_output(digitizer).close()  # nothing stayed reserved
 
 
-def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_reports_it(
-    digitizer, output, virtual
-):
+def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output, virtual):
     output.write(np.full(6400, 1.0))
     output.arm()
     digitizer.start()
@@ -209,7 +207,7 @@ def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_reports_
         digitizer.close()
 
 
-def test_the_driver_keeps_the_promises_of_an_analogue_output(output):
+def test_the_driver_keeps_the_contract_of_an_analogue_output(output):
     promised: AnalogOutput = output
     assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
     assert promised.identity.model == "USB-4431"

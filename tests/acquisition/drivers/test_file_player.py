@@ -81,7 +81,7 @@ def test_a_bench_that_does_not_fit_the_recording_is_refused(playing, daq, said):
 
 
 @pytest.mark.parametrize("change", ["samples", "seal"])
-def test_an_altered_recording_is_not_played_back_into_a_new_seal(playing, original, change):
+def test_an_altered_recording_is_not_played_back(playing, original, change):
     with h5py.File(original, "r+") as file:
         if change == "seal":
             del file["seal"]

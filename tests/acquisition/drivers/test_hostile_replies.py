@@ -50,7 +50,7 @@ class Hostile(Logged):
 
 @pytest.mark.parametrize("query", QUERIES)
 @pytest.mark.parametrize("name", REPLIES)
-def test_a_generator_with_hostile_replies_is_off_in_the_end(bus, name, query):
+def test_a_generator_with_hostile_replies_ends_switched_off(bus, name, query):
     plugged = bus.plug_in(listener=Hostile)
     generator = AFG1022X.open(plugged.config)
     generator.load_sine(100.0, 1.0)
@@ -103,7 +103,7 @@ def babbler():
         thread.join()
 
 
-def test_a_reply_without_end_is_an_error():
+def test_an_endless_reply_is_an_error():
     with babbler() as resource:
         instrument = ScpiInstrument(lambda: open_link(resource, "@py"), "the generator")
         try:
@@ -122,7 +122,7 @@ COUNTS = {
 
 @pytest.mark.parametrize("announced", [0, -1, 1])
 @pytest.mark.parametrize("sent", COUNTS)
-def test_another_number_of_samples_than_requested_is_an_error(rig, monkeypatch, sent, announced):
+def test_a_wrong_number_of_samples_is_an_error(rig, monkeypatch, sent, announced):
     usual = DATA_CALLS["ReadBinaryI32"]
 
     def read(system, request):
@@ -164,7 +164,7 @@ def test_an_overload_of_an_unknown_channel_is_an_error():
     assert len(str(refused.value)) < LONGEST_SENTENCE
 
 
-def test_a_scale_that_is_no_number_is_no_step():
+def test_a_non_numeric_scale_gives_no_step():
     assert linear_step_v([0.0, 1e-6, 0.0], 5.0) == 1e-6
     assert linear_step_v([0.0, 1e-6, float("nan")], 5.0) is None
     assert linear_step_v([float("nan"), 1e-6], 5.0) is None

@@ -22,7 +22,7 @@ def test_the_range_names_first_and_last_sample_of_the_run_inclusive(sign):
     assert ranges(row, first_sample=5000) == (Overload("m0_velocity", 5010, 5019),)
 
 
-def test_pauses_shorter_than_the_converter_needs_to_recover_do_not_end_a_range():
+def test_short_pauses_do_not_end_an_overload_range():
     row = np.zeros(1000)
     row[[100, 164, 300]] = 1.0
     assert ranges(row) == (Overload("m0_velocity", 100, 164), Overload("m0_velocity", 300, 300))

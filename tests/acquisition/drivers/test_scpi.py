@@ -61,7 +61,7 @@ def port(instrument, **options):
     return ScpiInstrument(lambda: instrument, "the generator", **options)
 
 
-def test_a_refused_command_names_itself_and_every_complaint():
+def test_an_error_names_the_refused_command_and_every_message():
     instrument = Instrument()
     instrument.errors.extend([b'-222,"Data out of range"\n', b'-102,"Syntax error"\n'])
     with pytest.raises(
@@ -71,13 +71,13 @@ def test_a_refused_command_names_itself_and_every_complaint():
     assert instrument.written == ["FREQ -1", "SYST:ERR?", "SYST:ERR?", "SYST:ERR?"]
 
 
-def test_a_command_without_complaint_leaves_an_empty_queue_behind():
+def test_a_successful_command_leaves_an_empty_error_queue():
     instrument = Instrument()
     assert port(instrument).send("FREQ 1") == ()
     assert instrument.written == ["FREQ 1", "SYST:ERR?"]
 
 
-def test_errors_without_end_are_an_error_and_no_endless_loop():
+def test_an_endless_error_queue_raises_an_error():
     instrument = Instrument()
     instrument.errors.extend([b'-102,"Syntax error"\n'] * 1000)
     with pytest.raises(InstrumentError, match=r"without end"):
@@ -98,7 +98,7 @@ def test_an_answer_outside_ascii_is_read_and_its_number_found():
 
 
 @pytest.mark.parametrize("reply", [b"\n", b"volts\n", b"\xff\xfe\n"])
-def test_an_answer_that_is_no_number_is_an_error_naming_question_and_answer(reply):
+def test_a_non_numeric_answer_raises_an_error_with_query_and_answer(reply):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [reply]
     with pytest.raises(InstrumentError, match=r"FREQ\?.*not a number"):
@@ -115,7 +115,7 @@ def test_a_timeout_is_an_error_that_states_how_long_was_waited():
 
 @pytest.mark.parametrize("death", [LOST, ValueError("[Errno 19] No such device"), OSError(errno.EIO, "I/O")])
 @pytest.mark.parametrize("act", ["command", "query", "query_codes"])
-def test_a_lost_device_is_lost_however_the_library_puts_it(death, act):
+def test_every_message_about_a_lost_device_is_recognised(death, act):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [b"1\n"]
     instrument.dies_with = death
@@ -123,7 +123,7 @@ def test_a_lost_device_is_lost_however_the_library_puts_it(death, act):
         getattr(port(instrument), act)("FREQ?")
 
 
-def test_an_interrupted_question_does_not_give_its_answer_to_the_next():
+def test_the_answer_to_an_interrupted_query_is_discarded():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [KeyboardInterrupt()]
     instrument.answers["VOLT?"] = [b"1.5\n"]
@@ -135,7 +135,7 @@ def test_an_interrupted_question_does_not_give_its_answer_to_the_next():
     assert instrument.timeout == 3000.0
 
 
-def test_a_question_after_a_timeout_waits_for_no_answer_that_never_came():
+def test_a_query_after_a_timeout_gets_its_own_answer():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [TIMEOUT, b"1000\n"]
     ours = port(instrument)
@@ -150,7 +150,7 @@ def test_codes_go_out_big_endian_in_a_block_of_known_length():
     assert instrument.written[0] == b"DATA:DATA EMEM,#16\x00\x00\x00\x0a\x3f\xff\n"
 
 
-def test_codes_come_back_even_when_a_byte_is_a_newline():
+def test_codes_with_newline_bytes_are_read():
     instrument = Instrument()
     instrument.answers["DATA:DATA? EMEM?"] = [b"#16\x00\x00\x00\x0a\x3f\xff\n"]
     assert port(instrument).query_codes("DATA:DATA? EMEM?").tolist() == [0, 10, 16383]
@@ -166,7 +166,7 @@ def test_a_broken_block_is_an_error(reply):
         port(instrument).query_codes("DATA?")
 
 
-def test_the_pause_that_an_instrument_needs_follows_every_command_and_no_question():
+def test_the_required_pause_follows_commands_only():
     pauses = []
     instrument = Instrument()
     port(instrument, settle_s=0.1, pause=pauses.append).command("FREQ 1")

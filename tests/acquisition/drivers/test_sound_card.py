@@ -72,7 +72,7 @@ def test_the_bench_passes_its_check(opened, tmp_path):
     ],
     ids=lambda each: each.kind,
 )
-def test_what_it_plays_is_recorded_without_a_gap_and_analysed(opened, tmp_path, excitation):
+def test_a_sound_card_records_its_output_without_gaps(opened, tmp_path, excitation):
     plan = Measurement(name="card", excitation=excitation, ramp_s=0.5, ramp_step_s=0.05)
     path = run_measurement(opened(), plan, tmp_path / "card.h5").path
     with open_recording(path) as recording:
@@ -112,7 +112,7 @@ def test_without_a_calibration_nothing_opens(card_rig, audio, missing):
         ({"range_v": 5.0}, "reaches 2 V"),
     ],
 )
-def test_what_no_card_can_do_is_refused(card_rig, audio, wrong, said):
+def test_unsupported_sound_card_settings_are_refused(card_rig, audio, wrong, said):
     rig = card_rig().model_copy(update={"virtual": None})
     first, *others = rig.daq.channels
     daq = rig.daq.model_copy(update={"channels": (first.model_copy(update=wrong), *others)})
@@ -120,14 +120,14 @@ def test_what_no_card_can_do_is_refused(card_rig, audio, wrong, said):
         open_bench(rig.model_copy(update={"daq": daq}), confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_a_card_that_is_not_there_is_reported(card_rig, audio):
+def test_a_missing_sound_card_is_reported(card_rig, audio):
     audio.plugged = False
     rig = card_rig().model_copy(update={"virtual": None})
     with pytest.raises(InstrumentLost, match="no sound card 'Simulated card'"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_samples_that_nobody_reads_in_time_are_lost_and_reported(opened, audio):
+def test_an_input_overflow_is_reported_as_lost_data(opened, audio):
     bench = opened()
     card = bench.digitizer.card
     card.most_waiting = 2000
@@ -138,7 +138,7 @@ def test_samples_that_nobody_reads_in_time_are_lost_and_reported(opened, audio):
         bench.digitizer.read(100)
 
 
-def test_an_output_that_nobody_feeds_runs_dry_and_reports_it(opened):
+def test_an_output_underflow_of_a_sound_card_is_reported(opened):
     bench = opened()
     bench.output.write(np.zeros(600))
     bench.output.arm()
@@ -150,15 +150,13 @@ def test_an_output_that_nobody_feeds_runs_dry_and_reports_it(opened):
 
 @pytest.mark.parametrize("name", ["input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
 @pytest.mark.parametrize("value", ["two", True, 0.0, -1.0])
-def test_a_calibration_that_is_no_number_above_zero_is_reported_before_anything_opens(
-    card_rig, audio, name, value
-):
+def test_an_invalid_calibration_is_refused_before_opening(card_rig, audio, name, value):
     rig = card_rig(**{name: value}).model_copy(update={"virtual": None})
     with pytest.raises(ConfigurationError, match=f"options.{name} = .* give a number above 0"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_an_output_that_no_card_has_is_reported_as_that(card_rig, audio):
+def test_a_missing_output_of_a_card_is_reported(card_rig, audio):
     rig = card_rig().model_copy(update={"virtual": None})
     output = rig.daq.output.model_copy(update={"physical": "out1"})
     rig = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
@@ -166,7 +164,7 @@ def test_an_output_that_no_card_has_is_reported_as_that(card_rig, audio):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_what_nobody_reads_is_kept_for_the_time_of_the_buffer_only(card_rig, audio):
+def test_unread_samples_are_kept_for_the_buffer_time_only(card_rig, audio):
     rig = card_rig()
     card = _Card(rig, (0, 1, 2, 3), 0)
     heard, fine = np.zeros((4800, 4), dtype=np.float32), SimpleNamespace(input_overflow=False)

@@ -132,7 +132,7 @@ class TestTheJob:
             ).physical_per_volt
         np.testing.assert_allclose(newest_samples.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
-    def test_a_mark_stands_at_its_sample(self, client, shipped_rig, tmp_path):
+    def test_a_mark_is_stored_with_its_sample(self, client, shipped_rig, tmp_path):
         before = running(client, shipped_rig, tmp_path).samples
         client.mark("the sphere was heard")
         client.stop(StopLevel.ABORT)
@@ -159,7 +159,7 @@ class TestTheJob:
 
 
 class TestACheckIsStopped:
-    def test_by_anyone_who_requests_it(self, client, shipped_rig, tmp_path):
+    def test_any_client_can_stop_a_check(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         client.check(tmp_path)
@@ -168,7 +168,7 @@ class TestACheckIsStopped:
         assert status.check is None
         assert "the bench check was stopped: smoke in the laboratory" in status.messages[-1].what
 
-    def test_when_nobody_looks(self, client, shared_engine, shipped_rig, tmp_path):
+    def test_a_check_without_attendance_is_stopped(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
         client.open(shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
         until_state(client, EngineState.READY)
@@ -181,7 +181,7 @@ class TestACheckIsStopped:
             "the bench check was stopped",
         ]
 
-    def test_and_the_campaign_that_requested_it_begins_nothing(self, client, shipped_rig, tmp_path):
+    def test_a_stopped_check_prevents_its_campaign(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
@@ -222,12 +222,12 @@ class TestRefusals:
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
             client.arm(campaign("run"), tmp_path)
 
-    def test_nobody_is_let_in_without_the_token(self, shared_engine):
+    def test_a_connection_without_token_is_refused(self, shared_engine):
         address = shared_engine.address
         with pytest.raises(EngineError, match="the connection was closed"):
             EngineClient.attach(address.model_copy(update={"token": "guessed"}))
 
-    def test_it_listens_on_loopback_only(self, shared_engine):
+    def test_the_engine_listens_on_loopback_only(self, shared_engine):
         address = shared_engine.address
         assert address.host == "127.0.0.1"
         others = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
@@ -238,9 +238,7 @@ class TestRefusals:
     @pytest.mark.parametrize(
         "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
     )
-    def test_anything_that_is_no_message_closes_the_connection_and_harms_nobody(
-        self, client, shared_engine, said
-    ):
+    def test_an_invalid_message_closes_only_its_connection(self, client, shared_engine, said):
         at = shared_engine.address
         with socket.create_connection((at.host, at.port), 5.0) as stranger:
             stranger.sendall(said)
@@ -274,9 +272,7 @@ class TestRefusals:
             mine.close()
 
 
-def test_a_long_campaign_is_armed_although_its_limits_take_longer_than_an_answer_may(
-    shared_engine, client, shipped_rig, tmp_path
-):
+def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, client, shipped_rig, tmp_path):
     """On a busy computer sixty sweeps took more than the five seconds of any answer; the window gave up."""
     client.open(shipped_rig)
     until_state(client, EngineState.READY)
@@ -310,9 +306,7 @@ class TestNobodyLooks:
         assert "unattended" in told.next_step
 
     @pytest.mark.thorough
-    def test_a_drive_far_from_its_limits_is_given_the_patience_that_was_granted(
-        self, client, shipped_rig, tmp_path
-    ):
+    def test_a_drive_far_from_its_limits_gets_the_granted_patience(self, client, shipped_rig, tmp_path):
         """And one at its limits half a second, whatever was granted."""
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
@@ -330,9 +324,7 @@ class TestNobodyLooks:
         until(client, lambda status: status.samples > samples + 50_000)
 
     @pytest.mark.thorough
-    def test_a_campaign_that_is_left_alone_continues_when_its_window_is_gone(
-        self, engine, shipped_rig, tmp_path
-    ):
+    def test_an_unattended_campaign_continues_without_its_window(self, engine, shipped_rig, tmp_path):
         """The engine is attended; this campaign is not, and the engine ends after it."""
         process = engine()
         process.client.open(shipped_rig)
@@ -351,7 +343,7 @@ class TestNobodyLooks:
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
     @pytest.mark.thorough
-    def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(
+    def test_a_frozen_engine_does_not_report_its_viewer_as_missing(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         before = running(client, shipped_rig, tmp_path).samples
@@ -360,7 +352,7 @@ class TestNobodyLooks:
         until(client, lambda status: status.samples > before + 100_000)
 
     @pytest.mark.thorough
-    def test_a_frozen_viewer_does_not_hold_the_engine_up(self, engine, shipped_rig, tmp_path):
+    def test_a_frozen_viewer_does_not_block_the_engine(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
         running(client, shipped_rig, tmp_path)
@@ -421,7 +413,7 @@ class TestNobodyLooks:
 
 class TestItsEnd:
     @pytest.mark.thorough
-    def test_an_unattended_engine_that_was_never_used_ends_when_it_is_forgotten(self):
+    def test_an_unused_unattended_engine_ends_after_a_timeout(self):
         arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
         with subprocess.Popen(
             [sys.executable, "-m", "vibench.acquisition.engine", *arguments],

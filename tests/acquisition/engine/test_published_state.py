@@ -36,7 +36,7 @@ def published(tmp_path):
     return published
 
 
-def test_another_attempt_at_a_point_is_another_run(published, tmp_path):
+def test_a_repeated_attempt_is_a_new_run(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
     first = published.status()
@@ -50,7 +50,7 @@ def test_another_attempt_at_a_point_is_another_run(published, tmp_path):
     )
 
 
-def test_the_rows_have_another_number_only_when_one_of_them_has_changed(published, tmp_path):
+def test_the_version_of_the_rows_changes_only_with_a_row(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     running = published.status().rows_number
     published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
@@ -62,7 +62,7 @@ def test_the_rows_have_another_number_only_when_one_of_them_has_changed(publishe
     assert [row.state for row in published.status().rows] == ["recorded"]
 
 
-def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(published, tmp_path):
+def test_a_vanished_folder_does_not_end_the_run_by_itself(published, tmp_path):
     gone = tmp_path / "gone"
     published.begin(campaign("point"), gone)
     published.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
@@ -70,7 +70,7 @@ def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(publishe
     assert published.status().disk_free_bytes == 0
 
 
-def test_what_an_earlier_run_has_made_counts_as_done(published, tmp_path):
+def test_points_of_an_earlier_run_count_as_done(published, tmp_path):
     twice = campaign("made", "point")
     published.begin(twice, tmp_path)
     published.note_result(
@@ -81,7 +81,7 @@ def test_what_an_earlier_run_has_made_counts_as_done(published, tmp_path):
     assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)
 
 
-def test_a_folder_that_hangs_holds_up_no_run(published, tmp_path, monkeypatch):
+def test_a_hanging_folder_does_not_block_a_run(published, tmp_path, monkeypatch):
     is_back = Event()
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: is_back.wait() and SimpleNamespace(free=7))
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)

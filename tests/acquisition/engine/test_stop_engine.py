@@ -45,19 +45,19 @@ def driving(tmp_path, monkeypatch):
     DRIVES_ON.confirm_silence(engine)
 
 
-def test_where_a_run_hangs_with_the_drive_on_a_stop_is_not_called_done(driving):
+def test_a_stop_is_not_confirmed_while_a_run_hangs_with_the_drive_on(driving):
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.UNHEEDED
     assert driving.switch.request.level is StopLevel.ABORT
 
 
 @pytest.mark.parametrize("state", [EngineState.RAMPING_DOWN, EngineState.READY, EngineState.FAULT])
-def test_a_run_that_ends_has_heeded_it(driving, state):
+def test_a_stop_is_confirmed_when_the_run_ends(driving, state):
     driving.published.enter(state)
     DRIVES_ON.confirm_silence(driving)
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
 
 
-def test_before_the_first_run_of_a_campaign_nothing_plays(driving, tmp_path):
+def test_a_stop_before_the_first_run_is_confirmed_at_once(driving, tmp_path):
     driving.published.begin(campaign("point"), tmp_path)
     DRIVES_ON.confirm_silence(driving)
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD

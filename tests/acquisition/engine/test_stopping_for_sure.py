@@ -119,7 +119,7 @@ def ended_by(tmp_path, reason):
 
 class TestAStallDoesNotMakeAnEngineUnstoppable:
     @pytest.mark.thorough
-    def test_a_stop_during_it_is_kept_and_obeyed_when_the_engine_comes_back(self, running, tmp_path):
+    def test_a_stop_during_a_stall_is_carried_out_afterwards(self, running, tmp_path):
         with frozen(running.pid):
             told = the_engine(None)
             assert told.pid == running.pid
@@ -129,7 +129,7 @@ class TestAStallDoesNotMakeAnEngineUnstoppable:
         assert list(engines_folder().glob("*.stop-*")) == []
 
     @pytest.mark.thorough
-    def test_a_stop_after_it_finds_the_engine(self, running, tmp_path):
+    def test_a_stop_after_a_stall_reaches_the_engine(self, running, tmp_path):
         with frozen(running.pid), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
             EngineClient.attach(running.address, patience_s=0.3)
         assert stop_engine(the_engine(running.pid), "abort", "afterwards") is StopDelivery.TOLD
@@ -137,7 +137,7 @@ class TestAStallDoesNotMakeAnEngineUnstoppable:
 
 
 class TestConnectionsWithoutATokenKeepNobodyOut:
-    def test_two_thousand_of_them_leave_a_stop_its_way(self, running, tmp_path):
+    def test_two_thousand_idle_connections_do_not_block_a_stop(self, running, tmp_path):
         before = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
         with connections(running.address, 2000):
             assert stop_engine(the_engine(None), StopLevel.ABORT, "in spite of all") in StopDelivery
@@ -145,7 +145,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
             now = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
             assert now <= before + WAITING_MOST + VIEWERS_MOST
 
-    def test_what_they_declare_costs_no_memory(self, process):
+    def test_declared_message_sizes_reserve_no_memory(self, process):
         process.client.status()
         before = resident_bytes(process.pid)
         with connections(process.address, 150, HEAD.pack(MAGIC, 32_000_000, 64_000_000) + bytes(8000)):
@@ -153,7 +153,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                 EngineClient.attach(process.address).close()
             assert resident_bytes(process.pid) - before < 20e6
 
-    def test_a_slow_one_has_one_deadline_for_all_that_it_states(self, process):
+    def test_a_slow_connection_has_one_deadline_for_its_message(self, process):
         at = process.address
         with socket.create_connection((at.host, at.port)) as slow:
             slow.sendall(HEAD.pack(MAGIC, 900, 0))
@@ -171,7 +171,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                     break
             assert GREETING_S * 0.9 < time.monotonic() - began_s < GREETING_S * 1.5
 
-    def test_with_one_viewer_too_many_the_quietest_goes(self, process):
+    def test_too_many_viewers_disconnect_the_least_active_one(self, process):
         with ExitStack() as viewers:
             attached = [
                 viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)
@@ -188,7 +188,7 @@ class TestNoDescriptorIsLeft:
             assert stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors") in StopDelivery
             ended_by(tmp_path, "no descriptors")
 
-    def test_a_stop_is_obeyed_that_was_only_put_down(self, running, tmp_path):
+    def test_a_stop_written_as_a_file_is_carried_out(self, running, tmp_path):
         with without_descriptors(running):
             write_stop_file(
                 stop_path(str(engines_folder()), running.pid, process_start(running.pid), "abort"), "put down"
@@ -197,7 +197,7 @@ class TestNoDescriptorIsLeft:
 
 
 class TestAFolderIsRemoved:
-    def test_the_engine_reports_it_and_continues(self, running, tmp_path):
+    def test_the_engine_reports_a_removed_folder_and_continues(self, running, tmp_path):
         shutil.rmtree(tmp_path)
         told = until_state(running.client, EngineState.READY).messages[-1]
         assert told.kind is MessageKind.FAULT
@@ -209,7 +209,7 @@ def resident_bytes(pid):
 
 
 class TestAnnouncements:
-    def test_one_whose_number_was_given_to_another_process_is_swept_away(self, process):
+    def test_an_announcement_with_a_reused_process_number_is_removed(self, process):
         told = the_engine(process.pid)
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
             taken = told.model_copy(update={"pid": other.pid, "process_start": "1"})
@@ -219,7 +219,7 @@ class TestAnnouncements:
             assert not path.exists()
             other.stdin.close()
 
-    def test_one_of_another_computer_is_left_alone(self, process):
+    def test_announcements_of_another_computer_are_kept(self, process):
         told = the_engine(process.pid)
         path = engines_folder() / "4.json"
         path.write_text(told.model_copy(update={"pid": 4, "computer": "elsewhere"}).model_dump_json())

@@ -37,16 +37,16 @@ def handler() -> RequestHandler:
     return RequestHandler(engine, JobQueue(engine))
 
 
-def test_the_words_on_the_wire_stay():
+def test_protocol_words_are_unchanged():
     assert set(VERBS) == WORDS
 
 
-def test_anything_that_ends_or_shows_a_run_is_permitted_in_every_state():
+def test_stopping_and_viewing_are_allowed_in_every_state():
     assert {word for word, verb in VERBS.items() if verb.states} == RESTRICTED
 
 
 @pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS.keys())
-def test_handler_and_client_take_what_the_request_holds(verb):
+def test_handler_and_client_have_the_parameters_of_the_request(verb):
     asked = [name for name in verb.request.model_fields if name != "ask"]
     for owner in (EngineClient, RequestHandler):
         _, *parameters = inspect.signature(getattr(owner, verb.method)).parameters
@@ -62,7 +62,7 @@ def test_a_state_that_does_not_permit_a_verb_refuses_it(handler, word):
         handler.carry_out(verb, arguments)
 
 
-def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
+def test_a_closing_bench_refuses_requests(shipped_rig):
     """To arm between the wish to close and the deed ended the connection of whoever asked."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
@@ -81,7 +81,7 @@ def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
     jobs.run()
 
 
-def test_anyone_who_sees_a_bench_closed_may_open_it_at_once(shipped_rig):
+def test_a_closed_bench_can_be_opened_at_once(shipped_rig):
     """The closing thread shows the state a moment before it is done, and opening was refused in between."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
@@ -113,7 +113,7 @@ def looked_after_until(handler, is_over):
         handler.enforce_deadlines()
 
 
-def test_anyone_who_arms_has_the_time_to_start(shipped_rig, tmp_path):
+def test_an_armed_run_has_time_to_be_started(shipped_rig, tmp_path):
     """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
     engine = Engine(Supervision.ATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
@@ -151,7 +151,7 @@ class MetByAnother(Engine):
         self._switch = switch
 
 
-def test_a_stop_that_meets_a_start_stops_what_begins(tmp_path):
+def test_a_stop_concurrent_with_a_start_stops_the_run(tmp_path):
     engine = MetByAnother(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     engine.published.enter(EngineState.READY)
@@ -161,7 +161,7 @@ def test_a_stop_that_meets_a_start_stops_what_begins(tmp_path):
     assert engine.switch.request.reason == "smoke"
 
 
-def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
+def test_a_stop_concurrent_with_arming_is_kept(shipped_rig, tmp_path):
     """A long campaign was armed after the stop, and started."""
     engine = MetByAnother(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
@@ -186,18 +186,18 @@ def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
         ('{"ask": "beat", "loud": true}', "beat.loud"),
     ],
 )
-def test_a_request_that_is_not_understood_does_nothing_and_states_where(handler, request_text, where):
+def test_an_invalid_request_changes_nothing_and_names_the_error(handler, request_text, where):
     answer = json.loads(answer_to(handler, Message(request_text.encode())).text)
     assert where in answer["refused"]
     assert "nothing was done" in answer["refused"]
 
 
-def test_a_word_that_is_none_is_refused_before_it_is_sent():
+def test_an_unknown_word_is_refused_before_sending():
     with pytest.raises(ConfigurationError, match=r"a request to stop: level .*'ramp'"):
         VERBS["stop"].message(level="gently")
 
 
-def test_a_request_and_its_answer_are_what_they_were_on_the_wire(handler):
+def test_requests_and_answers_round_trip(handler):
     assert VERBS["look"].message(most=3).text == b'{"ask":"look","since_sample":0,"most":3}'
     assert VERBS["stop"].message(level="ramp").text == (
         b'{"ask":"stop","level":"ramp","reason":"stopped by the operator"}'

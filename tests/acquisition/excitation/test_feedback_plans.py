@@ -67,7 +67,7 @@ def test_a_held_sweep_passes_the_frequencies_of_an_open_one():
     assert len({id(step.segment) for step in held.steps()}) == 1, "one segment is recorded, not one a step"
 
 
-def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
+def test_acceleration_of_a_displacement_grows_with_frequency_squared():
     level = BaseLevel(displacement_m=2e-6)
     assert level.acceleration_at(260) == pytest.approx(2e-6 * (2 * np.pi * 260) ** 2)
     assert level.acceleration_at(520) == pytest.approx(4 * level.acceleration_at(260))
@@ -108,7 +108,7 @@ def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
         (lambda: HeldDwell(amplitude_vpp=1, frequency_hz=260, duration_s=1), "base_level"),
     ],
 )
-def test_a_plan_that_means_nothing_is_refused(broken, sentence):
+def test_a_contradictory_feedback_plan_is_refused(broken, sentence):
     with pytest.raises(ValidationError, match=sentence):
         broken()
 
@@ -145,9 +145,7 @@ MODE = "start_hz = 95\nlow_hz = 90\nhigh_hz = 99\n"
         ("held_noise", BAND, CORNER, "1e+300", f"{LESS} 100000"),
     ],
 )  # fmt: skip
-def test_a_held_level_that_no_base_reaches_is_refused_when_its_file_is_read(
-    kind, rest, key, given, allowed, tmp_path
-):
+def test_an_unreachable_level_is_refused_when_the_file_is_read(kind, rest, key, given, allowed, tmp_path):
     path = tmp_path / "held.toml"
     path.write_text(HELD.format(f'kind = "{kind}"\n{rest}{key.format(given)}\n'))
     with pytest.raises(ConfigurationError) as refused:
@@ -156,5 +154,5 @@ def test_a_held_level_that_no_base_reaches_is_refused_when_its_file_is_read(
 
 
 @pytest.mark.parametrize("displacement_m", [1e-15, 2e-6, 1.0])
-def test_a_level_that_a_base_may_have_is_taken(displacement_m):
+def test_a_reachable_level_is_accepted(displacement_m):
     assert BaseLevel(displacement_m=displacement_m).acceleration_at(1.0) > 0.0

@@ -62,7 +62,7 @@ by_kind = {each.kind: each for each in EXAMPLES}
 every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
 
 
-def test_the_union_and_the_rows_name_the_same_plans_in_the_same_order():
+def test_the_union_and_the_registry_list_the_same_plans():
     union = get_args(Excitation)[0]
     assert get_args(union) == tuple(kind.plan for kind in EXCITATION_KINDS.values())
     assert list(EXCITATION_KINDS) == list(by_kind)
@@ -77,21 +77,21 @@ def test_white_noise_is_read_by_its_name_and_by_the_name_of_version_0_1(word):
 
 
 @every_kind
-def test_every_segment_that_is_recorded_is_one_that_results_are_taken_from_or_the_way_there(excitation):
+def test_every_recorded_segment_is_a_result_or_a_lead_in(excitation):
     labels = {step.segment.label for step in excitation.steps()}
     assert labels - {SegmentLabel.LEAD_IN} <= set(excitation.result_labels)
     assert excitation.family in Family
 
 
 @every_kind
-def test_the_band_holds_what_is_played(excitation):
+def test_the_band_contains_all_played_frequencies(excitation):
     low_hz, high_hz = excitation.band_hz
     tones = [step.play.frequency_hz for step in excitation.steps() if hasattr(step.play, "frequency_hz")]
     assert low_hz < high_hz
     assert all(low_hz <= each <= high_hz for each in (*tones, excitation.highest_frequency_hz))
 
 
-def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
+def test_a_resonance_search_covers_the_whole_range():
     assert by_kind["resonance_tracking"].band_hz == (240, 290)
 
 
@@ -114,7 +114,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
         ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
-def test_a_kind_states_what_decides_the_motion_of_the_base(kind, level):
+def test_each_kind_declares_what_sets_the_base_motion(kind, level):
     assert by_kind[kind].level_at(250.0) == level
 
 
@@ -134,14 +134,14 @@ def test_a_settled_sine_without_a_level_plays_its_setting():
         ("resonance_tracking", "resonance tracking, base held at 0.6 m/s², 0.3 m/s², at most 1 Vpp"),
     ],
 )
-def test_words_of_a_plan_name_the_level_that_it_holds(kind, said):
+def test_the_description_of_a_plan_names_its_held_level(kind, said):
     assert excitation_text(by_kind[kind]) == said
 
 
 @pytest.mark.parametrize(
     "kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine", "held_response"]
 )
-def test_anything_that_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_to(kind):
+def test_sweeps_reach_frequencies_from_the_requested_side(kind):
     for direction, approach in ((Direction.UP, Approach.UP), (Direction.DOWN, Approach.DOWN)):
         turned = by_kind[kind].turned(direction)
         assert turned.approach is approach
@@ -149,17 +149,17 @@ def test_anything_that_goes_through_frequencies_comes_to_each_from_the_side_it_i
 
 
 @pytest.mark.parametrize("kind", ["dwell", "held_dwell", "white_noise", "resonance_tracking"])
-def test_anything_that_has_no_direction_cannot_be_turned(kind):
+def test_kinds_without_direction_cannot_be_reversed(kind):
     assert by_kind[kind].turned(Direction.UP) is None
     assert by_kind[kind].approach is Approach.REST
 
 
-def test_levels_go_the_way_that_they_are_turned_to():
+def test_level_steps_follow_the_requested_direction():
     falling = by_kind["stepped_level"].turned(Direction.DOWN)
     assert [step.play.level for step in falling.steps()] == [1.0, 0.75, 0.5]
 
 
-def test_only_a_dwell_is_led_and_it_adds_its_tone_to_the_way():
+def test_only_a_dwell_has_a_lead_in_of_tones():
     assert [kind for kind, each in by_kind.items() if each.led(WAY, 0.5) is not None] == ["dwell"]
     led, tone = by_kind["dwell"].led(WAY, 0.25)
     assert (led.lead_in, led.lead_in_s) == (WAY, 0.25)

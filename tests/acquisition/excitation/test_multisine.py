@@ -47,7 +47,7 @@ def test_the_mean_of_a_period_is_zero():
     assert abs(np.mean(values)) < 1e-15
 
 
-def test_realisations_share_their_rms_and_the_sharpest_reaches_full_range():
+def test_realisations_have_equal_rms_and_the_peakiest_uses_full_range():
     periods = flat_periods(BAND, realisations=6, seed=5)
     rms = [np.sqrt(np.mean(np.square(period))) for period in periods]
     peaks = [np.max(np.abs(period)) for period in periods]
@@ -56,7 +56,7 @@ def test_realisations_share_their_rms_and_the_sharpest_reaches_full_range():
     assert max(peaks) == pytest.approx(1.0, rel=1e-15)
 
 
-def test_a_plan_that_is_asked_again_makes_its_waveforms_only_once():
+def test_waveforms_of_a_plan_are_cached():
     first, again = (flat_periods(BAND, realisations=2, seed=5) for _ in range(2))
     assert all(one is other for one, other in zip(first, again, strict=True))
     with pytest.raises(ValueError, match="read-only"):
@@ -76,7 +76,7 @@ def test_the_same_seed_gives_the_same_period_and_another_seed_another():
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
 
 
-def test_more_realisations_leave_the_phases_of_the_first_as_they_were():
+def test_more_realisations_keep_the_phases_of_the_first_ones():
     alone = flat_periods(BAND, 1, seed=7)[0]
     among = flat_periods(BAND, 4, seed=7)[0]
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
@@ -124,7 +124,7 @@ def test_no_value_ever_leaves_the_range(seed, first, count):
         assert np.max(np.abs(values)) <= 1.0
 
 
-def test_the_first_image_lies_where_the_hold_leaves_it():
+def test_the_first_image_matches_the_zero_order_hold():
     (values,) = flat_periods(np.array([1000]), 1, seed=1)
     lines = np.abs(held_lines(values, spans=4))
     # -17.1 dB at 7192 Hz for 1000 Hz out of 8192 points a second (the hold's gain over itself).

@@ -41,15 +41,15 @@ def plan(request):
     return request.param
 
 
-def test_a_plan_comes_back_from_json_as_it_was(plan):
+def test_a_plan_round_trips_through_json(plan):
     assert ANY.validate_json(ANY.dump_json(plan)) == plan
 
 
-def test_the_steps_take_the_time_the_plan_says(plan):
+def test_the_steps_add_up_to_the_duration_of_the_plan(plan):
     assert sum(step.duration_s for step in plan.steps()) == pytest.approx(plan.playing_s, rel=1e-12)
 
 
-def test_the_steps_are_the_same_at_every_listing(plan):
+def test_the_steps_are_reproducible(plan):
     first, second = list(plan.steps()), list(plan.steps())
     assert [step.segment for step in first] == [step.segment for step in second]
     assert [(step.settle_s, step.record_s) for step in first] == [
@@ -57,7 +57,7 @@ def test_the_steps_are_the_same_at_every_listing(plan):
     ]
 
 
-def test_a_preview_reaches_no_further_than_half_the_amplitude_setting(plan):
+def test_a_preview_stays_within_half_the_peak_to_peak_setting(plan):
     shown = plan.preview(4096.0)
     assert shown.peak_v <= plan.amplitude_vpp / 2 * (1 + 1e-12)
     assert shown.peak_v == pytest.approx(np.max(np.abs(shown.volts)))
@@ -74,7 +74,7 @@ def test_a_preview_keeps_the_energy(plan):
     assert np.sqrt(mean_square) == pytest.approx(shown.rms_v, rel=1e-3)
 
 
-def test_a_preview_that_cannot_show_the_plan_says_which_rate_can(plan):
+def test_a_preview_at_too_low_a_rate_names_the_required_rate(plan):
     with pytest.raises(ValueError, match=f"ask for more than {2 * plan.highest_frequency_hz:g}"):
         plan.preview(1.9 * plan.highest_frequency_hz)
 
@@ -134,7 +134,7 @@ def test_an_unknown_key_is_refused():
         ),
     ],
 )
-def test_a_plan_that_cannot_be_played_states_what_can(kind, fields, sentence):
+def test_an_unplayable_plan_names_the_allowed_values(kind, fields, sentence):
     with pytest.raises(ValidationError) as refused:
         kind(amplitude_vpp=1.0, **fields)
     assert sentence in str(refused.value)
@@ -201,7 +201,7 @@ def test_a_stepped_sweep_keeps_the_phase_of_the_ideal_one_at_the_end_of_every_st
     assert elapsed_s == pytest.approx(sweep.duration_s, rel=1e-9)
 
 
-def test_a_linear_sweep_has_half_the_sum_of_its_ends_as_mean_frequency():
+def test_the_mean_frequency_of_a_linear_sweep_is_the_mean_of_its_ends():
     sweep = SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=200)
     assert sweep.cycles(200.0) == pytest.approx(250.0 * 200.0, rel=1e-14)
 
@@ -247,7 +247,7 @@ def test_the_phase_is_continuous_from_one_tone_to_the_next():
     assert np.max(np.abs(np.diff(shown.volts))) <= 2 * np.pi * 140 / 51200
 
 
-def test_the_paper_s_sweep_keeps_its_whole_number_of_steps():
+def test_the_sweep_of_the_paper_has_a_whole_number_of_steps():
     steps = list(SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=200, step_s=0.1).steps())
     assert len(steps) == 2000
 
@@ -271,7 +271,7 @@ class TestStreamedNoise:
 
     @settings(max_examples=30, deadline=None)
     @given(first=st.integers(0, 50_000), count=st.integers(1, 3000), cut=st.floats(0, 1))
-    def test_the_same_samples_come_in_blocks_of_any_size(self, first, count, cut):
+    def test_streamed_noise_does_not_depend_on_the_block_size(self, first, count, cut):
         source = self.PLAN.source
         middle = round(cut * count)
         whole = source.samples(first, count, self.RATE)

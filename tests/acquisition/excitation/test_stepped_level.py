@@ -45,7 +45,7 @@ def test_the_level_changes_without_a_ramp_and_without_a_break_in_phase():
     assert preview.duration_s == plan().playing_s == 16 * 0.75
 
 
-def test_limits_know_the_highest_level_before_anything_moves():
+def test_limits_are_checked_at_the_highest_level():
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
     with pytest.raises(LimitExceeded):
@@ -72,6 +72,6 @@ def test_limits_know_the_highest_level_before_anything_moves():
         ({"lowest_vpp": 0}, "greater than 0"),
     ],
 )
-def test_anything_that_makes_no_levels_is_refused_with_what_is_allowed(changed, said):
+def test_invalid_levels_are_refused_with_the_allowed_values(changed, said):
     with pytest.raises(ValidationError, match=said):
         plan(**changed)

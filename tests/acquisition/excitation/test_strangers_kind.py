@@ -72,7 +72,7 @@ def vibench(folder, *arguments):
 
 
 @pytest.mark.thorough
-def test_it_is_planned_measured_and_reported_by_its_family(tmp_path):
+def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
     offer(tmp_path, "two_tones:TwoTones")
     measured = vibench(tmp_path, "measure", "two.toml", "--out", "two")
     assert measured.returncode == 0, measured.stderr
@@ -90,7 +90,7 @@ def test_it_is_planned_measured_and_reported_by_its_family(tmp_path):
         ("two_tones:Segment", "no plan with that kind alone"),
     ],
 )
-def test_one_that_cannot_be_used_costs_its_own_plans_only(tmp_path, target, reason):
+def test_a_broken_third_party_kind_affects_only_its_own_plans(tmp_path, target, reason):
     offer(tmp_path, target)
     refused = vibench(tmp_path, "measure", "two.toml", "--out", "two", "--estimate")
     assert refused.returncode == 1

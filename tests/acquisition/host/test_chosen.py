@@ -7,7 +7,7 @@ from vibench.acquisition.campaign import ExistingRecordings, list_recordings
 from vibench.acquisition.host.chosen import chosen
 
 
-def test_a_member_and_its_word_are_the_same_choice():
+def test_an_enum_member_and_its_word_are_equivalent():
     assert chosen(ExistingRecordings, "resume") is ExistingRecordings.RESUME
     assert chosen(ExistingRecordings, ExistingRecordings.RESUME) is ExistingRecordings.RESUME
 
@@ -29,7 +29,7 @@ def test_a_member_and_its_word_are_the_same_choice():
         ),
     ],
 )
-def test_a_wrong_word_is_answered_by_those_that_are_allowed(tmp_path, asked, sentence):
+def test_a_wrong_word_is_refused_with_the_allowed_words(tmp_path, asked, sentence):
     with pytest.raises(ConfigurationError, match=sentence):
         asked(tmp_path)
 

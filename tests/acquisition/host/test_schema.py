@@ -155,7 +155,7 @@ def test_a_specimen_may_state_the_version_it_was_written_for(tmp_path):
         ),
     ],
 )
-def test_anything_that_is_loaded_passes_the_schema(kind, text, tmp_path):
+def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
     path = tmp_path / "file.toml"
     path.write_text(text, encoding="utf-8")
     load_toml(path, MODELS[kind])
@@ -183,7 +183,7 @@ def test_anything_that_is_loaded_passes_the_schema(kind, text, tmp_path):
         ("mapping", 'source = "1"', 'sauce = "1"'),
     ],
 )
-def test_a_slip_that_is_refused_on_loading_is_shown_while_it_is_typed(kind, old, new, tmp_path):
+def test_the_schema_finds_errors_that_loading_refuses(kind, old, new, tmp_path):
     named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper", "map": "map"}
     right = (
         MAPPING
@@ -199,7 +199,7 @@ def test_a_slip_that_is_refused_on_loading_is_shown_while_it_is_typed(kind, old,
     assert faults(kind, wrong) != []
 
 
-def test_a_file_that_is_written_names_its_schema_and_comes_back(tmp_path):
+def test_a_written_file_names_its_schema_and_loads_unchanged(tmp_path):
     campaign = load_campaign("paper")
     save_toml(campaign, tmp_path / "mine.toml")
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
@@ -227,7 +227,7 @@ def test_a_specimen_that_is_written_names_its_schema_and_passes_it(kind, tmp_pat
 
 
 @pytest.mark.parametrize("slip", ["gap = 3e-5", "gap_m = [3e-5]", 'gap_m = [3e-5, "open"]', "contact = 3"])
-def test_a_slip_in_a_specimen_is_shown_while_it_is_typed(slip, tmp_path):
+def test_the_schema_finds_errors_in_a_specimen(slip, tmp_path):
     (tmp_path / "mine.toml").write_text(f'model = "gong2025"\n{slip}\n', encoding="utf-8")
     with pytest.raises(ValueError, match=slip.split(" ", maxsplit=1)[0]):
         load_specimen(str(tmp_path / "mine.toml"))
@@ -235,7 +235,7 @@ def test_a_slip_in_a_specimen_is_shown_while_it_is_typed(slip, tmp_path):
 
 
 @pytest.mark.parametrize("version", ["2", "0", '"1"', "true", "1.0"])
-def test_a_file_of_a_later_version_is_refused_with_what_to_do(version, tmp_path):
+def test_a_file_of_a_later_version_is_refused_with_advice(version, tmp_path):
     path = Path(tmp_path) / "later.toml"
     text = (shipped_folder("campaigns") / "quick.toml").read_text(encoding="utf-8")
     path.write_text(f"format_version = {version}\n{text}", encoding="utf-8")
@@ -245,7 +245,7 @@ def test_a_file_of_a_later_version_is_refused_with_what_to_do(version, tmp_path)
     assert load_campaign(path) == load_campaign("quick")
 
 
-def test_the_language_server_of_editors_finds_a_slip_and_nothing_else(tmp_path):
+def test_the_editor_language_server_reports_only_the_error(tmp_path):
     taplo = shutil.which("taplo", path=str(Path(sys.executable).parent))
     if taplo is None:
         pytest.skip("pip install vibench[test] brings taplo")

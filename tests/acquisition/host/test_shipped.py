@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, all_shipped, load_campaign, named, shipped_folder
 
 
-def test_a_bare_name_stands_for_a_shipped_file(tmp_path, monkeypatch):
+def test_a_bare_name_loads_a_shipped_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in ("campaigns", "hardware_configs", "hardware_configs/faults", "studies"):
         for path in all_shipped(folder):
@@ -20,13 +20,13 @@ def test_a_file_of_the_user_comes_before_a_shipped_one(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("given", ["quick.toml", "campaigns/quick"])
-def test_a_path_never_stands_for_a_shipped_file(given, tmp_path, monkeypatch):
+def test_a_path_never_loads_a_shipped_file(given, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=r"missing|not exist|no such|cannot be read"):
         load_campaign(given)
 
 
-def test_an_unknown_name_is_refused_with_those_that_there_are(tmp_path, monkeypatch):
+def test_an_unknown_file_name_is_refused_with_the_known_ones(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=r"'quik' is neither .* paper, quick, "):
         load_campaign("quik")

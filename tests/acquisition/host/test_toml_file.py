@@ -63,7 +63,7 @@ def test_an_excitation_of_no_known_kind_is_refused_with_the_known_ones(tmp_path,
         ('values = [1.0, "fast"]\n', "values.1 = 'fast': give a number"),
     ],
 )
-def test_the_kind_that_was_meant_gives_the_key(tmp_path, text, told):
+def test_the_intended_kind_determines_the_reported_key(tmp_path, text, told):
     file = tmp_path / "plan.toml"
     file.write_text(text)
     with pytest.raises(ConfigurationError) as refused:
@@ -107,7 +107,7 @@ def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told
         ('began = "-1.5"\n', "began = '-1.5': give a date, time and time zone"),
     ],
 )
-def test_what_a_value_should_be_is_stated_without_a_word_of_python(tmp_path, text, told):
+def test_errors_describe_values_without_python_terms(tmp_path, text, told):
     class Words(FrozenModel):
         few: Annotated[tuple[float, ...], Field(min_length=1, max_length=2)] = (1.0,)
         pair: tuple[float, float] = (1.0, 2.0)

@@ -85,14 +85,14 @@ class TestRoundTrips:
         ),
         notes=TEXT,
     )
-    def test_a_campaign_comes_back_from_its_toml_text_as_it_was(self, tmp_path_factory, measurements, notes):
+    def test_a_campaign_round_trips_through_toml(self, tmp_path_factory, measurements, notes):
         campaign = Campaign(name="c", notes=notes, measurements=tuple(measurements))
         path = tmp_path_factory.mktemp("toml") / "c.toml"
         path.write_bytes(toml_text(campaign).encode())
         assert load_campaign(path) == campaign
 
     @given(measurement=MEASUREMENTS)
-    def test_a_measurement_comes_back_from_json_as_it_was(self, measurement):
+    def test_a_measurement_round_trips_through_json(self, measurement):
         assert Measurement.model_validate_json(measurement.model_dump_json()) == measurement
 
     @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -102,7 +102,7 @@ class TestRoundTrips:
 
 
 class TestDefaults:
-    def test_they_fill_in_what_a_measurement_leaves_out(self, tmp_path):
+    def test_defaults_fill_in_missing_values(self, tmp_path):
         text = 'name = "c"\n[defaults]\nramp_s = 0.7\n[defaults.dwell]\nsettle_s = 9.0\n' + DWELL_TABLE
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.ramp_s == 0.7
@@ -113,7 +113,7 @@ class TestDefaults:
         (measurement,) = loaded(tmp_path, text).measurements
         assert measurement.excitation.duration_s == 2.0
 
-    def test_they_state_nothing_to_another_kind(self, tmp_path):
+    def test_defaults_apply_to_their_kind_only(self, tmp_path):
         text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
         assert len(loaded(tmp_path, text).measurements) == 1
 
@@ -156,7 +156,7 @@ class TestRefusals:
             )
 
     @pytest.mark.parametrize("name", ["", "a b", "../up", ".hidden", "a.b", "ü", "x" * 65])
-    def test_a_name_that_is_no_file_name_everywhere_is_refused(self, name):
+    def test_a_name_must_be_a_portable_file_name(self, name):
         with pytest.raises(ValueError, match="name"):
             Measurement(name=name, excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=1))
 
@@ -224,7 +224,7 @@ def test_the_paper_s_campaign_has_its_levels_band_and_times():
     assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)
 
 
-def test_the_page_on_campaigns_states_of_every_kind_what_it_needs(tmp_path):
+def test_the_campaigns_page_lists_the_needs_of_every_kind(tmp_path):
     page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.*=.*) \|$", page, re.MULTILINE)
     assert {kind for kind, _ in rows} == set(EXCITATION_KINDS)

@@ -50,7 +50,7 @@ def test_a_stream_needs_an_output_also_on_a_rig_without_one(rig):
     assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 
-def test_the_outputs_limit_counts_for_what_it_plays_and_for_nothing_else(rig):
+def test_the_output_limit_applies_only_to_its_own_signals(rig):
     measurement = Measurement(name="m", excitation=TONES[0])
     named = "the analogue output's voltage (peak)"
     by_generator = limit_checks(measurement, with_output(rig, OutputUse.STREAMS))

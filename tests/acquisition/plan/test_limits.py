@@ -47,7 +47,7 @@ def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
     )
 
 
-def test_a_sweep_is_checked_where_the_rig_answers_most(rig):
+def test_a_sweep_is_checked_at_the_largest_response_of_the_rig(rig):
     sweep = SineSweep(amplitude_vpp=1, start_hz=10, stop_hz=100, duration_s=100)
     loads = predicted_loads(sweep, rig)
     grid_hz = np.linspace(10, 100, 20_000)
@@ -78,7 +78,7 @@ def test_a_waveform_s_peaks_match_an_integration_in_time(rig):
     assert loads[BaseQuantity.CURRENT].peak == pytest.approx(np.max(np.abs(last[:, 2])), rel=0.02)
 
 
-def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
+def test_streamed_noise_reaches_exactly_the_terminal_range(rig):
     noise = StreamedNoise(amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=800, duration_s=1)
     volts = predicted_loads(noise, rig)[BaseQuantity.AMPLIFIER_VOLTAGE]
     assert volts.peak == pytest.approx(rig.generator.terminal_factor() * rig.amplifier.gain, rel=2e-3)
@@ -158,6 +158,6 @@ def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
         ),
     ],
 )
-def test_what_the_generator_cannot_play_is_refused_by_its_description(rig, excitation, said):
+def test_signals_beyond_the_generator_are_refused_by_its_description(rig, excitation, said):
     with pytest.raises(LimitExceeded, match=said):
         require_within_limits(plan(excitation), rig)

@@ -29,14 +29,14 @@ def test_peak_and_size_match_the_signal(rig, name):
     assert len(seen.spectrum_hz) <= SPECTRUM_POINTS
 
 
-def test_a_sine_is_one_line_at_its_place_and_height(rig):
+def test_the_spectrum_of_a_sine_is_one_line(rig):
     seen = preview_measurement(QUICK["dwell"], rig)
     highest = int(np.argmax(seen.spectrum_v))
     assert seen.spectrum_hz[highest] == pytest.approx(260, abs=0.5)
     assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
 
 
-def test_limits_come_with_the_most_used_first_and_a_broken_one_is_stated(rig):
+def test_limits_are_sorted_by_use_and_exceeded_ones_are_marked(rig):
     excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
     seen = preview_measurement(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
     uses = [check.use for check in seen.checks]
@@ -55,11 +55,11 @@ def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
 @pytest.mark.parametrize(
     ("name", "band_hz"), [("noise", (20, 800)), ("sweep", (220, 310)), ("dwell", (130, 520))]
 )
-def test_the_band_is_what_is_excited(name, band_hz):
+def test_the_preview_band_is_the_excited_band(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
 
 
-def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_stated_without_it(rig):
+def test_holdable_growth_follows_from_the_feedback_loop_of_the_rig(rig):
     assert preview_measurement(QUICK["dwell"], rig).least_growth_time_s is None
     smart = load_campaign(ROOT / "campaigns" / "smart.toml").measurements
     (dwell,) = (each for each in smart if each.name == "dwell_260")
@@ -69,7 +69,7 @@ def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_state
     assert preview_measurement(dwell, slow).least_growth_time_s == pytest.approx(2.0 + 10 * 2 * 0.1)
 
 
-def test_of_a_branch_that_a_fast_loop_follows_no_growth_time_is_reported_for_it_decides_nothing():
+def test_a_fast_loop_branch_has_no_growth_time():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     fast = load_rig(ROOT / "hardware_configs" / "virtual_rig_controller.toml")
     (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements

@@ -18,7 +18,7 @@ def measurement(excitation):
     return Measurement(name="one", excitation=excitation, ramp_s=0.5)
 
 
-def test_a_sweep_is_led_in_by_check_ramp_and_settling():
+def test_a_sweep_starts_after_check_ramp_and_settling():
     sweep = SineSweep(amplitude_vpp=1.0, start_hz=100, stop_hz=200, duration_s=10, settle_s=2.0)
     assert lead_in_s(measurement(sweep)) == pytest.approx(CHECK_S + 0.5 + 2.0)
 
@@ -29,7 +29,7 @@ def test_the_tones_that_lead_to_a_dwell_are_part_of_its_lead_in():
     assert lead_in_s(measurement(dwell)) == pytest.approx(CHECK_S + 0.5 + 2 * 0.25 + 1.0)
 
 
-def test_what_feedback_lets_settle_is_no_lead_in():
+def test_settling_under_feedback_is_not_lead_in():
     tracking = ResonanceTracking(
         amplitude_vpp=1.0, start_hz=94, low_hz=90, high_hz=98, accelerations_m_per_s2=(0.1,)
     )

@@ -32,7 +32,7 @@ def settled_m(rig, amplitude_vpp, frequency_hz):
     return np.max(np.abs(relative))
 
 
-def test_a_sine_that_touches_no_stop_is_foretold_as_rig_and_specimen_answer_it(rig):
+def test_predicted_motion_without_contact_matches_the_linear_response(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=0.02, frequency_hz=266, duration_s=1), rig)
     assert loads[BaseQuantity.P].peak < specimen_of(rig).gap_m
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 0.02, 266.0), rel=2e-3)
@@ -40,7 +40,7 @@ def test_a_sine_that_touches_no_stop_is_foretold_as_rig_and_specimen_answer_it(r
 
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 201.0, 440.0])
-def test_a_sine_that_drives_the_stops_is_foretold_within_a_half(rig, frequency_hz):
+def test_predicted_motion_with_contact_is_within_half(rig, frequency_hz):
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 8.0, frequency_hz), rel=0.5)
 
@@ -48,7 +48,7 @@ def test_a_sine_that_drives_the_stops_is_foretold_within_a_half(rig, frequency_h
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(frequency_hz=st.floats(150, 300), level=st.floats(0.05, 0.99))
 @example(frequency_hz=195.0, level=0.5)
-def test_no_level_on_the_way_moves_anything_more_than_was_foretold(rig, frequency_hz, level):
+def test_motion_during_ramps_stays_within_the_prediction(rig, frequency_hz, level):
     """Ramps pass every level, and the base may move less at a higher one: stops take the notch away."""
     model = RigModel(rig)
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
@@ -59,7 +59,7 @@ def test_no_level_on_the_way_moves_anything_more_than_was_foretold(rig, frequenc
 
 
 @pytest.mark.parametrize("kind", [WhiteNoise, StreamedNoise])
-def test_noise_is_foretold_by_its_lines_free_while_weak_and_stuck_when_strong(rig, kind):
+def test_noise_is_predicted_by_free_or_stuck_linear_response(rig, kind):
     band = {"band_start_hz": 50.0, "band_stop_hz": 600.0}
     more = {"duration_s": 1.0} if kind is StreamedNoise else {"repetition_hz": 1.0, "realisations": 1}
     weak, strong = (kind(amplitude_vpp=level, **band, **more) for level in (0.02, 10.0))
@@ -85,13 +85,13 @@ def test_a_specimen_without_stops_swings_with_the_drive(rig):
         assert high[quantity].peak == pytest.approx(100 * low[quantity].peak)
 
 
-def test_a_plan_that_would_overstretch_the_specimen_is_refused_before_anything_moves(rig):
+def test_a_plan_that_overstretches_the_specimen_is_refused(rig):
     sweep = SineSweep(amplitude_vpp=9.9, start_hz=180, stop_hz=220, duration_s=60)
     with pytest.raises(LimitExceeded, match=r"the specimen's amplitude \(about, at 2\d\d.*keep away from"):
         require_within_limits(Measurement(name="plan", excitation=sweep), rig)
 
 
-def test_the_vibrometer_s_range_stands_in_the_table(rig):
+def test_the_table_contains_the_vibrometer_range(rig):
     dwell = Measurement(name="plan", excitation=Dwell(amplitude_vpp=1, frequency_hz=266, duration_s=1))
     told = {check.what: check for check in limit_checks(dwell, rig)}
     velocity = told["the velocity of m0 (about, at 266 Hz)"]

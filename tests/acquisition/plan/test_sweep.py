@@ -29,7 +29,7 @@ class TestOrder:
         ]
         assert [point.measurement.excitation.frequency_hz for point in plan.points()] == [200, 205, 210] * 2
 
-    def test_a_stated_order_turns_the_nesting_round(self):
+    def test_a_stated_order_changes_the_nesting(self):
         plan = campaign(
             amplitude_vpp=[0.5, 1.5], frequency_hz=[200, 210], order=["frequency_hz", "amplitude_vpp"]
         )
@@ -44,7 +44,7 @@ class TestOrder:
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
         assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
 
-    def test_each_excitation_gets_the_template_s_values_and_its_own(self):
+    def test_each_excitation_combines_template_and_own_values(self):
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
             excitations=[
@@ -92,7 +92,7 @@ excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s
 
 
 class TestChains:
-    def test_each_point_is_led_through_all_before_it(self):
+    def test_each_point_passes_through_all_earlier_points_of_its_chain(self):
         plan = campaign(
             amplitude_vpp=[0.5],
             direction=["up", "down"],
@@ -115,7 +115,7 @@ class TestChains:
         assert [point.chain for point in plan.points()] == ["line-0p5vpp-up"] * 3 + ["line-0p5vpp-down"] * 3
         assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
 
-    def test_a_bounded_way_keeps_the_nearest_points_and_makes_a_long_chain_grow_with_its_length(self):
+    def test_a_limited_lead_in_keeps_the_nearest_points(self):
         def made(points, **bound):
             return campaign(
                 amplitude_vpp=[0.5],
@@ -144,7 +144,7 @@ class TestChains:
         last = plan.points()[-1].measurement.excitation
         assert [tone.frequency_hz for tone in last.lead_in] == [200, 205, 205]
 
-    def test_a_level_chain_downwards_is_led_from_above_and_checked_against_the_limits_there(self, rig):
+    def test_a_downward_level_chain_is_checked_at_its_highest_level(self, rig):
         plan = campaign(
             measurement={"ramp_s": 0.3, "excitation": {**DWELL, "frequency_hz": 200}},
             amplitude_vpp=[0.5, 1.0, 2.0],
@@ -161,7 +161,7 @@ class TestChains:
         assert peak == pytest.approx(predicted_loads(alone, rig)[BaseQuantity.ACCELERATION].peak)
         require_within_limits(last, rig)
 
-    def test_a_chain_comes_back_from_its_toml_text_as_it_was(self, tmp_path):
+    def test_a_chain_round_trips_through_toml(self, tmp_path):
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 205], continue_from_previous="frequency_hz")
         path = tmp_path / "c.toml"
         path.write_text(toml_text(plan))

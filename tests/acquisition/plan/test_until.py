@@ -35,7 +35,7 @@ def plan(kind, until):
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 @pytest.mark.parametrize("name", sorted(NOISE | SINE))
-def test_each_kind_waits_for_its_own_results_alone(kind, name):
+def test_until_accepts_only_results_of_its_kind(kind, name):
     if name in ALLOWED.get(kind, set()):
         assert plan(kind, {name: "1 %"}).until.wishes == {name: 0.01}
         return
@@ -44,7 +44,7 @@ def test_each_kind_waits_for_its_own_results_alone(kind, name):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("0.1 %", 0.001), ("2%", 0.02), ("1e-3 %", 1e-5), (0.05, 0.05)])
-def test_a_bound_is_a_percentage_or_a_share(said, meant):
+def test_a_bound_is_a_percentage_or_a_fraction(said, meant):
     until = plan("dwell", {"response_i": said}).until
     assert until.response_i == pytest.approx(meant)
     assert type(until).model_validate_json(until.model_dump_json()) == until
@@ -56,12 +56,12 @@ def test_an_invalid_bound_is_refused(said):
         plan("dwell", {"response_i": said})
 
 
-def test_until_without_a_wish_is_refused():
+def test_until_without_a_bound_is_refused():
     with pytest.raises(ValidationError, match="it names no result"):
         plan("dwell", {"shortest_s": 3.0})
 
 
-def test_a_plan_of_before_has_no_until():
+def test_a_plan_of_an_older_version_has_no_until():
     assert plan("dwell", None).until is None
     assert (
         Measurement.model_validate({"name": "a", "excitation": {"kind": "dwell", **KINDS["dwell"]}}).until

@@ -74,7 +74,7 @@ def handed_over(places, trace):
 
 
 @pytest.mark.thorough
-def test_a_crash_after_any_write_opens_and_loses_at_most_one_block(tmp_path, traced):
+def test_a_crash_after_any_write_loses_at_most_one_block(tmp_path, traced):
     places, empty, trace, truth = traced
     crashed = tmp_path / "crashed.h5.part"
     crashed.write_bytes(empty)
@@ -177,7 +177,7 @@ def require_nothing_but_the_truth(recording, truth):
         assert (recording.reason, recording.samples) == ("done", BLOCKS * BLOCK)
 
 
-def test_a_power_cut_never_counts_samples_that_are_not_there(traced):
+def test_the_sample_count_never_exceeds_the_data_after_a_power_cut(traced):
     places, empty, trace, truth = traced
     chance = random.Random(3)
     for _ in range(400):
@@ -198,7 +198,7 @@ def test_a_power_cut_never_counts_samples_that_are_not_there(traced):
             np.testing.assert_array_equal(counts, truth[row, :samples])
 
 
-def test_the_power_cut_model_would_notice_a_counter_that_is_synced_with_its_samples(traced):
+def test_the_power_cut_model_detects_wrong_write_order(traced):
     places, empty, trace, truth = traced
     careless = [each for at, each in enumerate(trace) if each is not None or at == len(trace) - 1]
     chance = random.Random(3)
@@ -255,7 +255,7 @@ class TracedFolder:
 
 
 @pytest.mark.skipif(not hasattr(os, "fdatasync"), reason="folders are synced on POSIX only")
-def test_a_power_cut_while_finishing_leaves_the_whole_recording_under_one_of_its_names(
+def test_a_power_cut_during_finishing_keeps_the_whole_recording(
     tmp_path, make_header, make_block, monkeypatch
 ):
     path = tmp_path / "a.h5"

@@ -19,7 +19,7 @@ def scale(step, zero=0.0, range_v=5.0):
     zero=st.floats(-0.01, 0.01),
     counts=st.lists(st.integers(-(2**23), 2**23 - 1), min_size=1, max_size=50),
 )
-def test_24_bit_counts_survive_the_way_through_volts(step, zero, counts):
+def test_24_bit_counts_round_trip_through_volts(step, zero, counts):
     volts = np.array([counts]) * step + zero
     np.testing.assert_array_equal(scale(step, zero).counts(volts), [counts])
 
@@ -31,7 +31,7 @@ def test_without_a_converter_step_volts_are_kept_to_half_a_fine_step(volts):
     assert np.abs(counts * fine_step - volts).max() <= 0.5 * fine_step
 
 
-def test_a_wrong_step_is_found_out():
+def test_a_wrong_step_is_detected():
     true_step, claimed_step = 5.0 / 2**23, 5.0 / 2**22
     volts = np.arange(-100.0, 100.0)[None] * true_step
     with pytest.raises(RecordingError, match=r"'m0_velocity' lie up to 0\.50 counts beside"):
@@ -39,6 +39,6 @@ def test_a_wrong_step_is_found_out():
 
 
 @pytest.mark.parametrize("volts", [np.nan, np.inf, -np.inf, 1e6])
-def test_what_no_count_can_hold_is_refused(volts):
+def test_values_beyond_the_counts_are_refused(volts):
     with pytest.raises(RecordingError, match="was not recorded"):
         scale(1e-6).counts(np.array([[0.0, volts]]))

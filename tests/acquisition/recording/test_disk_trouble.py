@@ -22,7 +22,7 @@ def trouble():
         yield trouble
 
 
-def test_the_first_refusal_comes_at_once_and_every_further_one_shows_the_rig_first():
+def test_a_full_disk_refuses_at_once():
     told = []
     trouble = DiskTrouble(lambda: told.append(len(told)))
     for _ in range(2):
@@ -50,7 +50,7 @@ def test_a_full_disk_refuses_a_new_recording_and_leaves_no_file(tmp_path, make_h
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_committed(
+def test_a_filling_disk_ends_the_recording_and_keeps_committed_samples(
     tmp_path, make_header, make_block, trouble
 ):
     writer = create_recording(tmp_path / "a.h5", make_header())
@@ -66,9 +66,7 @@ def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_committed(
         assert (recording.state, recording.samples) == (RecordingState.FAILED, 1000)
 
 
-def test_a_disk_that_is_full_at_the_end_leaves_a_part_that_is_recovered_when_there_is_room(
-    tmp_path, make_header, make_block, trouble
-):
+def test_a_part_file_of_a_full_disk_can_be_recovered_later(tmp_path, make_header, make_block, trouble):
     writer = create_recording(tmp_path / "a.h5", make_header())
     append_until_committed(writer, make_block, 0, 500)
     heal = trouble.fill()
@@ -79,7 +77,7 @@ def test_a_disk_that_is_full_at_the_end_leaves_a_part_that_is_recovered_when_the
         assert recording.samples == 500
 
 
-def test_a_disk_that_refuses_twice_takes_the_third(trouble):
+def test_a_commit_succeeds_after_two_refusals(trouble):
     trouble.fill(2)
     for _ in range(2):
         with pytest.raises(OSError, match="No space") as refusal:
@@ -101,7 +99,7 @@ def test_a_slow_disk_delays_the_writer_and_not_the_reader(tmp_path, make_header,
         assert recording.samples == 1000
 
 
-def test_a_slow_disk_takes_its_time(trouble):
+def test_a_simulated_slow_disk_is_slow(trouble):
     heal = trouble.slow_down(0.1)
     began_s = time.monotonic()
     trouble.meet()
@@ -112,7 +110,7 @@ def test_a_slow_disk_takes_its_time(trouble):
     assert time.monotonic() - began_s < 0.1
 
 
-def test_a_disk_is_well_again_when_the_rig_is_switched_off(tmp_path, make_header):
+def test_simulated_disk_faults_end_with_the_rig(tmp_path, make_header):
     with troubled_disks(DiskTrouble()) as _:
         pass
     trouble = DiskTrouble()

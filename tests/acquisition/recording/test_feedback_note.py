@@ -73,14 +73,14 @@ def read(kind, text):
 
 
 @pytest.mark.parametrize(("kind", "text", "form"), WRITTEN)
-def test_a_note_of_an_older_recording_is_read_and_written_back_unchanged(kind, text, form):
+def test_a_note_of_an_older_recording_round_trips(kind, text, form):
     note = read(kind, text)
     assert type(note) is form
     assert (note.kind, note.text) == (kind, text)
     assert len(text) <= TEXT_WIDTH, "it is not cut in the file"
 
 
-def test_words_of_a_note_come_back_as_values():
+def test_words_of_a_note_are_parsed_to_values():
     assert read("achieved", STEP).segment is SegmentLabel.STEP
     assert read("achieved", STEP).level is Held.WITHIN
     assert read("settled", SETTLED).motion is Steadiness.UNSETTLED
@@ -92,7 +92,7 @@ def test_words_of_a_note_come_back_as_values():
     assert read("resonance", LOST).mode_hz is None
 
 
-def test_other_events_and_notes_that_were_cut_short_are_no_notes():
+def test_other_events_and_truncated_notes_are_ignored():
     assert read("check", "left out: the bench was checked shortly before") is None
     assert read("settled", SETTLED[:100] + "…") is None
 
@@ -105,6 +105,6 @@ def test_a_note_of_an_unknown_version_is_refused_in_one_sentence_that_names_it(m
         read("level", LEVEL.replace("{", "{" + more))
 
 
-def test_figures_are_noted_to_six_places():
+def test_numbers_in_notes_have_six_digits():
     note = ExcursionNote(from_hz=254.8123456, to_hz=258.8, worst=-0.2124261234, level=Held.OUTSIDE)
     assert (note.from_hz, note.worst) == (254.812, -0.212426)

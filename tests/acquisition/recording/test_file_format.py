@@ -37,7 +37,7 @@ def test_a_channel_is_named_scaled_and_dimensioned(file, make_block):
     assert velocity.attrs["_FillValue"].dtype == velocity.dtype
 
 
-def test_the_file_states_what_it_is(file):
+def test_the_file_identifies_its_format(file):
     assert file.attrs["Conventions"] == b"CF-1.11"
     assert file.attrs["format"] == b"vibench-recording"
     assert file.attrs["format_version"] == 1
@@ -49,7 +49,7 @@ def test_the_superblock_is_the_oldest(file):
         assert raw.read(9) == b"\x89HDF\r\n\x1a\n\x00"
 
 
-def test_no_type_is_used_that_old_readers_cannot_show(file):
+def test_all_data_types_are_readable_by_old_readers(file):
     kinds = set()
 
     def look(name, item):
@@ -72,7 +72,7 @@ def test_the_tables_are_plain_columns(file):
 
 
 @pytest.mark.parametrize("samples", [1, 5, 99, 100, 101, 1000])
-def test_chunks_made_in_threads_are_those_hdf5_makes_itself(tmp_path, samples):
+def test_chunks_made_in_threads_equal_those_of_hdf5(tmp_path, samples):
     counts = np.random.default_rng(samples).integers(-(2**31), 2**31, samples, dtype=np.int32)
     with h5py.File(tmp_path / "chunks.h5", "w") as file:
         ours = create_counts(file, "ours", samples, 100)
@@ -84,6 +84,6 @@ def test_chunks_made_in_threads_are_those_hdf5_makes_itself(tmp_path, samples):
         np.testing.assert_array_equal(file["theirs"][:], counts)
 
 
-def test_no_room_that_was_claimed_is_left_over(file):
+def test_no_reserved_space_remains(file):
     raw_bytes = 3 * SAMPLES * 4  # 24 of 32 bits are noise, in two channels
     assert Path(file.filename).stat().st_size < raw_bytes

@@ -204,7 +204,7 @@ def in_phase(left, phase):
 
 @pytest.mark.thorough
 @forks
-def test_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(tmp_path):
+def test_recordings_killed_in_every_phase_lose_at_most_one_second(tmp_path):
     left = killed_at(tmp_path, {"recording": 2, "committing": 3, "finalising": 3}, seed=1)
     assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [2, 3, 3]
 

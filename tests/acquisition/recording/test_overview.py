@@ -23,7 +23,7 @@ def recorded(tmp_path, make_header, make_block):
     return tmp_path / "a.h5", counts
 
 
-def test_every_sample_lies_between_the_extremes_of_its_bin_and_touches_them(recorded):
+def test_the_extremes_of_a_bin_are_those_of_its_samples(recorded):
     path, counts = recorded
     with open_recording(path) as recording:
         for row, role in zip(counts, recording.roles, strict=True):
@@ -34,7 +34,7 @@ def test_every_sample_lies_between_the_extremes_of_its_bin_and_touches_them(reco
                 assert (overview.low[number], overview.high[number]) == (part.min(), part.max())
 
 
-def test_a_stranger_reads_the_overview_with_scale_and_axis(recorded):
+def test_h5py_alone_reads_the_overview_with_scale_and_axis(recorded):
     path, counts = recorded
     with h5py.File(path, "r") as file:
         low = file["overview/m0_velocity_low"]
@@ -47,7 +47,7 @@ def test_a_stranger_reads_the_overview_with_scale_and_axis(recorded):
         assert file["overview"].attrs["samples_per_bin"] == BIN_SAMPLES
 
 
-def test_the_labelled_curve_of_a_channel_is_nan_where_a_whole_bin_is_lost(tmp_path, make_header, make_block):
+def test_an_overview_curve_is_nan_in_lost_bins(tmp_path, make_header, make_block):
     _, before = make_block(0, BIN_SAMPLES)
     _, after = make_block(3 * BIN_SAMPLES + 5, 1000)
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
@@ -60,7 +60,7 @@ def test_the_labelled_curve_of_a_channel_is_nan_where_a_whole_bin_is_lost(tmp_pa
         assert file["view/m0_velocity/time"].shape == values.shape
 
 
-def test_lost_samples_are_no_extreme_and_a_lost_bin_is_missing():
+def test_lost_samples_do_not_enter_the_extremes():
     counts = np.arange(4 * BIN_SAMPLES, dtype=np.int32)
     counts[5:9] = MISSING_COUNT
     counts[BIN_SAMPLES : 2 * BIN_SAMPLES] = MISSING_COUNT
@@ -69,7 +69,7 @@ def test_lost_samples_are_no_extreme_and_a_lost_bin_is_missing():
     assert found.high.tolist() == [BIN_SAMPLES - 1, MISSING_COUNT, 3 * BIN_SAMPLES - 1, 4 * BIN_SAMPLES - 1]
 
 
-def test_pieces_make_the_overview_of_the_whole():
+def test_an_overview_made_in_pieces_equals_the_whole():
     counts = np.random.default_rng(1).integers(-1000, 1000, 10 * BIN_SAMPLES + 7, dtype=np.int32)
     sums = OverviewSums()
     for first in range(0, counts.size, 3 * BIN_SAMPLES):

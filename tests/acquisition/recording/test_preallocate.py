@@ -15,7 +15,7 @@ def _die_before(step, path, header):
     create_recording(path, header)
 
 
-def test_a_kill_before_everything_stands_leaves_a_tmp_and_the_next_attempt_is_free(tmp_path, make_header):
+def test_a_kill_during_preparation_leaves_only_a_tmp_file(tmp_path, make_header):
     path = tmp_path / "run.h5"
     child = multiprocessing.get_context("spawn").Process(
         target=_die_before, args=("_claim", path, make_header())
@@ -29,7 +29,7 @@ def test_a_kill_before_everything_stands_leaves_a_tmp_and_the_next_attempt_is_fr
         assert recording.samples == 0
 
 
-def test_a_part_that_stands_can_be_opened_by_any_reader(tmp_path, make_header):
+def test_a_prepared_part_file_can_be_opened(tmp_path, make_header):
     writer = create_recording(tmp_path / "run.h5", make_header())
     with h5py.File(tmp_path / "run.h5.part", "r", locking=False) as file:
         assert file["n_valid"][0] == 0

@@ -21,7 +21,7 @@ def path(tmp_path, make_header, make_block):
     return tmp_path / "a.h5"
 
 
-def test_a_recording_states_everything_that_was_known_at_its_start(path, make_channel):
+def test_a_recording_contains_all_metadata_of_its_start(path, make_channel):
     with open_recording(path) as recording:
         assert recording.channel("m0_velocity") == make_channel("m0_velocity", long_name="m0 velocity")
         assert recording.plan == {"kind": "dwell", "frequency_hz": 260.0}
@@ -33,9 +33,7 @@ def test_a_recording_states_everything_that_was_known_at_its_start(path, make_ch
         assert recording.origin == "simulated"
 
 
-def test_a_channel_without_converter_step_or_sensitivity_comes_back_as_such(
-    tmp_path, make_header, make_channel
-):
+def test_missing_converter_step_and_sensitivity_are_read_as_missing(tmp_path, make_header, make_channel):
     bare = make_channel("m0_velocity", volts_per_count=None, sensitivity=None, long_name="velocity of m0")
     with create_recording(tmp_path / "b.h5", make_header(channels=(bare,))):
         pass
@@ -43,7 +41,7 @@ def test_a_channel_without_converter_step_or_sensitivity_comes_back_as_such(
         assert recording.channels == (bare,)
 
 
-def test_a_plan_longer_than_an_attribute_holds_comes_back(tmp_path, make_header):
+def test_a_plan_longer_than_an_attribute_is_stored(tmp_path, make_header):
     long_plan = '{"steps": [' + ",".join(["0.125"] * 50_000) + "]}"
     with create_recording(tmp_path / "b.h5", make_header(plan_json=long_plan)):
         pass
@@ -51,7 +49,7 @@ def test_a_plan_longer_than_an_attribute_holds_comes_back(tmp_path, make_header)
         assert len(recording.plan["steps"]) == 50_000
 
 
-def test_blocks_put_together_are_the_whole(path):
+def test_concatenated_blocks_equal_the_whole(path):
     with open_recording(path) as recording:
         blocks = list(recording.blocks(["m0_velocity", "drive_voltage"], 700))
         assert [block.first_sample for block in blocks] == [0, 700, 1400, 2100]
@@ -61,12 +59,12 @@ def test_blocks_put_together_are_the_whole(path):
 
 
 @pytest.mark.parametrize(("start", "stop"), [(-1, 10), (0, SAMPLES + 1), (20, 10)])
-def test_samples_that_are_not_there_are_refused(path, start, stop):
+def test_reading_beyond_the_samples_is_refused(path, start, stop):
     with open_recording(path) as recording, pytest.raises(RecordingError, match="has samples 0 to 2500"):
         recording.read("m0_velocity", start, stop)
 
 
-def test_an_unknown_channel_is_answered_with_the_known_ones(path):
+def test_an_unknown_channel_is_refused_with_the_known_ones(path):
     with open_recording(path) as recording, pytest.raises(RecordingError, match="drive_voltage, m0_velocity"):
         recording.read("m2_velocity")
 
@@ -78,7 +76,7 @@ def test_a_closed_recording_reports_it(path):
         recording.read("m0_velocity")
 
 
-def test_a_recording_that_was_finished_a_moment_ago_is_found_under_its_former_name(path):
+def test_a_just_finished_recording_is_found_by_its_part_name(path):
     with open_recording(path.with_name("a.h5.part")) as recording:
         assert recording.path == path
         assert recording.state == "complete"
@@ -133,13 +131,13 @@ def without_segments(path):
         (without_segments, "is damaged"),
     ],
 )
-def test_each_kind_of_unreadable_file_has_its_own_sentence(path, damage, sentence):
+def test_each_kind_of_unreadable_file_has_a_specific_message(path, damage, sentence):
     damage(path)
     with pytest.raises(RecordingError, match=sentence):
         open_recording(path)
 
 
-def test_results_stand_beside_the_samples_they_were_made_from(path):
+def test_results_are_stored_beside_their_samples(path):
     frequency = np.linspace(0.0, 500.0, 6)
     response = np.exp(1j * frequency)
     arrays = {
@@ -176,7 +174,7 @@ def test_two_analyses_at_once_both_keep_their_results(path):
         assert [each.settings["by"] for each in recording.results.values()] == ["one", "other"]
 
 
-def test_a_result_whose_axis_does_not_fit_is_refused_and_harms_nothing(path):
+def test_a_result_with_a_wrong_axis_is_refused(path):
     before = path.read_bytes()
     arrays = {
         "H": ResultArray(np.zeros(5), "1", ("frequency",)),

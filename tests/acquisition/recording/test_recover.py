@@ -44,7 +44,7 @@ def test_an_abandoned_recording_is_finished_with_all_its_samples(tmp_path, aband
 
 
 @pytest.mark.parametrize("state", [each for each in RecordingState if each is not RecordingState.RECORDING])
-def test_a_program_that_died_while_it_wrote_the_state_has_not_ended_its_recording(tmp_path, abandoned, state):
+def test_a_program_killed_while_writing_the_state_leaves_an_unfinished_recording(tmp_path, abandoned, state):
     part, counts = abandoned(tmp_path)
     with h5py.File(part, "r+") as file:
         file["state"][0] = state.value[:6].encode() + b"recording"[6:]
@@ -67,19 +67,19 @@ def test_a_recording_is_finished_where_no_thread_can_be_started(tmp_path, abando
         np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
 
 
-def test_either_name_can_be_given(tmp_path, abandoned):
+def test_recover_accepts_the_part_and_the_final_name(tmp_path, abandoned):
     abandoned(tmp_path)
     assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"
 
 
-def test_an_incomplete_copy_is_made_again(tmp_path, abandoned):
+def test_an_incomplete_copy_is_repeated(tmp_path, abandoned):
     part, _ = abandoned(tmp_path)
     (tmp_path / "a.h5.tmp").write_bytes(b"half a copy")
     recover(part)
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
 
-def test_a_finished_copy_is_kept_and_only_the_part_goes(tmp_path, abandoned):
+def test_a_finished_copy_is_kept_and_its_part_removed(tmp_path, abandoned):
     part, _ = abandoned(tmp_path)
     saved = tmp_path / "saved"
     shutil.copyfile(part, saved)
@@ -101,7 +101,7 @@ def test_another_recording_of_that_name_is_not_overwritten(tmp_path, abandoned):
     assert part.exists()
 
 
-def test_a_living_recording_is_left_alone(tmp_path, make_header, make_block):
+def test_a_running_recording_is_not_recovered(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(make_block(0, 500)[1])
         with pytest.raises(RecordingError, match="still being recorded"):
@@ -112,7 +112,7 @@ def test_a_living_recording_is_left_alone(tmp_path, make_header, make_block):
         assert recording.state is RecordingState.COMPLETE
 
 
-def test_a_living_recording_can_be_read_by_h5py_alone(tmp_path, make_header, make_block):
+def test_a_running_recording_can_be_read_by_h5py_alone(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(make_block(0, 500)[1])
         with h5py.File(tmp_path / "a.h5.part", "r") as file:
@@ -121,7 +121,7 @@ def test_a_living_recording_can_be_read_by_h5py_alone(tmp_path, make_header, mak
             assert recording.state is RecordingState.RECORDING
 
 
-def test_nothing_to_recover_is_stated(tmp_path):
+def test_recover_reports_when_there_is_nothing_to_recover(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing to recover; give the path of a \.h5\.part"):
         recover(tmp_path / "a.h5")
     (tmp_path / "a.h5").touch()
@@ -129,7 +129,7 @@ def test_nothing_to_recover_is_stated(tmp_path):
         recover(tmp_path / "a.h5")
 
 
-def test_a_growing_recording_shows_what_is_committed(tmp_path, make_header, make_block):
+def test_a_growing_recording_shows_its_committed_samples(tmp_path, make_header, make_block):
     path = tmp_path / "a.h5"
     places = preallocate(path, part_of(path), make_header())
     writer = RecordingWriter(

@@ -70,7 +70,7 @@ def test_a_recording_is_sealed_at_its_end(recorded):
         assert len(recording.seal) == 64
 
 
-def test_a_stranger_verifies_a_seal_with_h5py_and_hashlib(recorded):
+def test_h5py_and_hashlib_alone_verify_a_seal(recorded):
     path = recorded()
     with open_recording(path) as recording:
         seal = recording.seal
@@ -80,7 +80,7 @@ def test_a_stranger_verifies_a_seal_with_h5py_and_hashlib(recorded):
     assert example_says(path) == (1, "not as it was sealed: /m0_velocity")
 
 
-def test_a_stranger_with_the_key_verifies_the_signature(recorded, key_file):
+def test_the_key_alone_verifies_the_signature(recorded, key_file):
     path = recorded()
     assert example_says(path, key_file)[0] == 0
     other = key_file.with_name("other")
@@ -138,14 +138,14 @@ CHANGES = (
 @pytest.mark.thorough
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("depth", SealDepth)
-def test_every_change_beside_the_samples_shows_at_a_quick_look(recorded, change, depth):
+def test_the_quick_check_finds_every_change_outside_the_samples(recorded, change, depth):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change(file)
     assert state_of(path, depth) is SealState.DAMAGED
 
 
-def test_a_changed_sample_shows_when_the_whole_is_read(recorded):
+def test_the_full_check_finds_a_changed_sample(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_sample(file)
@@ -154,7 +154,7 @@ def test_a_changed_sample_shows_when_the_whole_is_read(recorded):
     assert (found.state, found.sentence) == (SealState.DAMAGED, "not as it was sealed: data of /m0_velocity")
 
 
-def test_a_new_seal_over_changed_content_has_another_name(recorded):
+def test_a_new_seal_of_changed_content_has_another_digest(recorded):
     path = recorded()
     with open_recording(path) as recording:
         before = recording.seal
@@ -200,7 +200,7 @@ def test_without_a_seal_samples_are_checked_against_the_checksum_of_their_channe
 
 
 @pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])
-def test_a_seal_of_which_a_part_is_gone_is_none(recorded, change):
+def test_an_incomplete_seal_is_invalid(recorded, change):
     path = recorded()
     with h5py.File(path, "r+") as file:
         if change != "dataset":
@@ -218,21 +218,21 @@ def test_the_seal_of_another_recording_is_refused(recorded):
     assert state_of(path) is SealState.DAMAGED
 
 
-def test_a_finished_recording_that_is_called_unfinished_is_checked_against_its_seal(recorded):
+def test_a_renamed_finished_recording_is_checked_against_its_seal(recorded):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_scale(file)
     assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
-def test_where_a_key_is_given_no_seal_is_no_excuse(recorded, key_file):
+def test_with_a_key_a_missing_seal_is_an_error(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["seal"]
     assert state_of(path, key=seal_key(key_file)) is SealState.OTHER_KEY
 
 
-def test_a_recovered_recording_is_sealed_when_it_is_recovered(tmp_path, make_header, make_block):
+def test_recovery_seals_a_recording(tmp_path, make_header, make_block):
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
     writer._committer.close()
@@ -243,7 +243,7 @@ def test_a_recovered_recording_is_sealed_when_it_is_recovered(tmp_path, make_hea
     assert example_says(path)[0] == 0
 
 
-def test_a_damaged_copy_does_not_cost_the_samples_it_was_made_of(recorded, tmp_path, make_header, make_block):
+def test_a_damaged_copy_does_not_remove_its_source(recorded, tmp_path, make_header, make_block):
     path = recorded("kept.h5")
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
@@ -285,7 +285,7 @@ def test_with_a_key_a_seal_is_signed(recorded, key_file, monkeypatch):
     assert state_of(path, key=seal_key(other)) is SealState.OTHER_KEY
 
 
-def test_who_seals_again_without_the_key_is_found_out(recorded, key_file):
+def test_a_new_seal_without_the_key_is_detected(recorded, key_file):
     path = recorded()
     with h5py.File(path, "r+") as file:
         change_sample(file)
@@ -303,9 +303,7 @@ def test_who_seals_again_without_the_key_is_found_out(recorded, key_file):
 @pytest.mark.parametrize(
     ("content", "said"), [(None, "cannot be read"), (b"short", "has 5 bytes; at least 16")]
 )
-def test_a_key_that_is_none_is_refused_before_anything_is_recorded(
-    tmp_path, make_header, monkeypatch, content, said
-):
+def test_an_invalid_key_is_refused_before_recording(tmp_path, make_header, monkeypatch, content, said):
     monkeypatch.setenv("VIBENCH_SEAL_KEY", str(tmp_path / "key"))
     if content is not None:
         (tmp_path / "key").write_bytes(content)
@@ -323,14 +321,14 @@ def with_result(recorded):
     return path
 
 
-def test_a_result_has_its_own_seal_and_leaves_that_of_its_recording_alone(with_result):
+def test_a_result_has_a_separate_seal(with_result):
     with open_recording(with_result) as recording:
         assert recording.check_seal("whole").state is SealState.INTACT
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.INTACT]
         assert recording.results["spectrum"].arrays["H"].axes == ("f",)
 
 
-def test_a_changed_result_is_refused_and_its_recording_is_not(with_result):
+def test_a_changed_result_is_refused_and_its_recording_accepted(with_result):
     with h5py.File(with_result, "r+") as file:
         file["results/spectrum/H"][1] = 7.0
     with open_recording(with_result) as recording:
@@ -349,14 +347,14 @@ def test_a_result_of_another_recording_is_refused(with_result, tmp_path, make_he
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.DAMAGED]
 
 
-def test_a_result_whose_seal_was_taken_away_is_refused(with_result):
+def test_a_result_without_its_seal_is_refused(with_result):
     with h5py.File(with_result, "r+") as file:
         del file["results/spectrum"].attrs["seal_sha256"]
     with open_recording(with_result) as recording, pytest.raises(RecordingError, match="its seal is gone"):
         _ = recording.results
 
 
-def test_a_result_that_was_saved_before_results_had_seals_is_read(with_result):
+def test_a_result_of_a_version_without_result_seals_is_read(with_result):
     with h5py.File(with_result, "r+") as file:
         del file["seal"], file["overview"], file["view"]
         for name in [each for each in file["results/spectrum"].attrs if each.startswith("seal_")]:
@@ -377,7 +375,7 @@ def test_nothing_is_added_to_a_damaged_recording(recorded):
     assert path.read_bytes() == before
 
 
-def test_a_result_that_is_small_only_while_it_is_packed_is_not_read(with_result, monkeypatch):
+def test_a_decompression_bomb_is_not_read(with_result, monkeypatch):
     monkeypatch.setattr(_seal, "LARGEST_TABLE_BYTES", 1000)
     with h5py.File(with_result, "r+") as file:
         del file["results/spectrum/H"]
@@ -389,7 +387,7 @@ def test_a_result_that_is_small_only_while_it_is_packed_is_not_read(with_result,
 
 
 @pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])
-def test_anything_that_is_no_group_of_results_is_refused_in_a_sentence(recorded, what):
+def test_an_invalid_group_of_results_is_refused_in_a_sentence(recorded, what):
     path = recorded()
     with h5py.File(path, "r+") as file:
         del file["results"]
@@ -415,7 +413,7 @@ class TestChangedAfterTheCheck:
         code = f"import h5py\nwith h5py.File({str(path)!r}, 'r+', locking=False) as file:\n    {change}"
         subprocess.run([sys.executable, "-c", code], check=True)
 
-    def test_samples_are_refused_and_others_are_as_before(self, long):
+    def test_changed_samples_are_refused_after_the_check(self, long):
         with open_recording(long) as recording:
             role, at = recording.roles[-1], _seal.PIECE_ITEMS + 5
             before = recording.read_counts(role)
@@ -433,14 +431,14 @@ class TestChangedAfterTheCheck:
             with pytest.raises(RecordingError, match="no longer what they were when the seal was checked"):
                 recording.read_counts(role, at - 5, at - 4)
 
-    def test_a_file_that_is_opened_again_is_checked_against_the_check(self, long):
+    def test_a_reopened_file_must_match_its_earlier_check(self, long):
         with open_recording(long) as recording:
             recording.check_seal("whole")
         self.written_over(long, f"file[{recording.roles[0]!r}].attrs['delay_s'] = 0.001")
         with pytest.raises(RecordingError, match="no longer what it was when its seal was checked"):
             open_recording(long)
 
-    def test_anything_that_was_read_before_the_check_is_what_is_checked(self, long):
+    def test_samples_read_before_the_check_are_checked(self, long):
         sound = long.read_bytes()
         self.written_over(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:

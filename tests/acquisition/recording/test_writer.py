@@ -11,7 +11,7 @@ from vibench.acquisition.recording import RecordingState, create_recording
 BLOCK = 250
 
 
-def test_every_24_bit_count_comes_back(tmp_path, make_header, make_block):
+def test_every_24_bit_count_round_trips(tmp_path, make_header, make_block):
     written = []
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         for first in range(0, 4000, BLOCK):
@@ -32,7 +32,7 @@ def test_every_24_bit_count_comes_back(tmp_path, make_header, make_block):
         )
 
 
-def test_a_converters_own_counts_are_recorded_as_they_are(tmp_path, make_header, make_block):
+def test_raw_converter_counts_are_recorded_unchanged(tmp_path, make_header, make_block):
     counts, block = make_block(0, BLOCK)
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(replace(block, counts=counts))
@@ -67,7 +67,7 @@ def test_an_existing_file_is_never_overwritten(tmp_path, make_header, taken):
 
 
 @pytest.mark.parametrize("name", ["a.hdf5", "a", "a.h5.part"])
-def test_another_ending_than_h5_is_refused(tmp_path, make_header, name):
+def test_a_file_extension_other_than_h5_is_refused(tmp_path, make_header, name):
     with pytest.raises(RecordingError, match=r"NAME\.h5"):
         create_recording(tmp_path / name, make_header())
 
@@ -77,7 +77,7 @@ def test_a_missing_folder_is_named(tmp_path, make_header):
         create_recording(tmp_path / "nowhere" / "a.h5", make_header())
 
 
-def test_a_plan_that_the_disk_cannot_hold_is_refused_before_the_start(tmp_path, make_header):
+def test_a_plan_larger_than_the_disk_is_refused_before_the_start(tmp_path, make_header):
     with pytest.raises(RecordingError, match=r"needs \d+ MB .* the disk has \d+ MB"):
         create_recording(tmp_path / "a.h5", make_header(expected_samples=10**15))
     assert list(tmp_path.iterdir()) == []
@@ -96,7 +96,7 @@ def test_lost_samples_are_a_gap_and_read_as_nan(tmp_path, make_header, make_bloc
         np.testing.assert_array_equal(recording.read_counts("m0_velocity", 150), counts[1])
 
 
-def test_a_block_that_was_handed_over_already_is_refused(tmp_path, make_header, make_block):
+def test_a_repeated_block_is_refused(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(make_block(0, 100)[1])
         with pytest.raises(RecordingError, match="sample 50 was given, but 100 samples"):
@@ -113,7 +113,7 @@ def test_a_block_of_the_wrong_shape_is_refused(tmp_path, make_header, make_block
 
 
 @pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="this system claims no room beforehand")
-def test_a_plan_may_run_over_by_its_margin_and_a_long_hold_and_no_further(tmp_path, make_header, make_block):
+def test_a_recording_may_exceed_its_plan_by_margin_and_hold_only(tmp_path, make_header, make_block):
     planned, margin, hold = 4000, 10_000, 600_000
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=planned)) as writer:
         claimed = disk_bytes(tmp_path)
@@ -135,7 +135,7 @@ def disk_bytes(folder):
     return (folder / "a.h5.part").stat().st_blocks * 512
 
 
-def test_an_open_ended_recording_takes_what_comes(tmp_path, make_header, make_block):
+def test_an_open_ended_recording_has_no_fixed_length(tmp_path, make_header, make_block):
     header = make_header(expected_samples=None)
     with create_recording(tmp_path / "a.h5", header) as writer:
         claimed = disk_bytes(tmp_path)
@@ -149,7 +149,7 @@ def test_an_open_ended_recording_takes_what_comes(tmp_path, make_header, make_bl
         np.testing.assert_array_equal(recording.read_counts("m0_velocity", 190_000), counts[1])
 
 
-def test_a_recording_that_raises_states_failed_and_why(tmp_path, make_header, make_block):
+def test_an_exception_ends_a_recording_as_failed_with_its_reason(tmp_path, make_header, make_block):
     def measure():
         with create_recording(tmp_path / "a.h5", make_header()) as writer:
             writer.append(make_block(0, BLOCK)[1])
@@ -163,7 +163,7 @@ def test_a_recording_that_raises_states_failed_and_why(tmp_path, make_header, ma
         assert recording.samples == BLOCK
 
 
-def test_the_keyboard_stops_a_recording(tmp_path, make_header):
+def test_a_keyboard_interrupt_stops_a_recording(tmp_path, make_header):
     with pytest.raises(KeyboardInterrupt), create_recording(tmp_path / "a.h5", make_header()):
         raise KeyboardInterrupt
     with open_recording(tmp_path / "a.h5") as recording:
@@ -171,7 +171,7 @@ def test_the_keyboard_stops_a_recording(tmp_path, make_header):
         assert recording.samples == 0
 
 
-def test_a_recording_can_only_end_in_an_ending(tmp_path, make_header):
+def test_a_recording_can_only_end_in_a_final_state(tmp_path, make_header):
     with (
         create_recording(tmp_path / "a.h5", make_header()) as writer,
         pytest.raises(RecordingError, match="complete, stopped, failed"),
@@ -179,7 +179,7 @@ def test_a_recording_can_only_end_in_an_ending(tmp_path, make_header):
         writer.finish(RecordingState.INTERRUPTED)
 
 
-def test_events_and_segments_state_where_they_belong(tmp_path, make_header, make_block):
+def test_events_and_segments_have_sample_positions(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.begin_segment("steady", realisation=3, frequency_hz=260.0, direction="up")
         writer.append(make_block(0, 100)[1])
@@ -208,7 +208,7 @@ def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
             writer.end_segment()
 
 
-def test_numbers_that_json_cannot_hold_are_refused(tmp_path, make_header):
+def test_numbers_outside_json_are_refused(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         with pytest.raises(RecordingError, match="'steady' cannot be kept as JSON"):
             writer.begin_segment("steady", frequency_hz=float("nan"))
@@ -218,7 +218,7 @@ def test_numbers_that_json_cannot_hold_are_refused(tmp_path, make_header):
         assert recording.segments[0].numbers == {"frequency_hz": 260.0, "realisation": 3}
 
 
-def test_an_overload_over_several_blocks_is_one_range(tmp_path, make_header, make_block):
+def test_an_overload_across_blocks_is_one_range(tmp_path, make_header, make_block):
     parts = [(0, 99), (100, 149), (200, 210)]
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         for index, (first, last) in enumerate(parts):
@@ -227,7 +227,7 @@ def test_an_overload_over_several_blocks_is_one_range(tmp_path, make_header, mak
         assert recording.overloads == (Overload("m0_velocity", 0, 149), Overload("m0_velocity", 200, 210))
 
 
-def test_more_overloads_than_fit_are_never_forgotten(tmp_path, make_header, make_block):
+def test_surplus_overloads_are_merged_not_lost(tmp_path, make_header, make_block):
     many = tuple(Overload("m0_velocity", 2 * each, 2 * each) for each in range(9000))
     late = (Overload("drive_voltage", 5, 6),)
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=20_000)) as writer:
@@ -251,7 +251,7 @@ def test_more_events_than_fit_are_counted(tmp_path, make_header):
         assert recording.events[-1].text == "5 more events were not kept"
 
 
-def test_a_finished_writer_takes_nothing_more(tmp_path, make_header, make_block):
+def test_a_finished_writer_refuses_samples(tmp_path, make_header, make_block):
     writer = create_recording(tmp_path / "a.h5", make_header())
     assert writer.finish(RecordingState.COMPLETE) == tmp_path / "a.h5"
     with pytest.raises(RecordingError, match="is finished"):

@@ -12,7 +12,7 @@ VIRTUAL = CONFIGS / "virtual_rig.toml"
 
 
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.name)
-def test_every_configuration_that_we_ship_is_valid(path):
+def test_every_shipped_configuration_is_valid(path):
     assert load_rig(path).name
 
 
@@ -86,13 +86,13 @@ def test_a_missing_file_is_refused_with_its_path(tmp_path):
         load_rig(tmp_path / "nowhere.toml")
 
 
-def test_a_configuration_comes_back_from_json_as_it_was():
+def test_a_configuration_round_trips_through_json():
     rig = load_rig(VIRTUAL)
     assert Rig.model_validate_json(rig.model_dump_json()) == rig
 
 
 @pytest.mark.parametrize(("load", "factor"), [('"high-z"', 1.0), ("50.0", 2.0)])
-def test_a_generator_told_of_50_ohm_gives_twice_what_it_shows(tmp_path, load, factor):
+def test_a_generator_set_to_50_ohm_gives_twice_the_displayed_voltage(tmp_path, load, factor):
     rig = load_rig(edited(tmp_path, 'load_ohm = "high-z"', f"load_ohm = {load}"))
     loading = 15000 / 15050
     assert rig.generator.terminal_factor() == pytest.approx(factor * loading)
@@ -106,6 +106,6 @@ def test_the_vibrometer_range_scales_its_channel():
     assert velocity.delay_s == rig.vibrometer.delay_s
 
 
-def test_a_divider_is_taken_out_of_its_channel():
+def test_a_voltage_divider_is_corrected_in_its_channel():
     drive = {channel.role: channel for channel in channels_of(load_rig(VIRTUAL))}[Role.DRIVE_VOLTAGE]
     assert drive.units_per_volt == 2.0

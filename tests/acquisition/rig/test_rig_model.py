@@ -32,7 +32,7 @@ def test_a_direct_coupled_amplifier_holds_the_table_at_its_static_deflection():
     assert model.transfer(BaseQuantity.VELOCITY, 0.0) == 0
 
 
-def test_an_amplifier_with_a_lower_band_edge_passes_no_direct_voltage():
+def test_an_amplifier_with_a_lower_band_edge_blocks_dc():
     model = with_amplifier(low_cut_hz=0.3)
     assert model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, 0.0) == 0
 
@@ -52,7 +52,7 @@ def test_force_over_acceleration_tends_to_the_suspended_mass():
     assert abs(force / acceleration) == pytest.approx(suspended_mass_kg(RIG.shaker), rel=1e-3)
 
 
-def test_the_undamped_unpowered_table_resonates_where_stiffness_and_mass_state():
+def test_the_undamped_table_resonates_at_the_root_of_stiffness_over_mass():
     shaker = RIG.shaker
     resonance_hz = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     model = with_shaker(force_constant_n_per_a=1e-6, suspension_damping_ns_per_m=0.1)
@@ -94,7 +94,7 @@ def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
 
 
 @given(st.floats(1.0, 5e3))
-def test_electrical_power_in_is_heat_and_friction(frequency_hz):
+def test_electrical_power_equals_heat_and_friction(frequency_hz):
     # Mean power of a sine from peak phasors; no specimen takes any.
     shaker = RIG.shaker
     voltage, current, velocity = (

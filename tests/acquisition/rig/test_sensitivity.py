@@ -52,7 +52,7 @@ G = 9.80665
         ("50 mV/Pa", "Pa", 0.05),
     ],
 )
-def test_a_spelling_of_a_data_sheet_has_its_value(text, unit, expected):
+def test_data_sheet_units_are_converted(text, unit, expected):
     assert volts_per_unit(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
@@ -97,7 +97,7 @@ def test_a_spelling_of_a_data_sheet_has_its_value(text, unit, expected):
         ("100 mV/g", "N", "such as '11.2 mV/N'"),
     ],
 )
-def test_a_spelling_without_one_meaning_is_refused(text, unit, said):
+def test_ambiguous_units_are_refused(text, unit, said):
     with pytest.raises(
         ValueError, match="^" + repr(text)[:3].replace("+", r"\+").replace(".", r"\.")
     ) as refused:

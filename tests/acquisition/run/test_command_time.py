@@ -56,7 +56,7 @@ def cycles(drive):
 
 
 @pytest.mark.parametrize("latency_s", [0.02, 0.1, 0.2, 0.35])
-def test_the_check_listens_to_a_tone_whose_commands_have_been_carried_out(bench, tmp_path, latency_s):
+def test_the_check_waits_until_commands_have_taken_effect(bench, tmp_path, latency_s):
     bench.world.latency_s = latency_s
     recorder = carried_out(bench, dwell(), tmp_path)
     assert recorder.ending[0] is RecordingState.COMPLETE
@@ -67,7 +67,7 @@ def test_the_check_listens_to_a_tone_whose_commands_have_been_carried_out(bench,
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.05, 0.3])
-def test_a_tone_settles_from_the_moment_on_at_which_it_plays(bench, tmp_path, latency_s):
+def test_settling_starts_when_the_tone_plays(bench, tmp_path, latency_s):
     bench.world.latency_s = latency_s
     grid = {"start_hz": 200.0, "stop_hz": 260.0, "step_hz": 20.0}
     excitation = SteppedSine(amplitude_vpp=1.0, grid=grid, settle_s=0.2, record_s=0.3)
@@ -81,7 +81,7 @@ def test_a_tone_settles_from_the_moment_on_at_which_it_plays(bench, tmp_path, la
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.02, 0.05, 0.1])
 @pytest.mark.parametrize("step_s", [0.02, 0.05, 0.1, 0.2, 0.5])
-def test_a_sweep_is_right_or_refused(bench, tmp_path, latency_s, step_s):
+def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, latency_s, step_s):
     bench.world.latency_s = latency_s
     plan = sweep(step_s)
     if step_s < 1.25 * latency_s:
@@ -95,7 +95,7 @@ def test_a_sweep_is_right_or_refused(bench, tmp_path, latency_s, step_s):
     assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
 
 
-def test_a_ramp_takes_as_long_as_its_commands_and_the_recorder_stays_with_it(bench, tmp_path):
+def test_a_ramp_lasts_as_long_as_its_commands(bench, tmp_path):
     bench.world.latency_s = 0.25
     most = []
     with Run(bench, dwell(), tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
@@ -106,7 +106,7 @@ def test_a_ramp_takes_as_long_as_its_commands_and_the_recorder_stays_with_it(ben
     assert up.size / RATE == pytest.approx(6 * 0.25, abs=0.01)
 
 
-def test_a_drive_that_falls_behind_ends_the_run_and_states_where(bench, tmp_path):
+def test_a_lagging_drive_ends_the_run_with_its_position(bench, tmp_path):
     plan = sweep(0.05)
     bench.world.latency_s = 0.02
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
@@ -124,7 +124,7 @@ def test_a_drive_that_falls_behind_ends_the_run_and_states_where(bench, tmp_path
 
 
 @pytest.mark.parametrize("stall_s", [0.25, 0.8])
-def test_one_late_moment_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
+def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
     bench.world.latency_s = 0.02
     plan = sweep(0.1)
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
@@ -142,7 +142,7 @@ def test_one_late_moment_is_noted_and_the_run_continues(bench, tmp_path, stall_s
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_stalls_of_a_busy_computer_make_up_no_frequency_far_from_the_plan(bench, tmp_path, seed):
+def test_stalls_of_the_computer_request_no_frequency_outside_the_plan(bench, tmp_path, seed):
     """A sweep from 20 Hz to 600 Hz asked its generator for -186 Hz after some stalls, others for 1,451 Hz."""
     chance = np.random.default_rng(seed)
     plan = sweep(0.1)

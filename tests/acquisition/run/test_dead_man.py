@@ -44,7 +44,7 @@ def terminal(virtual, duration_s):
     return virtual.generator.render(start_s, 1e-4, round(duration_s / 1e-4))
 
 
-def test_a_run_that_stands_still_is_silent_after_its_burst(guarded, tmp_path):
+def test_a_stalled_run_is_silent_after_its_burst(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         next(progress for progress in run if progress.state is RunState.RECORDING)
@@ -113,7 +113,7 @@ def test_the_bursts_are_whole_periods_with_short_gaps_between(guarded, tmp_path)
     assert max(b - a for a, b in gaps) < GUARD_S + 1e-3
 
 
-def test_the_generator_plays_on_after_the_run(guarded, tmp_path):
+def test_the_generator_can_play_again_after_the_run(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         next(progress for progress in run if progress.state is RunState.RECORDING)
@@ -146,7 +146,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_what_can_have_no_dead_man_is_refused_before_anything_of_the_campaign_plays(kind, guarded, tmp_path):
+def test_kinds_without_dead_man_are_refused_before_the_campaign(kind, guarded, tmp_path):
     virtual, bench = guarded
     before_s = virtual.world.time_s
     refused = {"name": "second", "excitation": REFUSED[kind]}
@@ -169,7 +169,7 @@ def test_an_analogue_output_has_no_dead_man(tmp_path):
         deque(Run(bench, PLAN, tmp_path / "run.h5"), maxlen=0)
 
 
-def test_it_needs_the_channel_that_has_bursts(rig):
+def test_a_dead_man_needs_a_channel_with_bursts(rig):
     content = rig.generator.model_dump() | {"dead_man_s": 1.0, "channel": 2}
     with pytest.raises(ValueError, match="channel 1 alone"):
         type(rig.generator).model_validate(content)

@@ -77,7 +77,7 @@ DISKS = {
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", DISKS)
-def test_whatever_the_disk_does_there_is_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
+def test_every_disk_fault_leaves_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
     virtual, connected = laboratory()
     disk, path, said = BadDisk(DISKS[name]), tmp_path / "run.h5", ""
     with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
@@ -107,7 +107,7 @@ def test_whatever_the_disk_does_there_is_silence_a_sentence_and_a_recording(labo
 
 
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])
-def test_a_clock_that_jumps_an_hour_changes_labels_and_nothing_else(laboratory, tmp_path, monkeypatch, by_s):
+def test_a_clock_jump_changes_time_labels_only(laboratory, tmp_path, monkeypatch, by_s):
     """Of the calendar; deadlines go by a clock that no one can set."""
     virtual, connected = laboratory()
     now = time.time

@@ -68,7 +68,7 @@ def recording(laboratory, tmp_path, monkeypatch):
         yield virtual, run
 
 
-def test_a_run_that_stands_still_is_silenced(recording, monkeypatch):
+def test_a_stalled_run_is_silenced(recording, monkeypatch):
     virtual, run = recording
     assert terminal_v(virtual) > 0.5
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 3)
@@ -83,13 +83,13 @@ def test_a_run_that_stands_still_is_silenced(recording, monkeypatch):
         assert recorded.reason.startswith("the run read no samples for 5 s; its output was switched off")
 
 
-def test_a_run_that_stands_still_is_silenced_sooner_once_it_is_stopped(recording):
+def test_a_stalled_run_is_silenced_sooner_after_a_stop(recording):
     virtual, run = recording
     run.switch.ask(StopRequest(Cause.TERMINATED, StopLevel.ABORT, "SIGTERM"))
     until(lambda: terminal_v(virtual) < SILENT_V, drive_guard.STOPPED_BLOCKS * 0.1 + 3.0)
 
 
-def test_a_run_that_continues_is_left_alone(recording, monkeypatch):
+def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
     virtual, run = recording
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 5)
     began_s = monotonic()
@@ -137,7 +137,7 @@ def announced(own_state):
         yield
 
 
-def test_a_stop_is_confirmed_when_the_output_is_off_and_not_before(announced):
+def test_a_stop_is_confirmed_only_after_the_output_is_off(announced):
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
         stop = stopped()
@@ -147,7 +147,7 @@ def test_a_stop_is_confirmed_when_the_output_is_off_and_not_before(announced):
         assert fate_of(stop) is Fate.SILENT
 
 
-def test_a_stop_is_not_confirmed_where_the_output_cannot_be_read_back(announced, monkeypatch):
+def test_a_stop_without_output_read_back_is_not_confirmed(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     guard = DriveGuard(Output(*[InstrumentLost("gone")] * 1000), StopSwitch())
     with guard:
@@ -188,7 +188,7 @@ def test_a_long_ramp_shows_that_it_continues(announced, monkeypatch):
         ramp.join()
 
 
-def test_where_memory_is_short_the_reserve_is_given_back_and_the_output_goes_off():
+def test_without_memory_the_reserve_is_freed_and_the_output_switched_off():
     output = Output(MemoryError())
     with DriveGuard(output, StopSwitch()) as guard:
         guard.begin()
@@ -199,7 +199,7 @@ def test_where_memory_is_short_the_reserve_is_given_back_and_the_output_goes_off
     assert not DRIVES_ON
 
 
-def test_nothing_begins_without_memory_to_hold_back(monkeypatch):
+def test_a_run_without_memory_reserve_is_refused(monkeypatch):
     MEMORY_RESERVE.release()
 
     def exhausted(*_):
@@ -210,7 +210,7 @@ def test_nothing_begins_without_memory_to_hold_back(monkeypatch):
         DriveGuard(Output(), StopSwitch())
 
 
-def test_anything_that_is_done_beside_starts_no_thread_later(monkeypatch):
+def test_background_work_starts_no_new_thread(monkeypatch):
     beside, done = Beside("test"), []
     monkeypatch.setattr(threading.Thread, "start", lambda self: pytest.fail("a thread was started"))
     beside.do(lambda: done.append(1))

@@ -89,7 +89,7 @@ def test_a_converter_that_fails_leaves_silence_and_the_record_so_far(laboratory,
     kept(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
 
 
-def test_a_device_in_another_programs_hands_is_named_before_anything_plays(laboratory):
+def test_a_device_used_by_another_program_is_named_before_output(laboratory):
     virtual, connected = laboratory()
     with bench_on(connected):
         # The generator is let go of first, so that it is the converter that is found busy.
@@ -124,7 +124,7 @@ def test_a_server_that_dies_is_lost_and_the_generator_silent(laboratory, tmp_pat
     kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
 
 
-def test_a_reply_that_comes_too_late_silences(laboratory, tmp_path):
+def test_a_late_reply_silences_the_drive(laboratory, tmp_path):
     virtual, connected = laboratory()
     delay = when_recording(lambda: virtual.faults.delay_reply(60.0))
     with bench_on(connected) as bench:
@@ -134,7 +134,7 @@ def test_a_reply_that_comes_too_late_silences(laboratory, tmp_path):
     kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentError")
 
 
-def test_a_setting_that_the_instrument_replaced_in_silence_is_a_fault(laboratory, tmp_path):
+def test_a_silently_replaced_setting_ends_the_run(laboratory, tmp_path):
     virtual, connected = laboratory()
     # A bench that allows more than the instrument can: 25 Vpp become its default without a word.
     bold = connected.model_copy(

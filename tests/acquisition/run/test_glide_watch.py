@@ -35,7 +35,7 @@ def watched(tones, late_s, step_s, **noise):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_lost_cycles_are_counted_however_many_they_are(seed):
+def test_any_number_of_lost_cycles_is_counted(seed):
     rng = np.random.default_rng(seed)
     tones = np.cumsum(rng.uniform(5.0, 30.0, 6)) + 80.0
     late_s = rng.uniform(0.0, 0.4)
@@ -45,12 +45,12 @@ def test_lost_cycles_are_counted_however_many_they_are(seed):
     assert found == pytest.approx(-max(0.0, lost - delay), abs=0.06)
 
 
-def test_three_whole_cycles_are_not_none():
+def test_three_lost_whole_cycles_are_detected():
     assert watched([150.0, 180.0], 0.1, 1.0, noise_v=0.0) == pytest.approx(-3 + 40 / RATE * 30, abs=0.02)
 
 
 @pytest.mark.parametrize("spacing", list(Spacing))
-def test_a_sweep_that_begins_late_ends_behind(spacing):
+def test_a_late_start_of_a_sweep_is_counted_at_its_end(spacing):
     sweep, late_s = Sweep(90.0, 530.0, 3.0, spacing), 0.02
     time_s = np.arange(round(3.0 * RATE)) / RATE
     watch = GlideWatch(CHANNELS, RATE)
@@ -62,7 +62,7 @@ def test_a_sweep_that_begins_late_ends_behind(spacing):
     assert watch.more_cycles == pytest.approx(-(lost - 40 / RATE * 440), abs=0.4)
 
 
-def test_anything_that_was_read_elsewhere_in_between_begins_the_count_again():
+def test_unobserved_samples_restart_the_count():
     watch = GlideWatch(CHANNELS, RATE)
     blocks = recorded(100.0 * np.arange(5120) / RATE)
     watch.take(blocks[:3], 100.0, 0.3)

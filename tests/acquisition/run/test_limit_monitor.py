@@ -101,7 +101,7 @@ def test_each_limit_ends_the_run_when_it_is_passed_and_is_named(
 
 
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
-def test_a_run_that_keeps_every_limit_continues(rig, kept, frequency_hz, peaks, quantity, limit):
+def test_a_run_within_every_limit_continues(rig, kept, frequency_hz, peaks, quantity, limit):
     five_per_cent_below = {role: 0.95 * peak for role, peak in peaks.items()}
     monitor = monitor_of(only(rig, kept))
     watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
@@ -138,7 +138,7 @@ def test_a_vibrometer_at_its_range_is_named_by_its_range_and_a_converter_by_its_
 
 
 @pytest.mark.parametrize("ending", OnChange)
-def test_a_change_of_the_specimen_ends_a_run_only_where_the_plan_says_so(rig, ending):
+def test_a_change_of_the_specimen_ends_a_run_only_if_planned(rig, ending):
     monitor, quiet = monitor_of(rig, on_changed_specimen=ending), np.zeros((4, BLOCK))
     monitor.require_safe(Block(0, quiet))
     monitor.note_change("The specimen is not what it was.", BLOCK)
@@ -152,7 +152,7 @@ def test_a_change_of_the_specimen_ends_a_run_only_where_the_plan_says_so(rig, en
             assert "vibench twin --new-baseline" in text
 
 
-def test_an_over_range_that_is_only_flagged_is_not_taken_for_an_amplitude(rig):
+def test_a_flagged_over_range_is_no_amplitude(rig):
     monitor = monitor_of(rig)
     for first in range(0, 20 * BLOCK, BLOCK):
         volts = np.zeros((4, BLOCK))
@@ -163,14 +163,14 @@ def test_an_over_range_that_is_only_flagged_is_not_taken_for_an_amplitude(rig):
         monitor.require_safe(Block(first, volts, overloads))
 
 
-def test_a_gap_begins_the_integration_again(rig):
+def test_a_gap_restarts_the_integration(rig):
     monitor = monitor_of(only(rig, "stroke_m"))
     blocks = sine_blocks(rig, 12.0, base_acceleration=20.0)
     watch(monitor, blocks[:20])
     monitor.require_safe(Block(blocks[25].first_sample, np.zeros((4, BLOCK))))
 
 
-def test_a_block_of_a_tenth_of_a_second_is_watched_in_well_under_a_millisecond(rig):
+def test_checking_a_block_of_0_1_s_takes_less_than_a_millisecond(rig):
     monitor = monitor_of(rig)
     blocks = sine_blocks(rig, 100.0, 10.0, base_acceleration=50.0, amplifier_voltage=5.0, m0_velocity=0.1)
     spent_s = []
@@ -182,7 +182,7 @@ def test_a_block_of_a_tenth_of_a_second_is_watched_in_well_under_a_millisecond(r
     assert np.median(spent_s) < 1e-3
 
 
-def test_a_trip_stands_in_the_recording_with_its_numbers(bench, tmp_path):
+def test_a_trip_is_recorded_with_its_numbers(bench, tmp_path):
     plan = Measurement(
         name="run",
         excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1),
@@ -212,7 +212,7 @@ def test_a_trip_stands_in_the_recording_with_its_numbers(bench, tmp_path):
     assert bench.recorder.ending[1] == str(failure.value)
 
 
-def test_an_input_that_drifts_to_its_rest_at_the_beginning_is_not_taken_for_a_stroke(rig):
+def test_settling_of_an_ac_coupled_input_is_no_stroke(rig):
     """An AC-coupled input with a time constant of 0.1 s, half a volt from its rest when the run begins."""
     monitor = monitor_of(rig)
     time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ

@@ -26,7 +26,7 @@ def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
     assert amplitude(motion.displacement) == pytest.approx(gain**2 * 7.0 / turn**2, rel=6e-3)
 
 
-def test_blocks_of_any_size_give_the_motion_of_the_whole():
+def test_the_motion_does_not_depend_on_the_block_size():
     rng = np.random.default_rng(5)
     acceleration = rng.standard_normal(TIME_S.size)
     first, rest = np.split(acceleration, [5120])  # by the first block alone it is known what was there before
@@ -42,7 +42,7 @@ def test_blocks_of_any_size_give_the_motion_of_the_whole():
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 3.0])
-def test_what_still_rings_when_a_run_begins_has_gone_no_further_than_it_rings(phase):
+def test_residual_ringing_at_the_start_does_not_inflate_the_motion(phase):
     """A run that follows the one before at once: base at 66 Hz and 3.6 m/s2, m0 at 95 Hz and 30 mm/s."""
     time_s = TIME_S[: round(0.4 * RATE_HZ)]
     acceleration = 3.6 * np.exp(-60 * time_s) * np.cos(2 * np.pi * 66 * time_s + phase)
@@ -55,7 +55,7 @@ def test_what_still_rings_when_a_run_begins_has_gone_no_further_than_it_rings(ph
         assert np.max(np.abs(stretched)) < 0.3e-3
 
 
-def test_a_constant_offset_moves_nothing():
+def test_a_constant_offset_gives_no_motion():
     motion = BaseTracker(RATE_HZ).follow(np.full(TIME_S.size, 9.81))
     assert np.max(np.abs(motion.displacement)) < 1e-12
 
@@ -71,7 +71,7 @@ def test_an_accelerometer_or_probe_on_m0_shows_the_same_stretch(role, frequency_
     assert amplitude(found) == pytest.approx(amplitude(by_velocity), rel=2e-3)
 
 
-def test_a_mass_that_moves_with_the_base_stretches_no_spring():
+def test_a_mass_moving_with_the_base_gives_no_spring_stretch():
     turn = 2 * np.pi * 10.0
     motion = BaseTracker(RATE_HZ).follow(15.0 * np.sin(turn * TIME_S))
     seen = np.zeros(TIME_S.size, dtype=np.bool_)
@@ -87,7 +87,7 @@ def test_a_mass_on_a_still_base_stretches_its_springs_by_its_own_displacement():
     assert amplitude(stretched) == pytest.approx(1e-3, rel=2e-3)
 
 
-def test_a_vibrometer_past_its_range_is_taken_for_blind_and_not_for_moving():
+def test_an_overloaded_vibrometer_gives_no_motion():
     is_blind = np.ones(TIME_S.size, dtype=np.bool_)
     stuck = SpecimenTracker(RATE_HZ).follow(np.full(TIME_S.size, 1.0), STILL, is_blind)
     assert np.max(np.abs(stuck)) == 0.0

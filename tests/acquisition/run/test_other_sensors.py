@@ -101,7 +101,7 @@ def test_a_probe_and_an_accelerometer_show_the_motion_that_the_vibrometer_shows(
     assert abs(at) == pytest.approx(1.0, rel=3e-4)
 
 
-def test_a_force_cell_shows_what_moves_fixture_and_specimen(tmp_path):
+def test_a_force_cell_measures_the_force_on_fixture_and_specimen(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     with open_recording(path) as recording:
         rate, stop = recording.sample_rate_hz, recording.samples - round(0.4 * recording.sample_rate_hz)
@@ -118,7 +118,7 @@ def test_a_force_cell_shows_what_moves_fixture_and_specimen(tmp_path):
 
 
 @ON_M0
-def test_the_bench_check_hears_a_sensor_on_m0_with_the_right_sign(tmp_path, role):
+def test_the_bench_check_verifies_the_sign_of_a_sensor_on_m0(tmp_path, role):
     with open_bench(rig_with(role, without=("m0_velocity",))) as bench:
         report = bench_report(bench, tmp_path)
     found = {each.name: each.verdict for each in report.findings}
@@ -142,7 +142,7 @@ def test_a_plan_beyond_the_range_of_a_sensor_on_m0_is_refused(role):
     assert not check.is_kept
 
 
-def test_a_dwell_by_accelerometers_has_the_responses_and_causes_of_its_sensors(tmp_path):
+def test_a_dwell_with_accelerometers_gives_responses_of_its_sensors(tmp_path):
     results = [
         analyse_files(
             [measured(rig, tmp_path / str(number), amplitude_vpp=1.5, frequency_hz=260.0, **DWELL)],
@@ -176,7 +176,7 @@ def test_a_dwell_by_accelerometers_has_the_responses_and_causes_of_its_sensors(t
         ({"sensors": {"m9_velocity": sheet("m0_velocity")}}, "m9_velocity"),
     ],
 )
-def test_a_sensor_that_does_not_fit_is_refused(change, words):
+def test_an_unsuitable_sensor_is_refused(change, words):
     with pytest.raises(ValidationError, match=re.escape(words)):
         Rig.model_validate({**BASE.model_dump(mode="json"), **change})
 
@@ -187,7 +187,7 @@ def test_a_channel_without_a_sensor_names_the_table_to_add():
         Rig.model_validate(said)
 
 
-def test_a_first_day_requests_the_sensors_that_the_template_has(tmp_path):
+def test_the_first_day_procedure_covers_all_sensors_of_the_template(tmp_path):
     template = shipped("hardware_configs/virtual_rig_accelerometers.toml")
     keys = {each.key for each in questions_for(template.read_text())}
     assert "vibrometer.serial" not in keys
@@ -214,7 +214,7 @@ def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_pa
         )  # fmt: skip
 
 
-def test_a_sensor_on_m2_is_analysed_by_the_same_path_and_gets_a_report(tmp_path):
+def test_a_sensor_on_m2_is_analysed_and_reported(tmp_path):
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
     path = measured(
         rig_with("m2_acceleration"), tmp_path, kind="white_noise", amplitude_vpp=0.05, settle_s=2.0, **noise
@@ -240,7 +240,7 @@ def test_a_sensor_on_m2_is_analysed_by_the_same_path_and_gets_a_report(tmp_path)
     assert re.findall(r".{30}\bm0\b(?! velocity).{20}", shown) == []
 
 
-def test_a_campaign_by_accelerometers_has_the_results_of_the_vibrometer(tmp_path):
+def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     """The paper's campaign, shortened: noise, sweep and chaotic dwell."""
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
     plans = {
@@ -268,7 +268,7 @@ def test_a_campaign_by_accelerometers_has_the_results_of_the_vibrometer(tmp_path
     assert kinds[0] == kinds[1]
 
 
-def test_a_channel_that_shows_no_mass_is_no_response(tmp_path):
+def test_a_channel_without_a_mass_gives_no_response(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force is no channel that shows the motion of a mass"):

@@ -26,7 +26,7 @@ def half_cosine(samples):
     return 0.5 * (1 - np.cos(np.pi * np.arange(samples) / samples))
 
 
-def test_a_stream_is_its_source_times_a_half_cosine_envelope_sample_by_sample():
+def test_a_stream_is_its_source_times_a_half_cosine_envelope():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     envelope = np.concatenate([half_cosine(512), np.ones(1536), 1 - half_cosine(512), np.zeros(100)])
@@ -36,7 +36,7 @@ def test_a_stream_is_its_source_times_a_half_cosine_envelope_sample_by_sample():
 
 
 @given(cuts=st.lists(st.integers(1, 700), max_size=20))
-def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
+def test_synthesised_samples_do_not_depend_on_the_block_size(cuts):
     whole, pieces = OutputSynthesizer(RATE_HZ), OutputSynthesizer(RATE_HZ)
     for synthesizer in (whole, pieces):
         synthesizer.append([*ramped(Tone(123.4)), *ramped(NOISE)])
@@ -48,7 +48,7 @@ def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
     frequencies=st.lists(st.floats(10, 500), min_size=2, max_size=6),
     hold_s=st.floats(0.001, 0.2),
 )
-def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
+def test_a_tone_with_changing_frequency_is_continuous(frequencies, hold_s):
     synthesizer = OutputSynthesizer(RATE_HZ)
     tones = [Tone(each) for each in frequencies]
     synthesizer.append(
@@ -65,7 +65,7 @@ def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
 
 
 @given(durations=st.lists(st.floats(1e-5, 0.05), min_size=1, max_size=40))
-def test_boundaries_lie_at_the_samples_nearest_to_the_sums_of_all_durations(durations):
+def test_boundaries_are_rounded_to_the_nearest_sample(durations):
     synthesizer = OutputSynthesizer(RATE_HZ)
     levels = [1.0 if number % 2 else 0.5 for number in range(len(durations))]
     phases = [
@@ -81,7 +81,7 @@ def test_boundaries_lie_at_the_samples_nearest_to_the_sums_of_all_durations(dura
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 
-def test_what_sounds_at_the_end_is_released_without_a_step():
+def test_the_last_signal_ends_without_a_step():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(
         [Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)]
@@ -94,7 +94,7 @@ def test_what_sounds_at_the_end_is_released_without_a_step():
     assert synthesizer.is_over
 
 
-def test_anything_that_is_appended_after_the_end_begins_with_the_next_sample():
+def test_a_signal_appended_after_the_end_starts_at_the_next_sample():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     synthesizer.take(4321)
@@ -104,7 +104,7 @@ def test_anything_that_is_appended_after_the_end_begins_with_the_next_sample():
 
 
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
-def test_a_fade_begins_at_the_level_of_now_and_ends_in_silence(taken):
+def test_a_fade_starts_at_the_current_level_and_ends_silent(taken):
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(NOISE))
     synthesizer.take(taken)
@@ -117,7 +117,7 @@ def test_a_fade_begins_at_the_level_of_now_and_ends_in_silence(taken):
     assert synthesizer.level == 0.0
 
 
-def test_a_waveform_is_for_the_generator():
+def test_the_synthesizer_refuses_generator_waveforms():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(ramped(Waveform(np.array([0.0, 1.0]), 1.0)))
     with pytest.raises(ConfigurationError, match="play it by the function generator"):

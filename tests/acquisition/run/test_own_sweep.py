@@ -56,9 +56,7 @@ def excess_cycles(path, excitation):
     ("ends", "spacing"),
     [((150.0, 310.0), Spacing.LINEAR), ((420.0, 70.0), Spacing.LINEAR), ((90.0, 530.0), Spacing.LOGARITHMIC)],
 )
-def test_a_sweep_of_the_generator_is_the_planned_one_from_its_first_sample_to_its_last(
-    tmp_path, ends, spacing
-):
+def test_a_hardware_sweep_matches_its_plan(tmp_path, ends, spacing):
     plan = sweep(*ends, spacing=spacing)
     with open_bench("virtual_rig_keysight") as bench:
         path = run_measurement(bench, plan, tmp_path / "sweep.h5").path
@@ -69,12 +67,12 @@ def test_a_sweep_of_the_generator_is_the_planned_one_from_its_first_sample_to_it
     assert (found.response.frequency_hz[0], found.response.frequency_hz[-1]) == pytest.approx(ends, rel=0.1)
 
 
-def test_a_generator_without_its_own_sweep_is_reported_before_anything_plays():
+def test_a_generator_without_hardware_sweep_is_refused_before_output():
     with pytest.raises(LimitExceeded, match=r"AFG1022.*set swept_by = \"computer\""):
         require_within_limits(sweep(), load_rig("virtual_rig"))
 
 
-def test_a_dead_man_is_not_compatible_with_it(tmp_path):
+def test_a_dead_man_excludes_hardware_sweeps(tmp_path):
     rig = load_rig("virtual_rig_keysight")
     generator = rig.generator.model_copy(update={"dead_man_s": 0.5})
     with (
@@ -84,7 +82,7 @@ def test_a_dead_man_is_not_compatible_with_it(tmp_path):
         run_measurement(bench, sweep(), tmp_path / "sweep.h5")
 
 
-def test_an_amplitude_that_changes_on_the_way_is_the_computers():
+def test_a_sweep_with_changing_amplitude_is_made_by_the_computer():
     with pytest.raises(ValueError, match="swept_by = 'computer'"):
         sweep(hold="velocity")
 
@@ -102,9 +100,7 @@ def test_the_preview_shows_the_whole_sweep():
 @pytest.mark.parametrize(
     ("bench", "swept_by"), [("virtual_rig", "computer"), ("virtual_rig_keysight", "generator")]
 )
-def test_check_and_campaign_are_recorded_at_the_walls_pace_with_the_pause_of_a_laboratory(
-    tmp_path, bench, swept_by
-):
+def test_check_and_campaign_run_in_real_time_with_instrument_delays(tmp_path, bench, swept_by):
     excitations = {
         "noise": WhiteNoise(amplitude_vpp=0.2, band_start_hz=50, band_stop_hz=800, realisations=2, periods=3),
         "dwell": Dwell(amplitude_vpp=0.2, frequency_hz=260, settle_s=0.5, duration_s=2.0),

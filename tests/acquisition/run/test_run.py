@@ -89,7 +89,7 @@ def assert_ended_without_a_jump(bench):
 
 
 class TestThePlanIsCarriedOut:
-    def test_all_states_are_passed_in_order(self, bench, tmp_path):
+    def test_a_run_passes_all_states_in_order(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         assert run.state is RunState.IDLE
         seen = [progress.state for progress in run]
@@ -98,7 +98,7 @@ class TestThePlanIsCarriedOut:
         assert run.state is RunState.FINISHED
         assert_silent_and_finished(bench, RecordingState.COMPLETE)
 
-    def test_every_stretch_has_exactly_its_samples(self, bench, tmp_path):
+    def test_every_segment_has_exactly_its_planned_samples(self, bench, tmp_path):
         play(run_of(bench, tmp_path))
         lengths = {each["label"]: each["last"] - each["first"] + 1 for each in bench.recorder.segments}
         expected = {"check": CHECK_S, "ramp_up": 0.2, "dwell": 0.5, "ramp_down": 0.2}
@@ -124,7 +124,7 @@ class TestThePlanIsCarriedOut:
         expected = AMPLITUDE_VPP / 2 * bench.rig.generator.terminal_factor()
         assert sine_amplitude(volts, 260.0, RATE) == pytest.approx(expected, rel=1e-9)
 
-    def test_the_ramp_is_a_staircase_on_a_half_cosine(self, bench, tmp_path):
+    def test_the_ramp_follows_a_half_cosine_in_steps(self, bench, tmp_path):
         play(run_of(bench, tmp_path))
         ramp = next(each for each in bench.recorder.segments if each["label"] == "ramp_up")
         stairs = [
@@ -224,7 +224,7 @@ class TestSweepsAndSteps:
 
     @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
     @given(settle_s=st.floats(0.0, 0.4), record_s=st.floats(0.01, 0.4))
-    def test_no_sum_of_stretches_drifts_by_more_than_one_sample(
+    def test_segment_boundaries_never_drift_by_more_than_one_sample(
         self, rig, new_bench, tmp_path, settle_s, record_s
     ):
         bench = new_bench(rig)
@@ -249,7 +249,7 @@ class TestEveryWayOut:
         if state is not RunState.CHECKING:
             assert_ended_without_a_jump(bench)
 
-    def test_a_cancel_is_heeded_within_a_block(self, bench, tmp_path):
+    def test_a_cancel_takes_effect_within_a_block(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         shown = upto(run, RunState.RECORDING)
         run.cancel()
@@ -301,7 +301,7 @@ class TestEveryWayOut:
             ("digitizer.read", RuntimeError),
         ],
     )
-    def test_a_failure_silences_and_states_why(self, bench, tmp_path, state, call, fault):
+    def test_a_failure_silences_the_drive_and_records_the_reason(self, bench, tmp_path, state, call, fault):
         run = run_of(bench, tmp_path)
         upto(run, state)
         bench.world.faults[call] = [lambda: fault("it broke")]
@@ -314,7 +314,7 @@ class TestEveryWayOut:
             assert_ended_without_a_jump(bench)
 
     @every_state
-    def test_a_lost_generator_is_still_told_to_stop(self, bench, tmp_path, state):
+    def test_a_lost_generator_still_receives_a_stop_command(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         upto(run, state)
         for name in ("set_amplitude", "set_frequency", "load_sine"):
@@ -324,7 +324,7 @@ class TestEveryWayOut:
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
     @every_state
-    def test_a_generator_that_does_not_stop_is_shouted_out(self, bench, tmp_path, state):
+    def test_a_generator_that_does_not_stop_raises_an_alarm(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         upto(run, state)
         bench.world.permanent["stop"] = lambda: InstrumentLost("THE OUTPUT MAY STILL BE ON")
@@ -356,7 +356,7 @@ class TestEveryWayOut:
             assert_ended_without_a_jump(bench)
 
     @every_state
-    def test_an_error_of_anyone_who_watches_ends_the_run(self, bench, tmp_path, state):
+    def test_an_exception_in_an_observer_ends_the_run(self, bench, tmp_path, state):
         def watch():
             with run_of(bench, tmp_path) as run:
                 upto(run, state)
@@ -374,7 +374,7 @@ class TestEveryWayOut:
         assert not bench.world.is_on
         assert run.outcome.state is RunState.FAILED
 
-    def test_the_first_failure_stays_in_front_when_the_converter_cannot_stop_either(self, bench, tmp_path):
+    def test_the_first_of_two_failures_is_reported(self, bench, tmp_path):
         bench.world.permanent["digitizer.stop"] = lambda: InstrumentLost("cannot stop")
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
@@ -418,7 +418,7 @@ class TestStopLevels:
         assert took_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
         assert_ended_without_a_jump(bench)
 
-    def test_off_switches_off_before_another_sample_is_read(self, bench, tmp_path):
+    def test_off_switches_the_output_off_before_the_next_read(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
@@ -435,13 +435,13 @@ class TestStopLevels:
             "ramp pressed", "abort pressed"
         ]  # fmt: skip
 
-    def test_a_gentler_wish_does_not_soften_a_hard_one(self):
+    def test_a_gentler_stop_does_not_replace_a_harder_one(self):
         switch = StopSwitch()
         switch.ask(StopRequest(Cause.EMERGENCY, StopLevel.ABORT, "first"))
         switch.ask(StopRequest(Cause.OPERATOR, StopLevel.RAMP, "second"))
         assert switch.request.reason == "first"
 
-    def test_the_time_to_silence_stands_in_the_recording(self, bench, tmp_path):
+    def test_the_time_to_silence_is_recorded(self, bench, tmp_path):
         self.ended(bench, tmp_path, StopLevel.ABORT)
         said = next(event[2] for event in bench.recorder.events if event[1] == "silence")
         took_s = float(said.removeprefix("abort: ").partition(" ")[0])
@@ -449,7 +449,7 @@ class TestStopLevels:
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
 
-    def test_a_drive_that_stays_on_is_recorded_and_shouted_out(self, bench, tmp_path):
+    def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         bench.world.stays_on = True
@@ -459,7 +459,7 @@ class TestStopLevels:
         assert "not silent" in next(event[2] for event in bench.recorder.events if event[1] == "silence")
         assert bench.recorder.ending[0] is RecordingState.FAILED
 
-    def test_hum_of_the_wire_is_no_drive(self, bench, tmp_path):
+    def test_mains_hum_does_not_count_as_drive(self, bench, tmp_path):
         bench.world.hum_v = 0.012
         run = run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": LOUD}))
         upto(run, RunState.RECORDING)
@@ -470,7 +470,7 @@ class TestStopLevels:
         )
 
     @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
-    def test_a_held_run_stays_as_it_is_and_continues_where_it_was(self, bench, tmp_path, state):
+    def test_a_held_run_keeps_its_state_and_continues_there(self, bench, tmp_path, state):
         run = run_of(bench, tmp_path)
         before = upto(run, state)
         run.switch.hold()
@@ -483,7 +483,7 @@ class TestStopLevels:
         assert run.state is RunState.FINISHED
         assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2 + 0.3) * RATE)
 
-    def test_a_held_run_is_still_watched(self, bench, tmp_path):
+    def test_limits_are_monitored_during_a_hold(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()
@@ -493,7 +493,7 @@ class TestStopLevels:
             play(run)
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
-    def test_a_hold_ends_by_a_stop(self, bench, tmp_path):
+    def test_a_stop_ends_a_hold(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()
@@ -504,7 +504,7 @@ class TestStopLevels:
         assert_ended_without_a_jump(bench)
 
     @pytest.mark.thorough
-    def test_nobody_holds_longer_than_the_recording_has_room(self, bench, tmp_path):
+    def test_a_hold_ends_when_the_recording_is_full(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()
@@ -523,7 +523,7 @@ class TestRefusals:
         assert bench.recorder.path is None
         return str(caught.value)
 
-    def test_a_plan_past_a_limit_is_refused_before_anything_moves(self, bench, tmp_path):
+    def test_a_plan_beyond_a_limit_is_refused_before_output(self, bench, tmp_path):
         hard = Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)
         text = self.refused(bench, tmp_path, DWELL.model_copy(update={"excitation": hard}), LimitExceeded)
         assert "the stroke (at 20 Hz, peak) would be" in text
@@ -563,7 +563,7 @@ class TestTheBenchCheck:
         assert loudest == pytest.approx(0.02 * AMPLITUDE_VPP)
 
     @pytest.mark.parametrize("fault", [{"drive_factor": 1.1}, {"base_factor": 1.35}, {"base_factor": 0.75}])
-    def test_small_differences_pass(self, bench, tmp_path, fault):
+    def test_small_differences_from_the_configuration_pass(self, bench, tmp_path, fault):
         for name, value in fault.items():
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)
@@ -584,7 +584,7 @@ class TestTheBenchCheck:
 
 
 class TestOverloads:
-    def test_an_overload_is_kept_and_the_run_continues(self, bench, tmp_path):
+    def test_an_overload_is_recorded_and_the_run_continues(self, bench, tmp_path):
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         run = run_of(bench, tmp_path)
         play(run)

@@ -54,7 +54,7 @@ def segment(recording, label):
     return recording.read("drive_voltage", found.first_sample, found.last_sample + 1)
 
 
-def test_a_dwell_arrives_with_its_frequency_and_amplitude(virtual_bench, tmp_path):
+def test_a_recorded_dwell_has_its_frequency_and_amplitude(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1)
     with measured(virtual_bench, tmp_path, dwell) as recording:
         drive = segment(recording, "dwell")
@@ -81,7 +81,7 @@ def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
         np.testing.assert_allclose(levels, heights, atol=2e-3)
 
 
-def test_noise_arrives_flat_and_whole_periods_hold_its_lines(virtual_bench, tmp_path):
+def test_recorded_noise_is_flat_with_lines_in_whole_periods(virtual_bench, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
     )
@@ -100,7 +100,7 @@ def test_noise_arrives_flat_and_whole_periods_hold_its_lines(virtual_bench, tmp_
     assert np.max(lines[900:]) < 0.02 * np.mean(inside)
 
 
-def test_a_sweep_arrives_with_the_cycles_of_the_ideal_one(virtual_bench, tmp_path):
+def test_a_recorded_sweep_has_the_cycles_of_the_ideal_one(virtual_bench, tmp_path):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
     with measured(virtual_bench, tmp_path, sweep) as recording:
         drive = segment(recording, "sweep")
@@ -189,7 +189,7 @@ if __name__ == "__main__":
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for another process")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_a_signal_from_outside_ends_a_run_softly(tmp_path, name):
+def test_a_signal_ends_a_run_with_a_ramp(tmp_path, name):
     script, path = tmp_path / "child.py", tmp_path / "run.h5"
     script.write_text(CHILD)
     with subprocess.Popen(

@@ -269,7 +269,7 @@ def test_the_stated_time_of_an_abort_matches_the_shipped_rig(rig):
 @pytest.mark.thorough
 @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.RECORDING, RunState.RAMPING_DOWN])
 @pytest.mark.parametrize("what", ["removed", "moved"])
-def test_a_folder_that_goes_away_leaves_silence_and_a_sentence(laboratory, tmp_path, state, what):
+def test_a_vanished_folder_leaves_silence_and_a_sentence(laboratory, tmp_path, state, what):
     virtual, connected = laboratory()
     folder = tmp_path / "recordings"
     folder.mkdir()
@@ -313,7 +313,7 @@ def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tm
 
 
 @pytest.mark.thorough
-def test_an_abort_of_a_slow_generator_is_over_in_time(rig, tmp_path):
+def test_an_abort_of_a_slow_generator_meets_its_time(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     plan = PLAN.model_copy(update={"ramp_step_s": 0.015})

@@ -95,9 +95,7 @@ def assert_faded_without_a_step(bench, ramp=RAMP):
 
 class TestThePlanIsCarriedOut:
     @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_the_drive_is_the_planned_noise_under_half_cosines_sample_by_sample(
-        self, streaming_bench, tmp_path, check
-    ):
+    def test_the_drive_is_the_planned_noise_with_half_cosine_ramps(self, streaming_bench, tmp_path, check):
         play(run_of(streaming_bench, tmp_path, check=check))
         begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         hold = round(1.35 * RATE)
@@ -107,7 +105,7 @@ class TestThePlanIsCarriedOut:
         )
 
     @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_every_stretch_lies_where_it_is_heard(self, streaming_bench, tmp_path, check):
+    def test_segments_are_recorded_where_they_are_played(self, streaming_bench, tmp_path, check):
         play(run_of(streaming_bench, tmp_path, check=check))
         begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         found = {
@@ -123,7 +121,7 @@ class TestThePlanIsCarriedOut:
         }
 
     @pytest.mark.parametrize("check", list(LowLevelCheck))
-    def test_the_length_is_known_beforehand(self, streaming_bench, tmp_path, check):
+    def test_the_length_of_a_streamed_run_is_known_before_it_starts(self, streaming_bench, tmp_path, check):
         shown = play(run_of(streaming_bench, tmp_path, check=check))
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert streaming_bench.recorder.header.expected_samples == streaming_bench.recorder.samples
@@ -137,20 +135,20 @@ class TestThePlanIsCarriedOut:
         assert run.state is RunState.FINISHED
         assert_silent_and_finished(streaming_bench, RecordingState.COMPLETE)
 
-    def test_nothing_louder_than_the_check_is_written_before_it_has_passed(self, streaming_bench, tmp_path):
+    def test_only_the_check_level_is_written_before_the_check_passes(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         upto(run, RunState.ARMED)
         assert np.max(np.abs(streaming_bench.world.streamed)) <= 0.5 * 0.02
         run.close()
 
-    def test_the_setting_shown_matches_what_is_heard(self, streaming_bench, tmp_path):
+    def test_the_shown_setting_matches_the_output(self, streaming_bench, tmp_path):
         shown = play(run_of(streaming_bench, tmp_path))
         settings = {progress.state: progress.amplitude_vpp for progress in shown}
         assert settings[RunState.CHECKING] == pytest.approx(0.02)
         assert settings[RunState.RECORDING] == 1.0
         assert settings[RunState.RAMPING_DOWN] == pytest.approx(0.0, abs=1e-12)
 
-    def test_an_output_that_was_never_armed_plays_nothing(self, streaming_bench, tmp_path):
+    def test_an_unarmed_output_plays_nothing(self, streaming_bench, tmp_path):
         streaming_bench.world.permanent["arm"] = lambda: InstrumentLost("no answer")
         with pytest.raises(InstrumentLost, match="no answer"):
             play(run_of(streaming_bench, tmp_path))
@@ -160,7 +158,7 @@ class TestThePlanIsCarriedOut:
 
 class TestEveryWayOut:
     @every_state
-    def test_a_cancel_fades_after_what_is_written(self, streaming_bench, tmp_path, state):
+    def test_a_cancel_fades_after_the_written_samples(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         shown = upto(run, state)
         run.cancel("the operator pressed stop")
@@ -174,7 +172,7 @@ class TestEveryWayOut:
             assert_faded_without_a_step(streaming_bench)
 
     @every_state
-    def test_an_abandoned_run_fades_as_well(self, streaming_bench, tmp_path, state):
+    def test_an_abandoned_run_fades_out(self, streaming_bench, tmp_path, state):
         with run_of(streaming_bench, tmp_path) as run:
             upto(run, state)
         assert run.state is RunState.STOPPED
@@ -183,7 +181,7 @@ class TestEveryWayOut:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @every_state
-    def test_an_exceeded_limit_fades_and_is_named(self, streaming_bench, tmp_path, state):
+    def test_an_exceeded_limit_fades_out_and_is_named(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         upto(run, state)
         streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
@@ -193,7 +191,7 @@ class TestEveryWayOut:
         if state is not RunState.CHECKING:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
-    def test_a_stream_that_is_asked_to_hold_is_ramped_down_and_states_why(self, streaming_bench, tmp_path):
+    def test_a_hold_ramps_a_stream_down_with_a_reason(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()
@@ -203,7 +201,7 @@ class TestEveryWayOut:
         assert_faded_without_a_step(streaming_bench)
 
     @heard_state
-    def test_off_cuts_what_was_written(self, streaming_bench, tmp_path, state):
+    def test_off_discards_written_samples(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         upto(run, state)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
@@ -229,7 +227,7 @@ class TestEveryWayOut:
             ("digitizer.read", KeyboardInterrupt),
         ],
     )
-    def test_when_nothing_can_be_read_a_short_fade_is_written_and_waited_for(
+    def test_a_failing_input_ends_the_output_with_a_short_fade(
         self, streaming_bench, tmp_path, state, call, fault
     ):
         world = streaming_bench.world
@@ -253,7 +251,7 @@ class TestEveryWayOut:
         assert world.played > sounding[-1]
 
     @heard_state
-    def test_an_output_that_takes_no_more_samples_is_stopped_at_once(self, streaming_bench, tmp_path, state):
+    def test_an_output_that_refuses_samples_is_stopped_at_once(self, streaming_bench, tmp_path, state):
         world = streaming_bench.world
         run = run_of(streaming_bench, tmp_path)
         upto(run, state)
@@ -263,7 +261,7 @@ class TestEveryWayOut:
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
 
     @heard_state
-    def test_an_output_that_does_not_stop_is_shouted_out(self, streaming_bench, tmp_path, state):
+    def test_an_output_that_does_not_stop_raises_an_alarm(self, streaming_bench, tmp_path, state):
         run = run_of(streaming_bench, tmp_path)
         upto(run, state)
         streaming_bench.world.permanent["output.stop"] = lambda: InstrumentLost("MAY STILL BE PLAYING")
@@ -273,7 +271,7 @@ class TestEveryWayOut:
         assert "MAY STILL BE PLAYING" in streaming_bench.recorder.ending[1]
         assert not streaming_bench.world.is_sampling
 
-    def test_the_generator_is_left_alone(self, streaming_bench, tmp_path):
+    def test_a_streamed_run_does_not_command_the_generator(self, streaming_bench, tmp_path):
         play(run_of(streaming_bench, tmp_path))
         calls = {name for name, _, _ in streaming_bench.world.calls}
         assert calls.isdisjoint({"load_sine", "load_waveform", "start", "set_amplitude"})

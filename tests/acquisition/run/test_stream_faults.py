@@ -138,7 +138,7 @@ def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laborato
     kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
-def test_a_server_that_dies_leaves_at_most_what_was_written_and_reports_it(laboratory, tmp_path):
+def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
     virtual, connected = laboratory()
     die = when_recording(virtual.faults.lose_daq_server)
     with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING") as failure, bench_on(connected) as bench:
@@ -155,7 +155,7 @@ def test_a_server_that_dies_leaves_at_most_what_was_written_and_reports_it(labor
 @pytest.mark.parametrize(
     ("code", "kind"), [(-200279, DataLost), (-200361, DataLost), (-200284, InstrumentError)]
 )
-def test_inputs_that_fail_let_the_output_fade(laboratory, tmp_path, code, kind):
+def test_failing_inputs_fade_the_output_out(laboratory, tmp_path, code, kind):
     virtual, connected = laboratory()
     fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
     with bench_on(connected) as bench:
@@ -167,7 +167,7 @@ def test_inputs_that_fail_let_the_output_fade(laboratory, tmp_path, code, kind):
     kept(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
 
 
-def test_ctrl_c_fades_within_a_block_what_is_written_and_a_ramp(laboratory, tmp_path):
+def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path):
     virtual, connected = laboratory()
     elapsed_s = []
 
@@ -216,7 +216,7 @@ class FillingDisk:
 
 
 @pytest.mark.skipif(resource is None, reason="limits on file size exist on POSIX only")
-def test_a_full_disk_lets_the_output_fade_and_keeps_what_was_written(laboratory, tmp_path):
+def test_a_full_disk_fades_the_output_out_and_keeps_the_recording(laboratory, tmp_path):
     virtual, connected = laboratory()
     long = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"duration_s": 120})})
     with bench_on(connected) as bench:
@@ -230,7 +230,7 @@ def test_a_full_disk_lets_the_output_fade_and_keeps_what_was_written(laboratory,
         assert recording.samples > 0
 
 
-def test_leaving_the_bench_silences_an_output_that_a_script_left_playing(laboratory):
+def test_leaving_the_bench_silences_a_playing_output(laboratory):
     virtual, connected = laboratory()
     with bench_on(connected) as bench:
         bench.output.write(np.full(25_600, 1.0))

@@ -90,7 +90,7 @@ def played(streamed):
 
 
 @pytest.mark.thorough
-def test_anything_that_is_recorded_is_what_the_plan_previews_to_the_converters_noise(streamed):
+def test_the_recording_matches_the_preview_within_converter_noise(streamed):
     expected = played(streamed)
     begin = streamed.segments["ramp_up"].start
     assert streamed.segments["ramp_down"].stop - begin == expected.size
@@ -104,7 +104,7 @@ def test_anything_that_is_recorded_is_what_the_plan_previews_to_the_converters_n
     assert np.max(np.abs(left)) < 10 * NOISE_V
 
 
-def test_between_check_and_ramp_there_is_silence(streamed):
+def test_the_output_is_silent_between_check_and_ramp(streamed):
     quiet = streamed.drive_v[streamed.segments["check"].stop + 4000 : streamed.segments["ramp_up"].start]
     assert quiet.size > 0.2 * RATE_HZ
     assert np.std(quiet) == pytest.approx(NOISE_V, rel=0.1)
@@ -117,7 +117,7 @@ def test_the_check_at_low_level_plays_through_the_output(streamed):
     assert streamed.state is RecordingState.COMPLETE
 
 
-def test_the_recording_states_what_played(streamed):
+def test_the_recording_names_its_output(streamed):
     assert "analogue output" in streamed.log
     assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
 

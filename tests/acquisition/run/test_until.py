@@ -51,7 +51,7 @@ def seconds(recording, label):
     ]
 
 
-def test_a_dwell_ends_when_its_response_is_known(rig, tmp_path):
+def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=120)
     outcome, recording, seen = measured(rig, tmp_path, dwell, Until(response_ii=0.01))
     with recording:
@@ -69,7 +69,7 @@ def test_a_dwell_ends_when_its_response_is_known(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_wish_that_is_not_met_ends_at_the_longest_time(rig, tmp_path):
+def test_an_unmet_bound_ends_at_the_longest_time(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
     outcome, recording, _ = measured(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
     with recording:
@@ -81,7 +81,7 @@ def test_a_wish_that_is_not_met_ends_at_the_longest_time(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_steps_end_one_by_one(rig, tmp_path):
+def test_each_step_ends_when_its_bound_is_met(rig, tmp_path):
     steps = SteppedSine(amplitude_vpp=0.1, frequencies_hz=(150, 160), settle_s=0.3, record_s=60)
     _, recording, _ = measured(rig, tmp_path, steps, Until(response_ii=0.02, shortest_s=1.0))
     with recording:
@@ -111,7 +111,7 @@ def test_noise_ends_after_a_whole_realisation_and_the_ramp_down(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_stream_that_is_written_ahead_ends_too(tmp_path):
+def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
     rig = load_rig(CONFIGS / "virtual_rig_streaming.toml")
     output = rig.daq.output.model_copy(update={"ahead_s": 2.0})
     rig = rig.model_copy(
@@ -130,7 +130,7 @@ def test_a_stream_that_is_written_ahead_ends_too(tmp_path):
     assert 5 <= recorded_s < 110
 
 
-def test_a_stop_ends_a_recording_that_waits_for_a_bound(rig, tmp_path):
+def test_a_stop_ends_a_recording_with_until(rig, tmp_path):
     switch = StopSwitch()
     plan = Measurement(
         name="run",
@@ -177,6 +177,6 @@ def test_the_recording_continues_when_the_analysis_has_died(rig, tmp_path, monke
         ({"response_i": 0.5}, "not within 20 s"),
     ],
 )
-def test_the_time_left_follows_the_root_of_time(bounds, said):
+def test_the_remaining_time_is_predicted_by_the_root_of_time(bounds, said):
     progress = UntilNote(stretch=1, wishes={"response_i": 0.01}, bounds=bounds, looked_s=4.0, longest_s=20.0)
     assert said in progress.sentence

@@ -63,7 +63,7 @@ def a_name_that_is_no_text(folder):
 @pytest.mark.parametrize(
     "litter", [no_text, a_pipe, a_folder, a_circle, a_power_of_two, a_name_that_is_no_text]
 )
-def test_litter_beside_an_announcement_hides_nobody(litter):
+def test_foreign_files_do_not_hide_announcements(litter):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         litter(engines_folder())
@@ -72,7 +72,7 @@ def test_litter_beside_an_announcement_hides_nobody(litter):
 
 
 @pytest.mark.timeout(15)
-def test_a_stop_that_is_a_pipe_is_obeyed_without_a_reason():
+def test_a_stop_file_that_is_a_pipe_stops_without_a_reason():
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         (program,) = announced_programs(Program)
@@ -81,14 +81,14 @@ def test_a_stop_that_is_a_pipe_is_obeyed_without_a_reason():
     assert switch.request.level is StopLevel.OFF
 
 
-def test_a_reason_that_is_no_text_stops_as_well():
+def test_an_undecodable_reason_still_stops():
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke \udcff") is StopDelivery.TAKEN
     assert switch.request.reason == "smoke ?"
 
 
-def test_who_is_announced_stays_so_when_the_state_folder_is_emptied(own_state):
+def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_state):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         engines_folder().rename(own_state / "moved away")
@@ -96,7 +96,7 @@ def test_who_is_announced_stays_so_when_the_state_folder_is_emptied(own_state):
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
-def test_what_a_killed_program_has_left_is_removed_when_the_next_one_begins():
+def test_leftovers_of_a_killed_program_are_removed_by_the_next_one():
     script = (
         "from vibench.acquisition import *; a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
     )
@@ -112,13 +112,13 @@ def test_what_a_killed_program_has_left_is_removed_when_the_next_one_begins():
         assert not left.exists()
 
 
-def test_a_computer_that_gets_another_name_finds_its_own(monkeypatch):
+def test_announcements_are_found_after_the_computer_was_renamed(monkeypatch):
     with stop_on_signal(StopSwitch(), "dwell"):
         monkeypatch.setattr("platform.node", lambda: "renamed")
         assert [each.what for each in announced_programs(Program)] == ["dwell"]
 
 
-def test_who_lives_and_refuses_a_connection_is_stopped_all_the_same():
+def test_a_running_program_that_refuses_connections_is_stopped():
     pressed = []
     with announce(
         EngineAddress(host="127.0.0.1", port=1, token="t"), "night", lambda *told: pressed.append(told)
@@ -140,7 +140,7 @@ def of_nobody(monkeypatch):
         os.seteuid(0)
 
 
-def test_what_root_has_announced_in_a_users_folder_is_stopped_by_that_user(of_nobody):
+def test_a_user_can_stop_a_program_of_root_in_their_folder(of_nobody):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         os.seteuid(NOBODY)
@@ -149,14 +149,14 @@ def test_what_root_has_announced_in_a_users_folder_is_stopped_by_that_user(of_no
     assert switch.request.reason == "smoke"
 
 
-def test_a_folder_that_may_not_be_read_is_no_empty_one(of_nobody):
+def test_an_unreadable_folder_is_not_treated_as_empty(of_nobody):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
     with pytest.raises(AcquisitionError, match="cannot be looked for in the state folder"):
         programs_to_stop(None)[0]
 
 
-def test_a_folder_with_foreign_modes_gets_its_own(of_nobody):
+def test_wrong_permissions_of_the_state_folder_are_corrected(of_nobody):
     engines_folder().chmod(0o300)
     os.seteuid(NOBODY)
     with stop_on_signal(StopSwitch(), "dwell"):
@@ -175,7 +175,7 @@ except AcquisitionError as error:
 """
 
 
-def test_a_full_state_folder_refuses_the_program_and_keeps_no_file_of_it(own_state):
+def test_a_full_state_folder_refuses_the_program_without_leftovers(own_state):
     script = [sys.executable, "-c", ON_A_FULL_DISK]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
     assert "a script cannot be announced in the state folder" in ended.stdout, ended.stderr

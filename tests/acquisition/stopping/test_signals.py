@@ -37,7 +37,7 @@ UNCATCHABLE = ("SIGKILL", "SIGSTOP")
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 @pytest.mark.parametrize("number", VALID, ids=signal_name)
-def test_a_signal_that_would_end_or_stop_the_program_is_an_abort(number, default, tmp_path, monkeypatch):
+def test_terminating_and_stopping_signals_abort_the_run(number, default, tmp_path, monkeypatch):
     if signal_name(number) in LEFT_TO_THE_DEAD_MAN:
         assert number not in heeded_signals()
         return
@@ -61,7 +61,7 @@ def lives_through(number):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_second_ctrl_z_does_not_insist(default, tmp_path, monkeypatch):
+def test_a_second_ctrl_z_does_not_stop_harder(default, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
@@ -72,7 +72,7 @@ def test_a_second_ctrl_z_does_not_insist(default, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_the_run_within_another_takes_the_signal(default, tmp_path, monkeypatch):
+def test_a_nested_run_takes_the_signal(default, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     outer, inner = StopSwitch(), StopSwitch()
     with stop_on_signal(outer, "campaign"), stop_on_signal(inner, "dwell"):
@@ -81,7 +81,7 @@ def test_the_run_within_another_takes_the_signal(default, tmp_path, monkeypatch)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_signal_that_the_program_handles_itself_is_left_to_it(default, tmp_path, monkeypatch):
+def test_signals_handled_by_the_program_are_not_taken_over(default, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     taken, switch = [], StopSwitch()
     signal.signal(signal.SIGUSR2, lambda number, frame: taken.append(number))

@@ -5,7 +5,7 @@ from threading import Event
 from vibench.acquisition.stopping.program import Watchdog
 
 
-def test_a_look_that_fails_is_not_the_last(caplog):
+def test_the_watchdog_continues_after_a_failed_check(caplog):
     looks, thrice = [], Event()
 
     def look():
