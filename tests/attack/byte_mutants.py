@@ -1,4 +1,4 @@
-"""Bytes that are nearly right: for files and frames whose inside is numbers at fixed places."""
+"""Mutants of binary files and frames with numbers at fixed positions."""
 
 import random
 import struct

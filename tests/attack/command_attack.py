@@ -1,4 +1,4 @@
-"""An attack on commands: cases made by number, each run in a process of its own and judged by its end."""
+"""An attack on commands: numbered cases, each run in a separate process and judged by its result."""
 
 import random
 from collections.abc import Callable

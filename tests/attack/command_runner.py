@@ -1,4 +1,4 @@
-"""Commands one after the other, each in a process of its own that is bounded in time and memory.
+"""Run commands one after another, each in a process with limits on time and memory.
 
 Starting an interpreter and importing takes seconds, so one process imports everything and forks itself for
 each command. What is forked ends for good: nothing of a command reaches the next one.

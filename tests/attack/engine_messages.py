@@ -1,4 +1,4 @@
-"""Broken messages to a real engine: before the token and after it, in its frames and in what it is asked."""
+"""Broken messages to a real engine: before and after the token, in frames and in requests."""
 
 import json
 import random

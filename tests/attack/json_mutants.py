@@ -1,4 +1,4 @@
-"""JSON documents that are nearly right: values of other types and sizes, keys too many and too few."""
+"""Mutants of JSON documents: values of other types and sizes, additional and missing keys."""
 
 import json
 import random

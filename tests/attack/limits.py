@@ -1,4 +1,4 @@
-"""What may happen when a command reads a damaged file: bounds, how it ended, and what was wrong with that."""
+"""Limits for commands that read damaged files: allowed endings, bounds, and violations found."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

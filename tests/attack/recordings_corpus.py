@@ -1,4 +1,4 @@
-"""Small good recordings of every sort, to be broken: three excitations, a hole, a result, a cut-off one."""
+"""Small intact recordings to be mutated: three excitations, a gap, a result, an interrupted one."""
 
 import shutil
 import tempfile

@@ -1,4 +1,4 @@
-"""A server of ours as a process of its own, watched from outside: its output, memory and descriptors."""
+"""A vibench server in a separate process, observed from outside: output, memory and descriptors."""
 
 import os
 import subprocess

@@ -32,7 +32,7 @@ SEED = 2025
     ],
     ids=["toml", "imports", "engine", "instruments", "replies", "altered"],
 )
-def test_nothing_that_is_broken_does_what_none_may_do(attack, count):
+def test_no_mutant_violates_the_limits_of_its_attack(attack, count):
     tally = attack(Shard(SEED, count))
     assert tally.tried == count
     assert tally.findings == [], tally.line()

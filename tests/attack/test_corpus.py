@@ -1,4 +1,4 @@
-"""Cases that attacks have found, each a file: refused in one sentence, quickly, and nothing is left of them.
+"""Files found by attacks: each is refused in one sentence, quickly and without leftovers.
 
 `corpus/campaign` and `corpus/study` are read as such, `corpus/imports` by `vibench import`. Whatever an
 attack finds is made small and put there, under a name that says what is wrong with it.
@@ -27,7 +27,7 @@ def runner():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("path", [*found("campaign"), *found("study")], ids=lambda path: path.stem)
-def test_a_broken_toml_file_is_refused_in_a_sentence_that_names_it(runner, path):
+def test_a_broken_toml_file_is_refused_by_name(runner, path):
     ending = runner.run(toml_files.reading(path.parent.name, path.read_bytes()))
     assert (ending.code, ending.faults, ending.made) == (1, (), ())
     assert ending.err.startswith("error: broken.toml: ")
@@ -35,7 +35,7 @@ def test_a_broken_toml_file_is_refused_in_a_sentence_that_names_it(runner, path)
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("path", found("imports"), ids=lambda path: path.stem)
-def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it(runner, path):
+def test_a_broken_imported_file_is_refused_by_name(runner, path):
     case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)
     ending = runner.run(case)
     assert (ending.code, imported_files.faults(case, ending)) == (1, ())
@@ -44,7 +44,7 @@ def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it
 
 
 @pytest.mark.parametrize("suffix", imported_files.WRITERS)
-def test_the_attack_breaks_files_that_are_imported_while_they_are_whole(runner, suffix):
+def test_the_unbroken_files_of_the_attack_can_be_imported(runner, suffix):
     ending = runner.run(
         imported_files.reading(suffix, imported_files.good_files()[suffix], *imported_files.MAKING)
     )
@@ -68,7 +68,7 @@ LONG = "x" * 300
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_a_name_that_no_disk_takes_is_one_sentence(runner, arguments):
+def test_an_impossible_file_name_gives_one_sentence(runner, arguments):
     ending = runner.run(Case(arguments, toml_files.GOOD))
     assert (ending.code, ending.faults) == (1, ())
     assert "is too long" in ending.err

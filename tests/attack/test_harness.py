@@ -1,4 +1,4 @@
-"""What the attacks stand on: mutants by number, shards that add up, commands judged by how they end."""
+"""The attack harness: numbered mutants, shards and their sums, judgement of commands."""
 
 import random
 import time
@@ -18,7 +18,7 @@ REFUSED = replace(GOOD, code=1, err="error: what was given is not allowed; give 
 
 
 @pytest.mark.parametrize("ending", [GOOD, REFUSED, replace(GOOD, code=2, err="Usage: vibench ...")])
-def test_an_answer_and_a_sentence_are_no_faults(ending):
+def test_results_and_one_sentence_errors_are_no_faults(ending):
     assert ending.faults == ()
 
 
@@ -37,7 +37,7 @@ def test_an_answer_and_a_sentence_are_no_faults(ending):
         replace(REFUSED, err=REFUSED.err + "x" * LONGEST_COMPLAINT),
     ],
 )
-def test_each_thing_that_may_not_be_is_a_fault(ending):
+def test_every_violation_of_the_limits_is_a_fault(ending):
     assert len(ending.faults) == 1
 
 
@@ -85,7 +85,7 @@ def test_a_shard_continues_from_its_file(tmp_path):
         tried(7, part=1)
 
 
-def test_mutants_of_nothing_are_mutants_too():
+def test_an_empty_document_has_mutants():
     for number in range(200):
         chance = random.Random(number)
         assert isinstance(mutated_bytes(b"", chance, (b"abc",)), bytes)

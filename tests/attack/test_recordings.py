@@ -24,7 +24,7 @@ def found_again(name, seed, number):
 
 @pytest.mark.parametrize(("name", "seed", "number"), FOUND)
 @pytest.mark.attack
-def test_anything_that_was_found_once_is_fixed(name, seed, number):
+def test_earlier_findings_are_fixed(name, seed, number):
     assert found_again(name, seed, number) == ()
 
 
@@ -38,7 +38,7 @@ def test_good_recordings_of_every_sort_give_numbers(tmp_path):
         assert recordings_flips.verdict_of_file(path)[0] == said
 
 
-def test_a_flip_that_changed_numbers_unnoticed_would_be_found():
+def test_an_undetected_bit_flip_would_be_reported():
     assert recordings_flips.faults("1234", "5678", 0.1, 1) == ("other numbers, unnoticed",)
     assert recordings_flips.faults("refused: it is damaged", "5678", 0.1, 1) == ()
     assert recordings_flips.faults("5678", "5678", 0.1, 1) == ()
@@ -50,7 +50,7 @@ def test_a_flip_that_changed_numbers_unnoticed_would_be_found():
     [20, pytest.param(150, marks=pytest.mark.attack), pytest.param(10_000, marks=pytest.mark.slow)],
 )
 @pytest.mark.timeout(7200)
-def test_a_bit_turned_over_is_noticed_or_changes_no_number(count):
+def test_a_bit_flip_is_detected_or_changes_no_result(count):
     tally = recordings_flips.attack(Shard(seed=3, count=count))
     assert tally.findings == []
     assert tally.tried == count
@@ -59,7 +59,7 @@ def test_a_bit_turned_over_is_noticed_or_changes_no_number(count):
 
 @pytest.mark.parametrize("count", [pytest.param(60, marks=pytest.mark.attack)])
 @pytest.mark.timeout(1800)
-def test_a_broken_recording_is_answered_by_a_sentence(count):
+def test_a_broken_recording_gives_one_sentence(count):
     tally = recordings_mutants.attack(Shard(seed=3, count=count))
     assert tally.findings == []
     assert tally.codes["1"] > count / 2
@@ -70,7 +70,7 @@ def test_a_broken_recording_is_answered_by_a_sentence(count):
     "faults", [pytest.param(6, marks=pytest.mark.attack), pytest.param(200, marks=pytest.mark.slow)]
 )
 @pytest.mark.timeout(7200)
-def test_what_exact_system_calls_do_loses_nothing_and_records_nothing_twice(faults):
+def test_faults_at_exact_system_calls_lose_or_repeat_no_point(faults):
     tally, number, kinds = Tally("calls"), 0, recordings_kills.CALL_KINDS
     while sum(tally.codes.get(kind, 0) for kind in kinds) < faults:
         tally.add(recordings_kills.attack_calls(Shard(seed=42, count=number + 1, part=number)))
@@ -80,7 +80,7 @@ def test_what_exact_system_calls_do_loses_nothing_and_records_nothing_twice(faul
 
 @pytest.mark.attack
 @pytest.mark.timeout(1800)
-def test_twenty_five_kills_lose_nothing_and_make_no_point_twice():
+def test_twenty_five_kills_lose_or_repeat_no_point():
     tally = Tally("kills")
     number = kills = 0
     # Whether a campaign ends before the moment of its kill depends on the machine: so its number varies.

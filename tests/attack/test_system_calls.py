@@ -1,4 +1,4 @@
-"""A system call that did its work and reports an error, or did not: the program looks at the disk."""
+"""System calls that report an error with or without success: the program checks the disk."""
 
 import errno
 import os
@@ -141,7 +141,7 @@ def ended(library, code, folder, call, when, fault="ENOSPC"):
 
 
 @pytest.mark.parametrize("code", [EXPORT, STOP, ANNOUNCEMENT])
-def test_a_file_is_reported_as_written_exactly_when_it_is_there(library, tmp_path, code):
+def test_a_file_is_reported_as_written_only_if_it_exists(library, tmp_path, code):
     refused = ended(library, code, tmp_path, "rename", "before")
     assert "No space left on device" in refused.stderr
     assert [each.name for each in tmp_path.iterdir()] == (["file.coming"] if code is ANNOUNCEMENT else [])
@@ -152,14 +152,14 @@ def test_a_file_is_reported_as_written_exactly_when_it_is_there(library, tmp_pat
     assert (tmp_path / "file").read_text() == "all of it"
 
 
-def test_an_export_whose_leftover_cannot_be_removed_is_an_export(library, tmp_path):
+def test_an_export_succeeds_if_only_its_leftover_remains(library, tmp_path):
     made = ended(library, EXPORT, tmp_path, "unlink", "before")
     assert (made.returncode, made.stderr) == (0, "")
     assert (tmp_path / "file").read_text() == "all of it"
 
 
 @pytest.mark.parametrize("when", WHEN)
-def test_a_result_is_reported_as_added_exactly_when_it_is_in_the_recording(library, tmp_path, when):
+def test_a_result_is_reported_as_added_only_if_it_is_stored(library, tmp_path, when):
     path = tmp_path / "dwell.h5"
     path.write_bytes(good_recordings()["dwell.h5"])
     made = ended(library, RESULT, tmp_path, "rename", when)
@@ -187,7 +187,7 @@ def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path
 
 
 @pytest.mark.parametrize("when", WHEN)
-def test_recordings_are_listed_where_their_catalogue_cannot_be_removed(library, tmp_path, when):
+def test_recordings_are_listed_despite_an_unremovable_catalogue(library, tmp_path, when):
     (tmp_path / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
     listed = ended(library, CATALOGUE, tmp_path, "unlink", when)
     assert (listed.stdout, listed.stderr) == ("1 1\n", "")
@@ -234,7 +234,7 @@ for name, read in READ.items():
 
 
 @pytest.mark.thorough
-def test_a_disk_that_cannot_be_read_is_not_a_damaged_file(library, tmp_path):
+def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
@@ -245,7 +245,7 @@ def test_a_disk_that_cannot_be_read_is_not_a_damaged_file(library, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_rename_that_was_made_ends_no_campaign_whatever_it_reports(library, tmp_path, number):
+def test_a_rename_that_reports_an_error_after_success_does_not_end_the_campaign(library, tmp_path, number):
     recordings_kills.laid(tmp_path, "virtual_rig_streaming")
     with KilledCampaigns(library) as runs:
         run = runs.run(tmp_path, kind="rename after ENOSPC", number=number)
@@ -255,7 +255,7 @@ def test_a_rename_that_was_made_ends_no_campaign_whatever_it_reports(library, tm
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("when", ["before", "after"])
-def test_a_point_that_was_recovered_when_the_journal_failed_is_not_recorded_twice(library, tmp_path, when):
+def test_a_point_recovered_after_a_journal_failure_is_not_repeated(library, tmp_path, when):
     recordings_kills.laid(tmp_path, "virtual_rig_streaming")
     out = tmp_path / "out"
     with KilledCampaigns(library) as runs:

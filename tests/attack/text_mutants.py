@@ -1,4 +1,4 @@
-"""Texts that are nearly right: TOML, and lines of fields as in CSV and universal files."""
+"""Mutants of texts: TOML, and lines of fields as in CSV and universal files."""
 
 import random
 import re

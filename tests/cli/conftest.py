@@ -1,4 +1,4 @@
-"""The command line in processes of its own, or in this one where nothing of a process matters."""
+"""Run the command line in separate processes, or in this one where that makes no difference."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A campaign of short points as a real process that is killed again and again, and what must come out."""
+"""A campaign of short points in a real process that is killed repeatedly, and its expected result."""
 
 import random
 import signal

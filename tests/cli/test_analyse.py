@@ -42,9 +42,7 @@ def changed(good, folder, change):
     return path
 
 
-def test_options_choose_estimator_quantity_and_resolution_and_are_named_in_the_answer(
-    vibench_here, good, tmp_path
-):
+def test_options_for_estimator_quantity_and_resolution_are_applied_and_reported(vibench_here, good, tmp_path):
     asked = ("--estimator", "h1", "--quantity", "velocity/acceleration", "--resolution", "5", "--scale", "db")
     done = vibench_here(
         "analyse", good, "--no-simulate", "--json", "--out", tmp_path / "out", *asked, cwd=tmp_path
@@ -62,7 +60,7 @@ def test_options_choose_estimator_quantity_and_resolution_and_are_named_in_the_a
     assert "Estimator h1; hann segments of 0.3 s overlapping by 50 %, lines 5 Hz wide." in page
 
 
-def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench_here, noise, tmp_path):
+def test_a_growing_recording_is_analysed_up_to_its_last_sample(vibench_here, noise, tmp_path):
     plan, base, velocity, parts = noise
     half = round(SECONDS * synthetic.RATE / 2)
     with synthetic.begun_recording(
@@ -81,7 +79,7 @@ def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench_here, n
 
 
 @pytest.mark.thorough
-def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed(vibench, good, tmp_path):
+def test_a_bad_recording_does_not_prevent_analysis_of_the_others(vibench, good, tmp_path):
     folder = tmp_path / "night[red]"
     folder.mkdir()
     shutil.copy(good, folder / "good.h5")
@@ -97,7 +95,7 @@ def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed
     assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 
 
-def test_a_single_bad_recording_leaves_no_report_behind(vibench_here, tmp_path):
+def test_a_single_bad_recording_leaves_no_report(vibench_here, tmp_path):
     (tmp_path / "nothing.h5").touch()
     done = vibench_here("analyse", "nothing.h5", cwd=tmp_path)
     assert done.returncode == 1
@@ -105,7 +103,7 @@ def test_a_single_bad_recording_leaves_no_report_behind(vibench_here, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["nothing.h5"]
 
 
-def test_options_that_contradict_each_other_are_one_sentence(vibench_here, good, tmp_path):
+def test_contradictory_options_are_refused_in_one_sentence(vibench_here, good, tmp_path):
     done = vibench_here("analyse", good, "--resolution", "1", "--averages", "9", cwd=tmp_path)
     assert done.returncode == 1
     assert "a resolution and a number of averages were given; give one" in done.stderr
@@ -152,11 +150,11 @@ def without_plan(file):
         (without_plan, "the plan in changed.h5 is not one this version of vibench can read"),
     ],
 )
-def test_a_recording_that_cannot_be_understood_states_what_is_wrong_with_it(good, tmp_path, change, said):
+def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, change, said):
     assert said in sentence(changed(good, tmp_path, change))
 
 
-def test_channels_that_hold_nothing_are_named(noise, tmp_path):
+def test_silent_channels_are_named(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
     assert "m0_velocity holds the same value throughout" in sentence(dead)
@@ -172,7 +170,7 @@ def test_channels_that_hold_nothing_are_named(noise, tmp_path):
     assert "holds no samples" in sentence(lost)
 
 
-def test_a_sine_that_just_fills_its_range_is_analysed(tmp_path):
+def test_a_sine_at_full_scale_is_analysed(tmp_path):
     base = synthetic.sine(4.0, 260.0, 5e-7)
     time_s = synthetic.times(4.0)
     plan = Dwell(amplitude_vpp=0.01, frequency_hz=260.0, settle_s=2.0, duration_s=2.0)
@@ -182,7 +180,7 @@ def test_a_sine_that_just_fills_its_range_is_analysed(tmp_path):
     assert not analyse_files([path], "full", Simulation.LEFT_OUT).failures
 
 
-def test_what_to_look_at_before_a_result_is_trusted_is_printed(vibench_here, tmp_path):
+def test_warnings_about_a_result_are_printed(vibench_here, tmp_path):
     """It stood in the report alone."""
     base = synthetic.sine(4.0, 260.0, 5e-7)
     velocity = 0.1 * np.sin(2 * np.pi * 260.0 * synthetic.times(4.0))

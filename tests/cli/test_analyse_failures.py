@@ -1,4 +1,4 @@
-"""How `analyse` ends: without a result it fails, without the simulation of a result it does not."""
+"""Exit codes of `analyse`: a missing result fails, a missing simulation does not."""
 
 import pytest
 import typer
@@ -11,7 +11,7 @@ def ended(what):
     return CampaignResults("night", (), (AnalysisFailure("a.h5", what, "the reason"),))
 
 
-def test_a_result_without_its_simulation_is_noted_and_is_no_failure(capsys):
+def test_a_missing_simulation_is_noted_without_a_failure(capsys):
     complain_about(ended(FailedStep.SIMULATION))
     assert capsys.readouterr().err == "note: a.h5: the reason\n"
 

@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
     return place
 
 
-def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell(vibench_here, folder):
+def test_json_contains_fit_intervals_and_undetermined_parameters(vibench_here, folder):
     result = vibench_here("analyse", folder, "--fit", "--no-simulate", "--json", cwd=folder)
     assert result.returncode == 0, result.stderr
     fit = json.loads(result.stdout)["specimen_fit"]
@@ -47,7 +47,7 @@ def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell
     assert any("gap stays as the bench says" in each for each in fit["not_told"])
 
 
-def test_the_fit_is_stated_in_words(vibench_here, folder, tmp_path):
+def test_the_fit_is_printed_in_words(vibench_here, folder, tmp_path):
     result = vibench_here(
         "analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder
     )

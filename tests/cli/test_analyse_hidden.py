@@ -1,4 +1,4 @@
-"""`vibench analyse --hidden`: the hidden motion in numbers, figures and report, or a sentence why not."""
+"""`vibench analyse --hidden`: hidden motion in numbers, figures and report, or why it is absent."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ def test_the_hidden_motion_is_reported_in_numbers_figures_and_the_report(vibench
     assert len(rows) == pytest.approx(len(true), rel=0.01)
 
 
-def test_json_has_bounds_and_states_what_is_not_determined(vibench_here, shaken, tmp_path):
+def test_json_contains_bounds_and_undetermined_values(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--json", cwd=tmp_path)
     told = json.loads(done.stdout)["hidden_motion"]["shaken"]
     gap = told["parameters"]["upper_gap_m"]
@@ -44,9 +44,7 @@ def test_json_has_bounds_and_states_what_is_not_determined(vibench_here, shaken,
     assert told["without_contact_model"]["gaps_m"] == pytest.approx([GAP_M, GAP_M], abs=0.5e-6)
 
 
-def test_a_recording_of_what_cannot_be_tracked_gets_a_sentence_and_the_rest_its_report(
-    vibench_here, tmp_path, monkeypatch
-):
+def test_an_untrackable_recording_gets_a_sentence_beside_the_report(vibench_here, tmp_path, monkeypatch):
     rigid = world.RIG.specimen.model_copy(update={"contact": "rigid:0.8"})
     monkeypatch.setattr(world, "RIG", world.RIG.model_copy(update={"specimen": rigid}))
     recorded = world.shaken(tmp_path, 260.0, 1.5, seed=51, specimen=gong2025())
@@ -55,9 +53,7 @@ def test_a_recording_of_what_cannot_be_tracked_gets_a_sentence_and_the_rest_its_
     assert (tmp_path / "told" / "report.html").exists()
 
 
-def test_a_specimen_that_cannot_be_tracked_is_refused_before_anything_is_computed(
-    vibench_here, shaken, tmp_path
-):
+def test_an_untrackable_specimen_is_refused_before_computation(vibench_here, shaken, tmp_path):
     options = ("--hidden", "--specimen", "rigid_stops", "--out", "told")
     done = vibench_here("analyse", shaken.path, *options, cwd=tmp_path)
     assert done.returncode == 1
@@ -65,7 +61,7 @@ def test_a_specimen_that_cannot_be_tracked_is_refused_before_anything_is_compute
     assert not (tmp_path / "told").exists()
 
 
-def test_a_kept_motion_goes_out_with_the_recording(vibench_here, shaken, tmp_path):
+def test_a_stored_hidden_motion_is_exported_with_the_recording(vibench_here, shaken, tmp_path):
     path = tmp_path / "shaken.h5"
     path.write_bytes(shaken.path.read_bytes())
     done = vibench_here("analyse", path, "--hidden", "--keep", "--no-simulate", "--json", cwd=tmp_path)
@@ -80,7 +76,7 @@ def test_a_kept_motion_goes_out_with_the_recording(vibench_here, shaken, tmp_pat
     assert kept["impact_impulse"]["values"].size == kept["impact_time"]["values"].size
 
 
-def test_keeping_without_a_hidden_motion_is_refused(vibench_here, shaken, tmp_path):
+def test_storing_without_a_hidden_motion_is_refused(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--keep", cwd=tmp_path)
     assert done.returncode != 0
     assert "--keep was given without --hidden" in done.stderr

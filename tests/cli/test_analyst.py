@@ -7,7 +7,7 @@ from vibench.analysis import AnalysisError
 from vibench.cli.demo import second_process
 
 
-def test_the_end_of_the_process_that_analyses_is_reported_and_ends_no_measurement(tmp_path):
+def test_a_dead_analysis_process_is_reported_and_does_not_end_the_measurement(tmp_path):
     recording = tmp_path / "of today" / "dwell.h5"
     with second_process("campaign", 5) as analyst:
         analyst.take(recording)

@@ -1,4 +1,4 @@
-"""`vibench bench new`: the configuration that it writes, the page that it keeps, and what it refuses."""
+"""`vibench bench new`: the configuration and page that it writes, and what it refuses."""
 
 import re
 import shlex
@@ -42,7 +42,7 @@ def new(*arguments):
 
 
 @pytest.mark.thorough
-def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
+def test_a_bench_configuration_is_created_checked_and_documented(tmp_path, monkeypatch):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert done.exit_code == 0, done.output
@@ -63,7 +63,7 @@ def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
 
 
 @pytest.mark.thorough
-def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
+def test_unconfirmed_wiring_ends_the_procedure_before_output(tmp_path):
     (tmp_path / "answers.toml").write_text('operator = "A. Student"')
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert done.exit_code == 1
@@ -79,21 +79,21 @@ def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("wired", ["false", '"no"', '" No "', '""'])
-def test_a_wire_that_is_not_plugged_in_ends_the_day(tmp_path, wired):
+def test_a_missing_wire_ends_the_procedure(tmp_path, wired):
     (tmp_path / "answers.toml").write_text(f"wired = {wired}")
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert done.exit_code == 1
     assert "Nothing has played" in str(done.exception)
 
 
-def test_a_file_beside_the_target_is_left_alone(tmp_path):
+def test_a_file_beside_the_target_is_kept(tmp_path):
     (tmp_path / "lab.toml.draft").write_text("mine")
     configure(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
     assert (tmp_path / "lab.toml.draft").read_text() == "mine"
 
 
 @pytest.mark.parametrize(("answer", "gain_db"), [(".5", 0.5), ("010", 10.0), ("1e1", 10.0), ("-3", -3.0)])
-def test_a_number_as_people_write_it_is_one(tmp_path, answer, gain_db):
+def test_common_number_formats_are_accepted(tmp_path, answer, gain_db):
     rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": [answer]})
     assert (rig.amplifier.gain_db, wrong) == (gain_db, [])
 
@@ -101,7 +101,7 @@ def test_a_number_as_people_write_it_is_one(tmp_path, answer, gain_db):
 SENSITIVITY = "accelerometer.sensitivity_v_per_m_per_s2"
 
 
-def test_a_sensitivity_is_taken_with_the_unit_of_its_certificate(tmp_path):
+def test_a_sensitivity_is_accepted_in_the_unit_of_its_certificate(tmp_path):
     rig, wrong = asked_of_a_person(tmp_path, {SENSITIVITY: ["10 pC/g", "10 mV/m/s2", "much", "100 mV/g"]})
     assert rig.accelerometer.sensitivity_v_per_m_per_s2 == pytest.approx(0.1 / 9.80665)
     assert [
@@ -109,21 +109,21 @@ def test_a_sensitivity_is_taken_with_the_unit_of_its_certificate(tmp_path):
     ] == [True] * 3
 
 
-def test_a_number_takes_the_place_of_a_sensitivity_with_its_unit(tmp_path):
+def test_a_plain_number_replaces_a_sensitivity_with_unit(tmp_path):
     text = with_answer(LAB.read_text(encoding="utf-8"), SENSITIVITY, "100 mV/g", "note")
     assert value_in(text, SENSITIVITY) == '"100 mV/g"'
     assert value_in(with_answer(text, SENSITIVITY, "0.0102", "note"), SENSITIVITY) == "0.0102"
 
 
 @pytest.mark.parametrize("name", ["B\udce9nch", "a\x7fb", "two\nlines"])
-def test_a_letter_that_cannot_be_written_is_asked_again(tmp_path, name):
+def test_undecodable_input_is_asked_again(tmp_path, name):
     rig, wrong = asked_of_a_person(tmp_path, {"name": [name, "Bénch"]})
     assert rig.name == "Bénch"
     assert "cannot be shown" in wrong[0]
 
 
 @pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
-def test_answers_that_cannot_be_read_or_have_no_place_are_reported_in_a_sentence(tmp_path, content):
+def test_unreadable_or_unknown_answers_give_one_sentence(tmp_path, content):
     if content is not None:
         (tmp_path / "answers.toml").write_bytes(content)
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
@@ -131,7 +131,7 @@ def test_answers_that_cannot_be_read_or_have_no_place_are_reported_in_a_sentence
     assert not list(tmp_path.glob("mine*"))
 
 
-def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
+def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
     """The handler of a check would only ask it to stop, and the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
@@ -143,7 +143,7 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
     assert switch.request is None
 
 
-def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeypatch):
+def test_ctrl_c_at_a_question_stops_without_writing(tmp_path, monkeypatch):
     def stopped(*_given, **_named):
         raise typer.Abort
 
@@ -155,7 +155,7 @@ def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
-def test_ctrl_c_at_a_knob_is_a_stop_before_anything_is_energised(monkeypatch):
+def test_ctrl_c_at_a_knob_stops_before_output(monkeypatch):
     def stopped(_question):
         raise KeyboardInterrupt
 
@@ -165,14 +165,14 @@ def test_ctrl_c_at_a_knob_is_a_stop_before_anything_is_energised(monkeypatch):
         confirm_at_terminal(())
 
 
-def test_a_number_that_nothing_can_be_computed_with_is_asked_again(tmp_path):
+def test_a_number_too_large_to_compute_with_is_asked_again(tmp_path):
     rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
     assert rig.amplifier.gain_db == 3.0
     assert "amplifier.gain_db" in wrong[0]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
-def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path):
+def test_a_partly_written_configuration_is_removed(tmp_path):
     """A full disk; begin again would find the name taken."""
     import resource
 
@@ -186,14 +186,14 @@ def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_place_that_is_no_folder_is_reported_before_anything_is_asked(tmp_path):
+def test_a_target_that_is_no_folder_is_reported_before_any_question(tmp_path):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "no" / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert isinstance(done.exception, ConfigurationError)
     assert "is not a folder" in str(done.exception)
 
 
-def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_path):
+def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
     (tmp_path / "faults.toml").write_text(
         '[[faults]]\nat_s = 0.0\nfault = "turn_amplifier_gain"\ngain_db = 16\n'
     )
@@ -209,7 +209,7 @@ def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_pa
     assert "two per cent" not in page
 
 
-def test_anything_that_is_seen_alone_is_proposed_and_its_driver_and_product_entered(tmp_path):
+def test_the_only_instrument_found_is_proposed_with_driver_and_product(tmp_path):
     only = seen("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
@@ -219,7 +219,7 @@ def test_anything_that_is_seen_alone_is_proposed_and_its_driver_and_product_ente
     assert "# CONFIRM: input of the 2706" in text, "comments on what was not asked stay"
 
 
-def test_an_answer_of_the_wrong_kind_is_refused_and_nothing_is_written(tmp_path):
+def test_an_answer_of_the_wrong_type_is_refused(tmp_path):
     def ask(question, choices, held):
         return "ten" if question.key == "amplifier.gain_db" else ""
 
@@ -228,7 +228,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_nothing_is_written(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_value_that_a_bench_cannot_have_is_refused_and_nothing_is_written(tmp_path):
+def test_an_impossible_bench_value_is_refused_without_writing(tmp_path):
     def ask(question, choices, held):
         return "-5" if question.key == "generator.settle_s" else ""
 
@@ -251,7 +251,7 @@ def asked_of_a_person(tmp_path, given):
     return rig, wrong
 
 
-def test_a_person_is_asked_again_at_once_after_a_wrong_answer(tmp_path):
+def test_a_wrong_answer_is_asked_again_at_once(tmp_path):
     rig, wrong = asked_of_a_person(
         tmp_path, {"amplifier.gain_db": ["ten", "700", "12"], "generator.settle_s": ["-1", "0.2"]}
     )
@@ -262,7 +262,7 @@ def test_a_person_is_asked_again_at_once_after_a_wrong_answer(tmp_path):
     assert load_rig(tmp_path / "lab.toml") == rig
 
 
-def test_answers_that_do_not_agree_are_asked_again_and_the_first_ones_kept(tmp_path):
+def test_only_contradictory_answers_are_asked_again(tmp_path):
     place = "daq.channels.{}.physical".format
     rig, wrong = asked_of_a_person(
         tmp_path,
@@ -274,7 +274,7 @@ def test_answers_that_do_not_agree_are_asked_again_and_the_first_ones_kept(tmp_p
     assert ".draft" not in wrong[0]
 
 
-def test_a_broken_package_of_somebody_s_does_not_end_the_first_day(tmp_path, monkeypatch):
+def test_a_broken_third_party_package_does_not_end_the_procedure(tmp_path, monkeypatch):
     metadata = tmp_path / "somebody-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
@@ -287,7 +287,7 @@ def test_a_broken_package_of_somebody_s_does_not_end_the_first_day(tmp_path, mon
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda each: each.key)
 @pytest.mark.parametrize("template", [LAB, VIRTUAL], ids=["lab", "virtual"])
-def test_every_question_has_a_place_in_the_templates(template, question):
+def test_every_question_has_a_key_in_the_templates(template, question):
     text = template.read_text()
     held = value_in(text, question.key)
     answer = {"{": "1.25", '"': "word"}.get(held[:1], "2026-03-04" if held.count("-") == 2 else "0.125")

@@ -16,7 +16,7 @@ from .killed_campaign import short_points, slow_rig
 HARDWARE_CONFIGS = Path(__file__).parents[2] / "hardware_configs"
 
 
-def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_path):
+def test_an_estimate_is_one_json_document_and_writes_no_file(vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
     arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
     result = vibench_here(*arguments, cwd=tmp_path)
@@ -28,7 +28,7 @@ def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_campaign_is_catalogued_and_its_end_is_reported(vibench, tmp_path):
+def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
     measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)
@@ -46,7 +46,7 @@ def test_a_campaign_is_catalogued_and_its_end_is_reported(vibench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibench, tmp_path):
+def test_a_campaign_accepts_only_settings_confirmed_at_its_check(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
     checked = vibench("bench", "check", "--bench", bench, "--knobs", knobs, cwd=tmp_path)
@@ -64,7 +64,7 @@ def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibe
 
 
 @pytest.mark.thorough
-def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench, tmp_path):
+def test_a_foreign_file_is_not_overwritten_by_a_knob_sheet(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     before = plan.read_text()
     refused = vibench("bench", "check", "--bench", bench, "--knobs", plan, cwd=tmp_path)
@@ -93,9 +93,7 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert searching.startswith("3 recordings (2 kept), at most 1:02:03 (h:min:s) of rig time")
 
 
-def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_number(
-    vibench_here, tmp_path
-):
+def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(vibench_here, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")
     bench = tmp_path / "late.toml"
@@ -106,7 +104,7 @@ def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_
     assert not (tmp_path / "out").exists()
 
 
-def test_an_estimate_states_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):
+def test_an_estimate_reports_a_missing_output_of_the_bench(vibench_here, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     result = vibench_here(
         "measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate", cwd=tmp_path

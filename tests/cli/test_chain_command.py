@@ -1,4 +1,4 @@
-"""`vibench chain`, as it is typed."""
+"""`vibench chain` on the command line."""
 
 import json
 import re
@@ -23,7 +23,7 @@ def answer(*arguments):
     return json.loads(result.stdout)
 
 
-def test_without_a_drive_bands_gaps_and_transmission_are_reported():
+def test_a_chain_without_drive_reports_bands_gaps_and_transmission():
     found = answer("--cells", 3)
     assert found["runs"] == []
     assert [round(low, 1) for low, _ in found["gaps_hz"]] == [96.1, 373.4, 701.3]
@@ -32,7 +32,7 @@ def test_without_a_drive_bands_gaps_and_transmission_are_reported():
     np.testing.assert_allclose(found["linear_transmission"]["3"], expected)
 
 
-def test_a_steady_chain_is_answered_cell_by_cell_and_written(tmp_path):
+def test_a_steady_chain_gives_results_per_cell_and_a_file(tmp_path):
     options = ("--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.2, "--settle", 0.1)
     found = answer(*options, "--out", tmp_path / "out")
     (point,) = found["runs"]
@@ -61,7 +61,7 @@ def test_a_swept_chain_shows_its_gap_and_follows_the_transmission_without_contac
         assert last[np.argmin(np.abs(over_hz - 405.0))] < 1e-3 * last[np.argmin(np.abs(over_hz - 520.0))]
 
 
-def test_studies_over_the_number_of_cells_and_cells_that_take_turns():
+def test_chain_lengths_and_alternating_cells_can_be_studied():
     options = ("--amplitude", 20e-6, "--frequency", 220, "--duration", 0.1, "--settle", 0, "--gap", 20e-6)
     found = answer("--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
     assert [each["cells"] for each in found["runs"]] == [1, 2, 3]
@@ -73,7 +73,7 @@ def test_studies_over_the_number_of_cells_and_cells_that_take_turns():
 
 
 @pytest.mark.parametrize("frequency", ["220", "200:300"])
-def test_a_run_that_is_lost_states_how_it_ended_and_nothing_else_is_claimed(frequency, tmp_path):
+def test_a_lost_run_reports_only_its_ending(frequency, tmp_path):
     options = (
         "--cells",
         2,
@@ -94,7 +94,7 @@ def test_a_run_that_is_lost_states_how_it_ended_and_nothing_else_is_claimed(freq
     assert "1 did not reach their end" in run(*options).output
 
 
-def test_a_run_without_time_for_an_error_states_that_it_is_not_known():
+def test_a_run_too_short_for_an_error_reports_it_as_unknown():
     found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
     assert "error not known" in found.output
     assert not re.search(r"\binf\b", found.output)

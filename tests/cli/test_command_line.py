@@ -50,7 +50,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
 
 
 @pytest.mark.thorough
-def test_a_campaign_a_file_and_a_page_are_results_as_json(vibench, tmp_path):
+def test_campaign_file_and_page_are_reported_as_json(vibench, tmp_path):
     measured = vibench("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
     (row,) = json.loads(measured.stdout)["recordings"]
     assert (row["name"], row["outcome"]) == ("dwell", "recorded")
@@ -63,7 +63,7 @@ def test_a_campaign_a_file_and_a_page_are_results_as_json(vibench, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
-def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
+def test_a_stopped_campaign_still_reports_failed_points(tmp_path):
     text = QUICK + QUICK.split("\n", 2)[2].replace('"dwell"\nramp', '"long"\nramp').replace(
         "= 1.5 }", "= 900 }"
     )
@@ -99,7 +99,7 @@ def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )
-def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench_here, tmp_path, old, new, said):
+def test_a_wrong_campaign_is_refused_in_one_sentence_without_output(vibench_here, tmp_path, old, new, said):
     result = vibench_here(
         "measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings", cwd=tmp_path
     )
@@ -110,7 +110,7 @@ def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench_here, tmp_pa
     assert not list(tmp_path.glob("recordings/*"))
 
 
-def test_a_bench_without_its_instruments_is_one_sentence(vibench_here, tmp_path):
+def test_missing_instruments_are_reported_in_one_sentence(vibench_here, tmp_path):
     text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     bench = tmp_path / "bench.toml"
     real = text.split("\n[virtual]\n")[0]
@@ -160,7 +160,7 @@ def committed(part):
         return 0
 
 
-def test_a_bench_check_is_kept_and_can_be_shown_again(vibench_here, tmp_path):
+def test_a_bench_check_is_stored_and_can_be_shown_again(vibench_here, tmp_path):
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / "state")}
     made = vibench_here("bench", "check", "--json", cwd=tmp_path, environment=environment)
     shown = vibench_here("bench", "check", "--last", "--json", cwd=tmp_path, environment=environment)
@@ -169,7 +169,7 @@ def test_a_bench_check_is_kept_and_can_be_shown_again(vibench_here, tmp_path):
     assert len(list((tmp_path / "state").rglob("*.json"))) == 2, "the last check, and the last that passed"
 
 
-def test_faults_that_cannot_be_played_are_refused_before_anything_is_opened(vibench_here, tmp_path):
+def test_invalid_simulated_faults_are_refused_before_opening(vibench_here, tmp_path):
     script = tmp_path / "faults.toml"
     script.write_text('[[faults]]\nat_s = 1\nfault = "fill_disk"\n', encoding="utf-8")
     served = vibench_here("serve-rig", "--address", "127.0.0.1:0", "--faults", script, cwd=tmp_path)
@@ -199,9 +199,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vib
 
 
 @pytest.mark.parametrize("words", [("--amplitude", "5um"), ("--amplitude", "5e-6", "--gap=45um")])
-def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stand_there(
-    vibench_here, tmp_path, words
-):
+def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_path, words):
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
     assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
@@ -218,9 +216,7 @@ def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stan
         (("analyse", "x.h5", "--draws", "many"), "'many' is not a number"),
     ],
 )
-def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(
-    vibench_here, tmp_path, words, said
-):
+def test_an_invalid_word_or_number_is_refused_with_the_given_value(vibench_here, tmp_path, words, said):
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
     assert said in " ".join(result.stderr.replace("│", " ").split())
@@ -237,7 +233,7 @@ def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(
         (("bench", "new", ""), "an argument"),
     ],
 )
-def test_nothing_is_no_path_and_no_name(vibench_here, tmp_path, words, place):
+def test_empty_paths_and_names_are_refused(vibench_here, tmp_path, words, place):
     """An empty variable of the shell filled the folder that the user stood in."""
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
@@ -263,7 +259,7 @@ def test_a_name_may_end_with_an_equals_sign(vibench_here, tmp_path):
         ),
     ],
 )
-def test_an_option_that_would_do_nothing_is_refused(vibench_here, tmp_path, words, said):
+def test_an_option_without_effect_is_refused(vibench_here, tmp_path, words, said):
     result = vibench_here(*words, cwd=tmp_path)
     assert result.returncode == 1
     assert said in result.stderr
@@ -285,7 +281,7 @@ def test_a_page_that_is_a_folder_is_refused_before_anything_is_computed(vibench_
         (("--notify", "mail 'me"), "close every quotation mark"),
     ],
 )
-def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, said):
+def test_senseless_options_are_refused_before_output(vibench_here, tmp_path, words, said):
     result = vibench_here("measure", campaign(tmp_path), "--out", "recordings", *words, cwd=tmp_path)
     assert result.returncode == 1
     assert said in result.stderr
@@ -293,7 +289,7 @@ def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, 
 
 
 @pytest.mark.parametrize("name", [":smile:", "[red]rig[/red]", r"C:\[bold]", "[/]"])
-def test_a_name_is_shown_as_it_is_whatever_it_looks_like(vibench_here, tmp_path, name):
+def test_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_path, name):
     refused = vibench_here("verify", f"{name}.h5", cwd=tmp_path)
     assert f"{name}.h5" in refused.stderr + refused.stdout
     bars = Progress(words("{task.description}"), console=errors)
@@ -309,7 +305,7 @@ def test_a_name_is_shown_as_it_is_whatever_it_looks_like(vibench_here, tmp_path,
         ("chain", "--cells", "2", "--frequency", "100"),
     ],
 )
-def test_micrometres_typed_as_metres_are_doubted_by_every_command(vibench_here, tmp_path, words):
+def test_every_command_questions_micrometres_typed_as_metres(vibench_here, tmp_path, words):
     """What would compute for minutes is refused here, after the doubt, by where its answer was to go."""
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     given = ("--amplitude", "5", "--gap", "45", "--out", "file")
@@ -320,7 +316,7 @@ def test_micrometres_typed_as_metres_are_doubted_by_every_command(vibench_here, 
     assert "if 5 micrometres were meant, give 5e-06" in said
 
 
-def test_micrometres_typed_as_metres_are_doubted_in_a_map(vibench_here, tmp_path):
+def test_a_map_questions_micrometres_typed_as_metres(vibench_here, tmp_path):
     (tmp_path / "map.toml").write_text("gap_m = 45\namplitude_m = { start = 1, stop = 50, points = 5 }\n")
     said = vibench_here("map", "map.toml", "--out", "map", "--estimate", cwd=tmp_path).stderr
     assert "warning: a gap of 45 m" in said

@@ -62,7 +62,7 @@ def test_weak_noise_shows_the_three_linear_resonances_within_one_percent(results
     assert resonances_hz(results["noise_weak"]) == pytest.approx(LINEAR_HZ, rel=0.01)
 
 
-def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_no_other(results):
+def test_strong_noise_shows_exactly_the_two_terminal_resonances_within_two_percent(results):
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
 
 
@@ -103,7 +103,7 @@ def test_another_program_reads_the_response_the_coherence_and_the_densities(demo
         )
 
 
-def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own(demo):
+def test_the_linear_transmission_matches_the_closed_form_within_tight_bounds(demo):
     with open_recording(demo / "recordings" / "noise_weak.h5") as recording:
         measured = analyse(recording).response.frequency_response
     truth = base_transmissibility(gong2025(), measured.frequency_hz)[:, 0]
@@ -118,7 +118,7 @@ def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own
     assert np.max(measured.half_width) < 0.03
 
 
-def test_every_measurement_is_one_of_the_draws_of_its_twin(results):
+def test_every_measurement_is_consistent_with_the_draws_of_its_twin(results):
     """One in a hundred quantities lies outside its own limit by chance, and some 15 are compared."""
     for name, found in results.items():
         assert found["simulated"]["drive"] == "recorded amplifier voltage", name
@@ -134,7 +134,7 @@ def test_every_measurement_is_one_of_the_draws_of_its_twin(results):
     assert escape is None or escape["what"] == "collisions"
 
 
-def test_the_collision_region_begins_where_its_twin_has_it(results):
+def test_the_collision_region_begins_where_its_twin_predicts(results):
     sweep = results["sweep_moderate"]
     (measured,) = sweep["measured"]["collision_regions"]
     (simulated,) = sweep["simulated"]["collision_regions"]

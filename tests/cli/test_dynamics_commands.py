@@ -1,4 +1,4 @@
-"""`vibench branches` and `vibench spectrum`, as they are typed."""
+"""`vibench branches` and `vibench spectrum` on the command line."""
 
 import json
 import re
@@ -50,7 +50,7 @@ def test_branches_along_the_level_are_reported_in_sentences():
     assert "1 branches (0 isolated)" in result.output
 
 
-def test_what_a_bench_can_hold_is_reported_beside_branches():
+def test_branches_report_which_motions_a_bench_can_hold():
     bench = shipped("hardware_configs/virtual_rig.toml")
     result = run(
         "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
@@ -63,7 +63,7 @@ def test_what_a_bench_can_hold_is_reported_beside_branches():
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
 
-def test_a_bench_with_a_real_time_controller_holds_what_that_one_is_quick_enough_for():
+def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     result = run(
         "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
@@ -75,7 +75,7 @@ def test_a_bench_with_a_real_time_controller_holds_what_that_one_is_quick_enough
 
 
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
-def test_without_damping_motions_are_neither_unstable_nor_do_they_bifurcate_by_rounding(options):
+def test_rounding_causes_no_instability_or_bifurcation_without_damping(options):
     result = run(
         "branches", "--damping-time", 0, "--amplitude", 5e-6, "--frequency", "200:201", "--places", 2,
         "--starts", 1, "--json", *options,
@@ -122,7 +122,7 @@ LINE = ("--amplitude", "5e-6", "--frequency", "60:70")
     ],
 )
 @pytest.mark.parametrize("value", ["-1", "nan"])
-def test_a_number_that_is_not_allowed_is_named_as_it_was_typed(command, value):
+def test_an_invalid_number_is_quoted_as_typed(command, value):
     result = run(*command, value)
     said = f"{result.exception} {result.output}"
     assert result.exit_code != 0
@@ -131,7 +131,7 @@ def test_a_number_that_is_not_allowed_is_named_as_it_was_typed(command, value):
 
 
 @pytest.mark.parametrize("command", [("spectrum", *POINT, "--duration"), ("branches", *LINE, "--places")])
-def test_zero_is_named_as_it_was_typed(command):
+def test_zero_is_quoted_as_typed(command):
     assert f"{command[-1]} was given as 0" in refused(*command, "0")
 
 
@@ -198,7 +198,7 @@ def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(arguments, sai
     ],
 )
 @pytest.mark.timeout(30)
-def test_numbers_that_no_specimen_has_are_refused_at_once(arguments, told):
+def test_impossible_specimen_values_are_refused_at_once(arguments, told):
     """They were tracebacks, warnings of numpy, or took minutes."""
     assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
 

@@ -21,7 +21,7 @@ role = "m0_velocity"
 """
 
 
-def test_a_folder_that_is_called_after_a_level_gives_its_whole_name_to_its_crate(recorded, tmp_path):
+def test_a_crate_keeps_a_folder_name_that_contains_a_dot(recorded, tmp_path):
     folder = tmp_path / "lauf 0.5Vpp"
     folder.mkdir()
     recorded.rename(folder / "run.h5")
@@ -47,7 +47,7 @@ def run(recorded, monkeypatch):
     return lambda *arguments: CliRunner().invoke(app, arguments)
 
 
-def test_a_recording_goes_out_and_comes_back(run, recorded):
+def test_a_recording_round_trips_through_export_and_import(run, recorded):
     out = run("export", "run.h5", "--to", "uff", "--until", "1.5")
     assert out.stdout.splitlines() == ["wrote run.uff", "wrote run.uff.facts.json"]
     (channel,) = json.loads(run("import", "run.uff", "--json").stdout)["channels"]
@@ -62,7 +62,7 @@ def test_a_recording_goes_out_and_comes_back(run, recorded):
 
 
 @pytest.mark.parametrize("folder", [".", "made", "..", "made/", "new/", "other/new"])
-def test_a_folder_takes_a_file_of_the_usual_name(run, recorded, folder):
+def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folder):
     """Of "." the export was a traceback, of any other folder a name that is taken; of a new one a file."""
     recorded.with_name("made").mkdir()
     place = recorded.parent / folder

@@ -72,13 +72,13 @@ def test_a_command_line_that_is_not_understood_ends_with_2_in_every_command(vibe
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 
 
-def test_an_answer_that_misses_the_requested_error_says_so_and_is_an_answer(vibench_here, tmp_path):
+def test_an_answer_that_misses_the_requested_error_is_marked_and_succeeds(vibench_here, tmp_path):
     ran = vibench_here("predict", *SCENE, "--error", "1e-6", "--time", "0.2s", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "needs about" in ran.stdout
 
 
 @pytest.mark.parametrize("time", ["1e9h", "1e300h"])
-def test_a_long_time_for_a_campaign_is_a_time(vibench_here, tmp_path, time):
+def test_long_campaign_times_are_valid(vibench_here, tmp_path, time):
     ran = vibench_here("measure", "quick", "--out", "a", "--estimate", "--within", time, cwd=tmp_path)
     assert "add until to a measurement" in ran.stderr

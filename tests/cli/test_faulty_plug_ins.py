@@ -1,4 +1,4 @@
-"""A stranger's instrument that raises, or gives something else: a sentence, nothing lost, and silence."""
+"""Third-party instruments that raise or return wrong data: one sentence, no lost data, and silence."""
 
 import re
 import sys
@@ -144,7 +144,7 @@ DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "
         ("digitizer", "read", raises),
     ],
 )
-def test_what_a_stranger_s_instrument_breaks_is_reported_in_a_sentence(stranger, kind, member, does, told):
+def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(stranger, kind, member, does, told):
     inside = AFG1022_MODEL if kind == "generator" else DaqmxDigitizer
     path = stranger(kind, OddDriver(inside, member, does))
     code, said = told(path)
@@ -158,7 +158,7 @@ def test_what_a_stranger_s_instrument_breaks_is_reported_in_a_sentence(stranger,
 
 
 @pytest.mark.parametrize(("does", "words"), [(not_a_number, "no numbers"), (fewer_rows, "of shape")])
-def test_samples_that_are_none_end_check_and_run_with_a_sentence(stranger, does, words, tmp_path):
+def test_invalid_samples_end_check_and_run_with_a_sentence(stranger, does, words, tmp_path):
     path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", does))
     with open_bench(path) as bench:
         with pytest.raises(AcquisitionError, match=words):
@@ -167,9 +167,7 @@ def test_samples_that_are_none_end_check_and_run_with_a_sentence(stranger, does,
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
-def test_samples_that_are_left_out_are_reported_with_the_recording_and_not_played_back(
-    stranger, told, tmp_path
-):
+def test_missing_samples_are_reported_and_such_a_recording_is_not_played_back(stranger, told, tmp_path):
     left = [20]
 
     def skips(found, *given):
@@ -192,7 +190,7 @@ def test_samples_that_are_left_out_are_reported_with_the_recording_and_not_playe
         deque(iter(lambda: player.read(5120), None), maxlen=0)
 
 
-def test_a_check_finds_a_converter_that_leaves_samples_out(stranger, tmp_path):
+def test_a_check_finds_a_converter_that_omits_samples(stranger, tmp_path):
     def skips(found, *given):
         found(*given)
         return found(*given)
@@ -208,7 +206,7 @@ def test_a_stop_that_fails_states_that_the_output_may_be_on(stranger, tmp_path):
         check_bench(bench, tmp_path)
 
 
-def test_a_driver_that_ends_the_program_is_reported_too(stranger, told):
+def test_a_driver_that_raises_system_exit_is_reported(stranger, told):
     def ends(_found, *_given):
         sys.exit(0)
 
@@ -217,7 +215,7 @@ def test_a_driver_that_ends_the_program_is_reported_too(stranger, told):
     assert "broke its promise in open: SystemExit: 0" in said
 
 
-def test_a_failure_while_playing_ends_silent_and_the_recording_states_why(stranger, tmp_path):
+def test_a_failure_during_output_ends_silent_with_a_recorded_reason(stranger, tmp_path):
     left = [15]
 
     def fails_later(found, *given):
@@ -260,7 +258,7 @@ def test_a_close_that_fails_after_a_complete_recording_states_that_it_is_complet
         (None, "None as SensorFacts"),
     ],
 )
-def test_a_sensor_that_shows_what_no_sensor_can_be_is_refused(stranger, facts, words):
+def test_an_impossible_sensor_is_refused(stranger, facts, words):
     usual = {"units_per_volt": 100.0, "full_scale_v": 5.0, "name": "odd"}
 
     def sensor(_rig, _config):

@@ -16,7 +16,7 @@ def refused(*arguments):
 
 @pytest.mark.parametrize("number", ["5", "all"])
 @pytest.mark.parametrize("none", ["0", "-0.0"])
-def test_a_comparison_of_damping_with_none_needs_some(tmp_path, number, none):
+def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
     said = refused(number, "--out", tmp_path / "f", "--damping-time", none)
     assert said == "figure 5 compares damping with none; give a damping time above 0 s"
     assert not (tmp_path / "f").exists()
@@ -31,6 +31,6 @@ def test_a_comparison_of_damping_with_none_needs_some(tmp_path, number, none):
         ("--damping-time", "nan", "a damping time of nan s is not allowed; give 0 to 0.01"),
     ],
 )
-def test_sizes_that_no_specimen_has_are_refused(tmp_path, option, value, told):
+def test_impossible_specimen_sizes_are_refused(tmp_path, option, value, told):
     assert refused("1", "--out", tmp_path / "f", option, value) == told
     assert not (tmp_path / "f").exists()

@@ -32,7 +32,7 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
         ("", "'' is not a number", "one above 0 Hz"),
     ],
 )
-def test_what_lists_no_frequency_is_refused_with_what_was_typed_why_and_a_way_out(typed, why, way):
+def test_an_invalid_frequency_list_is_refused_with_reason_and_remedy(typed, why, way):
     with pytest.raises(InvalidRequest) as refused:
         frequencies(typed)
     said = str(refused.value)

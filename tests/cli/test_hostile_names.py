@@ -1,4 +1,4 @@
-"""Whatever names and texts a folder holds, no command lets them move a cursor or reorder what it prints."""
+"""Control and direction characters in names and texts have no effect on the output of commands."""
 
 import json
 import re
@@ -93,7 +93,7 @@ def harmful(text):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_no_command_prints_what_a_name_would_have_done(vibench_here, folder, command):
+def test_no_command_prints_control_characters_of_a_name(vibench_here, folder, command):
     for arguments in cases(folder)[command]:
         ended = vibench_here(command, *arguments, cwd=folder)
         for said in (ended.stdout, ended.stderr):
@@ -105,7 +105,7 @@ def test_no_command_prints_what_a_name_would_have_done(vibench_here, folder, com
     assert not harmful("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
 
 
-def test_the_report_shows_the_name_and_the_notes(vibench_here, folder, tmp_path):
+def test_the_report_shows_hostile_names_and_notes_as_text(vibench_here, folder, tmp_path):
     path = next(folder.glob("*dwell.h5"))
     ended = vibench_here("analyse", path, "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr

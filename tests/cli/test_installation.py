@@ -65,7 +65,7 @@ def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(vibench_here, t
     assert not (tmp_path / "out.h5").exists()
 
 
-def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, tmp_path):
+def test_copies_of_shipped_files_are_complete_and_never_overwrite(vibench_here, tmp_path):
     assert vibench_here("examples", "--copy", "mine", cwd=tmp_path).returncode == 0
     for folder in ("campaigns", "hardware_configs", "studies", "examples"):
         for path in shipped_folder(folder).rglob("*.toml"):
@@ -85,12 +85,12 @@ def test_every_example_has_its_own_name(vibench_here, tmp_path):
         assert len(names) == len(set(names)), line
 
 
-def test_the_studies_that_are_listed_are_those_that_the_command_takes(vibench_here, tmp_path):
+def test_studies_are_listed_as_toml_files(vibench_here, tmp_path):
     listed = json.loads(vibench_here("examples", "--json", cwd=tmp_path).stdout)["studies"]
     assert {Path(each).suffix for each in listed} == {".toml"}
 
 
-def test_a_disk_without_room_is_one_sentence(vibench_here, tmp_path):
+def test_a_full_disk_is_reported_in_one_sentence(vibench_here, tmp_path):
     resource = pytest.importorskip("resource", reason="bounds on files are POSIX")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
@@ -117,9 +117,7 @@ def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vib
 
 
 @pytest.mark.parametrize("state", ["file", "file/below"])
-def test_where_no_state_can_be_kept_the_doctor_reports_it_and_predictions_continue(
-    vibench_here, tmp_path, state
-):
+def test_the_doctor_reports_an_unwritable_state_folder_and_predictions_work(vibench_here, tmp_path, state):
     (tmp_path / "file").write_text("a file in the way")
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / state)}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
@@ -130,7 +128,7 @@ def test_where_no_state_can_be_kept_the_doctor_reports_it_and_predictions_contin
     assert predicted.returncode == 0, predicted.stderr
 
 
-def test_the_doctor_names_the_smallest_extra_that_brings_a_library(monkeypatch):
+def test_the_doctor_names_the_smallest_extra_with_a_library(monkeypatch):
     def missing(name):
         raise PackageNotFoundError(name)
 
@@ -175,9 +173,7 @@ def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, 
         ("matplotlib", ("reproduce", "--out", "out"), "figures"),
     ],
 )
-def test_a_missing_library_is_one_sentence_with_the_command_that_brings_it(
-    tmp_path, library, arguments, extra
-):
+def test_a_missing_library_is_reported_with_the_install_command(tmp_path, library, arguments, extra):
     told = without([library], *arguments, cwd=tmp_path)
     assert told.returncode == 1
     assert told.stderr.startswith(f"error: {library}")
@@ -197,7 +193,7 @@ CORE_ALONE = [
 ]
 
 
-def test_on_the_base_installation_what_draws_nothing_works_and_every_command_explains_itself(tmp_path):
+def test_the_base_installation_supports_commands_without_figures_and_all_help(tmp_path):
     helps = [(*words, "--help") for words in (*((name,) for name in COMMANDS), ("bench", "list"))]
     program = ONE_AFTER_ANOTHER.format(
         libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]
@@ -270,7 +266,7 @@ def test_the_core_takes_less_than_300_megabytes():
     assert 200 < installed_mb("vibench", set()) < 300
 
 
-def test_the_page_lists_the_exit_codes_and_variables_that_there_are():
+def test_the_page_lists_all_exit_codes_and_variables():
     page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
     assert [int(each) for each in re.findall(r"^\| (\d) \|", page, flags=re.M)] == list(ExitCode)
     assert dict(re.findall(r"^\| `([A-Z_]+)` \| (.+) \|$", page, flags=re.M)) == {
@@ -287,7 +283,7 @@ def test_every_variable_that_the_sources_read_is_on_the_page():
     assert [name for name in sorted(found) if f"`{name}`" not in page] == []
 
 
-def test_a_command_ends_with_an_exit_code_that_has_a_name():
+def test_every_exit_code_has_a_name():
     numbered = re.compile(r"(?:sys\.exit|typer\.Exit)\(\d")
     loose = [path.name for path in (ROOT / "cli").rglob("*.py") if numbered.search(path.read_text("utf-8"))]
     assert loose == []

@@ -1,4 +1,4 @@
-"""A campaign killed without a word, again and again, ends like one that was left alone."""
+"""A repeatedly killed campaign ends like an uninterrupted one."""
 
 import random
 import subprocess
@@ -18,7 +18,7 @@ from .killed_campaign import amplitudes, branches, command, done, killed, short_
     [pytest.param(16, 2, id="16"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
 )
 @pytest.mark.timeout(1500)
-def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, points, kills):
+def test_a_killed_and_resumed_campaign_records_every_point_once(tmp_path, points, kills):
     chance = random.Random(points)
     plan, bench = short_points(tmp_path, points), slow_rig(tmp_path)
     left_alone, disturbed = tmp_path / "left_alone", tmp_path / "disturbed"

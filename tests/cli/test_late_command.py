@@ -1,4 +1,4 @@
-"""Commands are listed without importing what they need, and their lines are those of the commands."""
+"""Commands are listed without importing their modules, with the first line of their help."""
 
 import subprocess
 import sys
@@ -13,7 +13,7 @@ HEAVY = {"numpy", "scipy", "matplotlib", "h5py", "pydantic", "pyvisa", "nidaqmx"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_line_of_a_command_is_the_first_of_its_help(name):
+def test_the_list_shows_the_first_line_of_each_help(name):
     place = COMMANDS[name]
     application = place.load()
     told = application.info.help

@@ -1,4 +1,4 @@
-"""A log that nobody reads, down a pipe or on a terminal that is held up, keeps no stop from a run."""
+"""An unread log in a pipe or on a blocked terminal does not block a stop."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ excitation = {kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s 
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="pipes whose room is told, as Linux has them")
-def test_a_run_whose_log_nobody_reads_hears_a_stop(tmp_path):
+def test_a_run_with_an_unread_log_can_be_stopped(tmp_path):
     fcntl = pytest.importorskip("fcntl")
     (tmp_path / "night.toml").write_text(CAMPAIGN)
     kept, written = os.pipe()

@@ -49,7 +49,7 @@ def test_an_estimate_makes_nothing(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
-def test_a_map_becomes_a_file_and_a_picture_and_continues_where_it_was(vibench_here, tmp_path, text):
+def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(vibench_here, tmp_path, text):
     asked = plan(tmp_path, text)
     found = vibench_here("map", asked, "--out", "a", "--json", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
@@ -70,7 +70,7 @@ def test_a_map_becomes_a_file_and_a_picture_and_continues_where_it_was(vibench_h
     assert json.loads(resumed.stdout)["motions"] == told["motions"]
 
 
-def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
+def test_a_basin_map_reports_shares_and_kicks(vibench_here, tmp_path):
     found = vibench_here("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     told = json.loads(found.stdout)
@@ -85,7 +85,7 @@ def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
         (LINE, "it needs ranges for two coordinates"),
     ],
 )
-def test_a_basin_states_why_its_boundary_has_no_exponent(vibench_here, tmp_path, text, why):
+def test_a_basin_map_explains_a_missing_boundary_exponent(vibench_here, tmp_path, text, why):
     found = vibench_here("map", plan(tmp_path, text), "--out", "a", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     assert f"The uncertainty exponent is not determined: {why}" in found.stdout
@@ -109,9 +109,7 @@ def test_a_basin_states_why_its_boundary_has_no_exponent(vibench_here, tmp_path,
         (MAP + "gap = 3\n", (), "gap"),
     ],
 )
-def test_anything_that_cannot_be_mapped_is_one_sentence_and_no_folder(
-    vibench_here, tmp_path, text, more, said
-):
+def test_an_invalid_map_is_refused_in_one_sentence_without_a_folder(vibench_here, tmp_path, text, more, said):
     found = vibench_here("map", plan(tmp_path, text), "--out", "a", *more, cwd=tmp_path)
     assert found.returncode == 1
     assert said in " ".join(found.stderr.split())
@@ -128,7 +126,7 @@ def test_anything_that_cannot_be_mapped_is_one_sentence_and_no_folder(
         (("--show", "lyapunov"), "--show lyapunov needs a map that finds exponents"),
     ],
 )
-def test_an_estimate_is_refused_what_the_map_itself_would_be(vibench_here, tmp_path, options, told):
+def test_an_estimate_refuses_the_same_requests_as_the_map(vibench_here, tmp_path, options, told):
     asked = ("map", plan(tmp_path, MAP), "--estimate", "--out", "a", *options)
     found = vibench_here(*asked, cwd=tmp_path)
     assert found.returncode == 1, found

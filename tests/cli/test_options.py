@@ -1,4 +1,4 @@
-"""Options of commands come from the fields of requests: names, help, defaults, and what a fault says."""
+"""Options of commands come from the fields of requests: names, help, defaults, and error messages."""
 
 import re
 import subprocess

@@ -17,7 +17,7 @@ def page(monkeypatch, request):
 
 
 @pytest.mark.parametrize("page", [20, 40, 80], indirect=True)
-def test_a_table_cuts_no_number_however_narrow_the_page(page):
+def test_numbers_are_not_cut_in_narrow_tables(page):
     rows = Table(title="Numbers")
     for heading in (*(f"quantity {number}" for number in range(9)), "words"):
         rows.add_column(heading, justify="right")

@@ -35,7 +35,7 @@ def test_a_prediction_is_the_answer_of_the_engine_for_every_frequency(vibench, t
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench_here, tmp_path):
+def test_a_prediction_until_settled_has_kind_and_error(vibench_here, tmp_path):
     ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", "94:260:166", "--duration", "auto", "--json"),
@@ -51,7 +51,7 @@ def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench_here, tmp_pat
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_an_exponent_is_carried_where_it_is_requested(vibench_here, tmp_path):
+def test_a_requested_exponent_is_given_with_its_error(vibench_here, tmp_path):
     ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov", "--json"),
@@ -65,7 +65,7 @@ def test_an_exponent_is_carried_where_it_is_requested(vibench_here, tmp_path):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_reader_gets_a_table_and_the_reasons(vibench_here, tmp_path):
+def test_a_prediction_prints_a_table_and_reasons(vibench_here, tmp_path):
     ran = vibench_here(
         "predict", *("--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT), cwd=tmp_path
     )
@@ -75,7 +75,7 @@ def test_a_reader_gets_a_table_and_the_reasons(vibench_here, tmp_path):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_points_that_are_answered_alike_are_explained_once(vibench_here, tmp_path):
+def test_equal_explanations_are_printed_once(vibench_here, tmp_path):
     ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", "200:244:2", "--explain", *("--duration", 8, "--window", 1)),
@@ -88,7 +88,7 @@ def test_points_that_are_answered_alike_are_explained_once(vibench_here, tmp_pat
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_metres_for_micrometres_are_computed_with_a_warning_beside_the_answer(vibench_here, tmp_path):
+def test_metres_instead_of_micrometres_give_a_warning_beside_the_answer(vibench_here, tmp_path):
     ran = vibench_here(
         "predict",
         *("--amplitude", 5, "--frequency", 30, "--json", "--duration", 0.05, "--window", 0.04),
@@ -103,7 +103,7 @@ def test_metres_for_micrometres_are_computed_with_a_warning_beside_the_answer(vi
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_point_without_an_answer_is_an_error_beside_the_answers_of_the_others(vibench_here, tmp_path):
+def test_a_failed_point_is_reported_beside_the_answers_of_others(vibench_here, tmp_path):
     chatter = ("--model", "rigid:1", "--gap", 1e-9, "--amplitude", 1e-3, "--duration", 0.3, "--window", 0.01)
     ran = vibench_here("predict", *chatter, "--frequency", "100:60100:60000", "--json", cwd=tmp_path)
     assert ran.returncode == 1
@@ -142,7 +142,7 @@ FORGETFUL = ("--amplitude", 5e-6, "--frequency", 242, "--damping-time", 3e-5, "-
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_forgotten_start_is_answered_with_motions_and_shares(vibench_here, tmp_path):
+def test_sensitive_dependence_on_the_start_is_answered_with_motions_and_shares(vibench_here, tmp_path):
     """Chaos that dies out within tens of seconds: after 36, about half of the starts have settled."""
     asked = ("predict", *FORGETFUL, "--budget", "0.2s", "--explain")
     ran = vibench_here(*asked, "--json", cwd=tmp_path)
@@ -161,7 +161,7 @@ def test_a_forgotten_start_is_answered_with_motions_and_shares(vibench_here, tmp
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_budget_that_is_no_number_is_refused_in_a_sentence(vibench_here, tmp_path):
+def test_a_non_numeric_budget_is_refused_in_a_sentence(vibench_here, tmp_path):
     for given, said in (("soon", "--budget was given as 'soon'"), ("-1", "--budget was given as -1")):
         ran = vibench_here("predict", *FORGETFUL, f"--budget={given}", cwd=tmp_path)
         assert ran.returncode != 0
@@ -199,7 +199,7 @@ def test_every_point_of_a_curve_reaches_the_requested_error(vibench_here, tmp_pa
         (("--error", "1%", "--observe", "response,lyapunov"), "A target is not allowed with lyapunov"),
     ],
 )
-def test_a_target_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
+def test_an_impossible_error_target_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
     ran = vibench_here("predict", "--amplitude", 1e-6, "--frequency", 100, *arguments, "--json", cwd=tmp_path)
     assert ran.returncode != 0
     (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]

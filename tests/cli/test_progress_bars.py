@@ -23,7 +23,7 @@ class Log(io.StringIO):
         return count
 
 
-def test_without_a_terminal_progress_is_one_line_each_time():
+def test_without_a_terminal_progress_is_printed_as_lines():
     log = Log()
     with show_bars(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
         assert not log.written.wait(0.1), "a line without a bar"
@@ -34,7 +34,7 @@ def test_without_a_terminal_progress_is_one_line_each_time():
     assert log.getvalue().splitlines()[-1] == "progress: noise 15 of 60 (25 %); opening"
 
 
-def test_anything_that_ends_before_ten_seconds_leaves_no_line():
+def test_work_under_ten_seconds_prints_no_progress():
     log = Log()
     with show_bars(Progress(console=Console(file=log))) as bars:
         bars.add_task("noise", total=60)

@@ -86,7 +86,7 @@ def hints(served):
 
 
 @pytest.mark.thorough
-def test_the_hints_work_when_they_are_pasted(served):
+def test_the_printed_example_commands_work(served):
     converter, usb, stream = hints(served)
     pasted = {}
     exec(converter, pasted)
@@ -103,7 +103,7 @@ def test_the_hints_work_when_they_are_pasted(served):
         assert said.stdout.startswith("TEKTRONIX,AFG1022"), said.stderr
 
 
-def test_a_block_without_a_length_ends_with_its_line_on_a_stream(served):
+def test_an_indefinite_length_block_ends_at_the_newline(served):
     pasted = {}
     exec(hints(served)[2], pasted)
     with closing(pasted["generator"]) as generator:
@@ -111,7 +111,7 @@ def test_a_block_without_a_length_ends_with_its_line_on_a_stream(served):
         assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
 
 
-def test_our_own_driver_speaks_to_the_socket(served):
+def test_the_own_driver_works_over_the_socket(served):
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
     config = rig.generator.model_copy(update={"resource": resource})
@@ -122,7 +122,7 @@ def test_our_own_driver_speaks_to_the_socket(served):
     generator.close()
 
 
-def test_time_passes_when_nobody_looks(served):
+def test_rig_time_advances_without_clients(served):
     address = served.split('insecure_channel("')[1].split('"')[0]
     with (
         grpc.insecure_channel(address) as channel,

@@ -60,9 +60,7 @@ def test_a_measurement_with_few_files_ends_with_a_sentence(tmp_path, most):
         (1100, ("demo",)),
     ],
 )
-def test_a_command_with_too_little_address_space_is_refused_before_its_libraries_are_loaded(
-    tmp_path, most_mb, arguments
-):
+def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, most_mb, arguments):
     ended = limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert re.fullmatch(
@@ -72,7 +70,7 @@ def test_a_command_with_too_little_address_space_is_refused_before_its_libraries
     )
 
 
-def test_a_stop_that_finds_nobody_and_has_no_memory_to_look_further_says_to_switch_off(tmp_path):
+def test_a_stop_without_memory_advises_to_switch_off(tmp_path):
     ended = limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
     assert ended.returncode == 1
     assert ended.stderr.endswith(f"{SWITCH_OFF}.\n")
@@ -97,7 +95,7 @@ def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, 
         (ImportError("x.so: cannot open shared object file: Too many open files"), "cannot open more files"),
     ],
 )
-def test_a_shortage_is_reported_however_it_is_wrapped(vibench_here, tmp_path, monkeypatch, wrapped, said):
+def test_a_wrapped_memory_error_is_reported(vibench_here, tmp_path, monkeypatch, wrapped, said):
     def short(*_arguments, **_named):
         try:
             raise wrapped
@@ -110,7 +108,7 @@ def test_a_shortage_is_reported_however_it_is_wrapped(vibench_here, tmp_path, mo
     assert said in ended.stderr
 
 
-def test_a_bench_is_checked_for_a_folder_that_is_not_there_yet(vibench, tmp_path):
+def test_a_bench_check_accepts_a_missing_folder(vibench, tmp_path):
     ended = vibench("bench", "check", "--out", "later/on", cwd=tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert not (tmp_path / "later").exists()

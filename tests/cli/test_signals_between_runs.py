@@ -23,7 +23,7 @@ with the_bench(load_rig(Path({rig!r})), "night") as engine:
 
 @sees_locks
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows ends a process at once")
-def test_a_polite_kill_while_nothing_is_measured_is_a_stop(tmp_path):
+def test_sigterm_between_measurements_stops_the_campaign(tmp_path):
     rig = str(ROOT / "hardware_configs" / "virtual_rig.toml")
     words = [sys.executable, "-c", KILLED.format(rig=rig)]
     ended = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)

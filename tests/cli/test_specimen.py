@@ -1,4 +1,4 @@
-"""A specimen's file goes every way with the same numbers: prediction, study, rig, recording, overlay."""
+"""A specimen file gives the same numbers in prediction, study, rig, recording and overlay."""
 
 import json
 import tomllib
@@ -79,7 +79,7 @@ def every_way_agrees(vibench_here, folder, path):
 
 
 @pytest.mark.timeout(300)
-def test_two_random_specimens_go_every_way_with_the_same_numbers(vibench_here, tmp_path):
+def test_random_specimens_keep_their_numbers_in_every_command(vibench_here, tmp_path):
     rng = np.random.default_rng(1)
     for _ in range(2):
         every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
@@ -98,7 +98,7 @@ def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
-def test_json_of_a_stop_on_one_side_has_a_word_for_the_other(vibench_here, tmp_path, command):
+def test_json_names_the_missing_stop(vibench_here, tmp_path, command):
     said = vibench_here(*command, one_sided(tmp_path), "--json", cwd=tmp_path)
     assert said.returncode == 0, said.stderr
     document = json.loads(said.stdout)
@@ -106,7 +106,7 @@ def test_json_of_a_stop_on_one_side_has_a_word_for_the_other(vibench_here, tmp_p
     assert described["gap_m"] == [30e-6, "inf"]
 
 
-def test_a_printed_specimen_with_a_stop_on_one_side_comes_back(vibench_here, tmp_path):
+def test_a_printed_specimen_with_one_stop_loads_unchanged(vibench_here, tmp_path):
     path = one_sided(tmp_path)
     own = tmp_path / "own.toml"
     own.write_text(vibench_here("specimen", path, "--toml", cwd=tmp_path).stdout, encoding="utf-8")
@@ -140,7 +140,7 @@ def test_the_list_names_every_specimen_and_every_law(vibench_here, tmp_path):
     assert all(said["contact_laws"].values())
 
 
-def test_a_printed_specimen_is_a_file_to_start_from(vibench_here, tmp_path):
+def test_a_printed_specimen_is_a_valid_file(vibench_here, tmp_path):
     printed = vibench_here("specimen", "asymmetric", "--toml", cwd=tmp_path).stdout
     own = tmp_path / "own.toml"
     own.write_text(printed, encoding="utf-8")
@@ -148,14 +148,14 @@ def test_a_printed_specimen_is_a_file_to_start_from(vibench_here, tmp_path):
     assert load_specimen(own).specimen() == load_specimen("asymmetric").specimen()
 
 
-def test_the_papers_resonances_stand_in_what_its_specimen_amounts_to(vibench_here, tmp_path):
+def test_the_specimen_command_prints_the_resonances_of_the_paper(vibench_here, tmp_path):
     said = json.loads(vibench_here("specimen", "gong2025", "--json", cwd=tmp_path).stdout)
     assert said["resonances_without_contact_hz"] == pytest.approx([94.6, 266.2, 499.6], abs=0.05)
     assert said["resonances_with_m1_held_hz"] == pytest.approx([201.5, 436.0], abs=0.05)
 
 
 @pytest.mark.parametrize("command", [("predict", *ASKED), ("specimen",)])
-def test_a_specimen_that_there_is_not_is_one_sentence(vibench_here, tmp_path, command):
+def test_an_unknown_specimen_is_reported_in_one_sentence(vibench_here, tmp_path, command):
     name, *rest = command
     options = ("--specimen", "nowhere.toml") if rest else ("nowhere.toml",)
     ended = vibench_here(name, *rest, *options, cwd=tmp_path)
@@ -193,7 +193,7 @@ def test_every_shipped_specimen_is_reported(vibench_here, tmp_path, name):
     assert "contact law: " in found.stdout
 
 
-def test_people_read_units_and_a_law_in_words(vibench_here, tmp_path):
+def test_a_specimen_is_printed_with_units_and_contact_law(vibench_here, tmp_path):
     said = vibench_here("specimen", "gong2025", cwd=tmp_path).stdout
     assert "masses [kg]: 0.0058, 0.0021, 0.002" in said
     assert "stiffnesses [N/m]: 23741" in said

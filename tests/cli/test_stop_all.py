@@ -1,4 +1,4 @@
-"""`vibench stop` in danger: nobody has to find out first which of several programs it is that drives."""
+"""`vibench stop` in an emergency: it stops every driving program without naming one."""
 
 import subprocess
 import sys
@@ -57,7 +57,7 @@ def driving(what, *within):
             program.kill()
 
 
-def test_all_that_drive_are_stopped_when_none_is_named(vibench_here, tmp_path):
+def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
     with driving("north") as north, driving("south") as south:
         told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
@@ -66,7 +66,7 @@ def test_all_that_drive_are_stopped_when_none_is_named(vibench_here, tmp_path):
             assert program.communicate(timeout=20)[0] == "off smoke\n"
 
 
-def test_one_that_is_named_is_stopped_alone(vibench_here, tmp_path):
+def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
     with driving("north") as north, driving("south") as south:
         assert vibench_here("stop", "--pid", north.pid, cwd=tmp_path).returncode == 0
         north.wait(20)
@@ -74,7 +74,7 @@ def test_one_that_is_named_is_stopped_alone(vibench_here, tmp_path):
         assert south.poll() is None
 
 
-def test_which_is_held_must_be_stated(vibench_here, tmp_path):
+def test_hold_requires_a_program(vibench_here, tmp_path):
     with driving("north"), driving("south"):
         told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert told.returncode == 1
@@ -82,7 +82,7 @@ def test_which_is_held_must_be_stated(vibench_here, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_one_that_hangs_is_named_and_keeps_no_stop_from_the_others(vibench_here, tmp_path):
+def test_a_hanging_program_is_named_and_the_others_are_stopped(vibench_here, tmp_path):
     with driving("hangs") as hangs, driving("south") as south:
         with frozen(hangs.pid):
             told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
@@ -94,7 +94,7 @@ def test_one_that_hangs_is_named_and_keeps_no_stop_from_the_others(vibench_here,
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="containers as Linux has them")
-def test_containers_that_share_a_state_folder_hide_one_another_from_no_stop(vibench_here, tmp_path):
+def test_programs_in_containers_with_a_shared_state_folder_are_all_found(vibench_here, tmp_path):
     """Both are process 1 in their container; the second wrote over what the first had said of itself."""
     with ExitStack() as running:
         programs = [running.enter_context(driving(what, *CONTAINER)) for what in ("north", "south")]
@@ -122,7 +122,7 @@ def on_another_computer(what):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
-def test_what_drives_on_another_computer_is_stated_not_to_be_reached(vibench_here, tmp_path):
+def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, tmp_path):
     there = "Not reached, since it runs on another computer: night (process"
     with on_another_computer("night") as path:
         alone = vibench_here("stop", cwd=tmp_path)

@@ -1,4 +1,4 @@
-"""`vibench stop` from Enter: it loads the standard library alone, and says what it does not know."""
+"""Fast `vibench stop`: it loads only the standard library and reports what it cannot verify."""
 
 import os
 import resource
@@ -40,7 +40,7 @@ def vibench_stop(*words, **variables):
     )
 
 
-def test_it_loads_the_standard_library_alone():
+def test_stop_loads_only_the_standard_library():
     with driving("north"):
         told = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
     said, others, ours = told.stdout.splitlines()
@@ -48,7 +48,7 @@ def test_it_loads_the_standard_library_alone():
     assert (others, ours) == ("", "vibench.command vibench.stop_files")
 
 
-def test_it_takes_less_than_a_tenth_of_a_second_of_the_processor():
+def test_stop_takes_less_than_0_1_s_of_processor_time():
     with driving("north"):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         assert vibench_stop().returncode == 0
@@ -60,7 +60,7 @@ def test_it_takes_less_than_a_tenth_of_a_second_of_the_processor():
     ("words", "told"),
     [(("--level", "off", "--reason", "smoke"), "off smoke"), (("--level=abort",), "abort vibench stop")],
 )
-def test_it_stops_as_the_complete_command_does(words, told):
+def test_the_fast_stop_equals_the_complete_command(words, told):
     with driving("north") as north:
         said = vibench_stop(*words)
         assert said.returncode == 0
@@ -68,7 +68,7 @@ def test_it_stops_as_the_complete_command_does(words, told):
         assert north.communicate(timeout=20)[0] == f"{told}\n"
 
 
-def test_it_stops_the_one_that_is_named():
+def test_the_fast_stop_stops_the_named_program():
     with driving("north") as north, driving("south"):
         assert vibench_stop("--pid", str(north.pid)).returncode == 0
         north.wait(20)
@@ -78,14 +78,14 @@ def test_it_stops_the_one_that_is_named():
 @pytest.mark.parametrize(
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
-def test_anything_that_is_not_plain_is_answered_by_the_complete_command(words, code):
+def test_unusual_arguments_are_passed_to_the_complete_command(words, code):
     with driving("north") as north:
         told = vibench_stop(*words)
         assert told.returncode == code, told.stderr
         assert north.poll() is None
 
 
-def test_of_one_that_was_killed_it_states_what_to_do():
+def test_the_fast_stop_gives_advice_about_a_killed_program():
     with driving("north") as north:
         north.kill()
         north.wait()
@@ -96,7 +96,7 @@ def test_of_one_that_was_killed_it_states_what_to_do():
 
 
 @pytest.mark.parametrize("is_killed", [False, True])
-def test_a_name_moves_no_cursor(is_killed):
+def test_control_characters_in_a_program_name_have_no_effect(is_killed):
     with driving("a\x1b[2J\u202e\x9b1m") as hostile:
         if is_killed:
             hostile.kill()
@@ -105,7 +105,7 @@ def test_a_name_moves_no_cursor(is_killed):
     assert rf"a\x1b[2J\u202e\x9b1m, process {hostile.pid}" in (told.stderr if is_killed else told.stdout)
 
 
-def test_what_the_system_stopped_is_not_called_silent():
+def test_a_suspended_program_is_not_reported_as_silent():
     with driving("north") as north:
         os.kill(north.pid, 19)
         told = vibench_stop("--level", "abort")
@@ -114,7 +114,7 @@ def test_what_the_system_stopped_is_not_called_silent():
         assert "switch the amplifier off" in " ".join(told.stderr.split())
 
 
-def test_without_a_state_folder_it_reports_it(tmp_path):
+def test_a_missing_state_folder_is_reported(tmp_path):
     told = vibench_stop(VIBENCH_STATE_DIR=str(Path(tmp_path) / "nowhere"))
     assert told.returncode == 1
     assert "no engine is running" in told.stderr

@@ -131,7 +131,7 @@ def test_a_stop_of_a_held_run_keeps_it_and_ends_silent(vibench_here, tmp_path, l
         assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 32))) < SILENT_V
 
 
-def test_a_run_that_stalls_has_failed_and_reports_it(vibench_here, tmp_path, monkeypatch):
+def test_a_stalled_run_is_reported_as_failed(vibench_here, tmp_path, monkeypatch):
     runs = "".join(RUN.format(name=name, duration_s=LONG_S, ramp_s=0.3) for name in ("first", "second"))
     (tmp_path / "c.toml").write_text(f'name = "c"\n{runs}')
     (tmp_path / "f.toml").write_text(
@@ -158,7 +158,7 @@ class StoppedBefore(Engine):
         self.switch.ask(StopRequest.by(Cause.KEYBOARD, "SIGINT"))
 
 
-def test_a_campaign_that_is_stopped_in_its_check_reports_it(vibench_here, tmp_path, monkeypatch):
+def test_a_campaign_stopped_during_its_check_is_reported(vibench_here, tmp_path, monkeypatch):
     (tmp_path / "c.toml").write_text(f'name = "c"\n{RUN.format(name="first", duration_s=0.1, ramp_s=0.3)}')
     monkeypatch.setattr("vibench.cli.measure.Engine", StoppedBefore)
     ended = vibench_here("measure", "c.toml", "--out", "out", cwd=tmp_path)

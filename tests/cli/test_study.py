@@ -42,7 +42,7 @@ def plan(folder, text=SMALL):
     return path
 
 
-def test_an_estimate_counts_points_and_work_and_makes_no_file(vibench_here, tmp_path):
+def test_an_estimate_counts_points_and_work_without_a_file(vibench_here, tmp_path):
     told = {}
     for duration_s in (0.5, 5.0):
         asked = plan(tmp_path, SMALL.replace("duration_s = 0.5", f"duration_s = {duration_s}"))
@@ -129,7 +129,7 @@ def some_kept(path):
         ),
     ],
 )
-def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path, old, new, said):
+def test_a_wrong_study_is_refused_in_one_sentence(vibench_here, tmp_path, old, new, said):
     assert old in SMALL
     result = vibench_here("study", plan(tmp_path, SMALL.replace(old, new)), "--out", "a.h5", cwd=tmp_path)
     assert result.returncode == 1
@@ -140,7 +140,7 @@ def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path,
     assert not (tmp_path / "a.h5").exists()
 
 
-def test_a_study_with_a_point_without_an_answer_is_kept_and_ends_in_an_error(vibench_here, tmp_path):
+def test_a_study_with_a_failed_point_is_saved_and_returns_an_error(vibench_here, tmp_path):
     chatter = 'models = ["hertz", "rigid:1"]\ngaps_m = [1e-9]\nduration_s = 0.3\nwindow_s = 0.01\n'
     asked = plan(tmp_path, chatter + "amplitudes_m = [1e-3]\nfrequencies_hz = [100]\n")
     ran = vibench_here("study", asked, "--out", "a.h5", cwd=tmp_path)
@@ -156,7 +156,7 @@ def test_a_study_with_a_point_without_an_answer_is_kept_and_ends_in_an_error(vib
     assert ended.value.exit_code == 1
 
 
-def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibench_here, tmp_path):
+def test_an_unreachable_cluster_is_reported_in_one_sentence(vibench_here, tmp_path):
     pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
     result = vibench_here(
         "study", plan(tmp_path), "--out", "a.h5", "--cluster", "nonsense:what", cwd=tmp_path
@@ -168,6 +168,6 @@ def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibenc
 
 
 @pytest.mark.parametrize("shipped", sorted((ROOT / "studies").glob("*.toml")), ids=lambda path: path.name)
-def test_every_study_that_is_shipped_is_allowed(shipped):
+def test_every_shipped_study_is_valid(shipped):
     asked = Study.model_validate(tomllib.loads(shipped.read_text(encoding="utf-8")))
     assert asked.grid.size > 0

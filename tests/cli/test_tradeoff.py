@@ -1,4 +1,4 @@
-"""`vibench tradeoff` of one's own scene: error over time for every method that can answer it."""
+"""`vibench tradeoff` of a user's scene: error over time for every applicable method."""
 
 import json
 
@@ -29,7 +29,7 @@ def test_the_curve_of_a_scene_has_the_chosen_answer_and_the_other_methods(vibenc
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
 )
-def test_a_scene_that_cannot_be_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
+def test_an_impossible_scene_is_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
     ran = vibench_here("tradeoff", *arguments, cwd=tmp_path)
     assert ran.returncode != 0
     (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]

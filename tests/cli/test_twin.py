@@ -1,4 +1,4 @@
-"""`vibench twin` beside a real engine at the wall's pace: what it tells, and that it keeps nothing up."""
+"""`vibench twin` beside a real engine in real time: it reports p and does not delay the run."""
 
 import os
 import signal
@@ -76,7 +76,7 @@ def recorded(tmp_path):
 
 
 @pytest.mark.thorough
-def test_p_is_reported_while_it_is_measured_and_a_change_ends_a_run_whose_plan_says_so(running, tmp_path):
+def test_the_live_twin_reports_p_and_a_change_ends_the_run_if_planned(running, tmp_path):
     client = running(campaign(STOPPING))
     told = until(client, is_tracked).twin
     assert told.stops_m == pytest.approx((-45e-6, 45e-6), rel=1e-2)
@@ -99,7 +99,7 @@ def test_p_is_reported_while_it_is_measured_and_a_change_ends_a_run_whose_plan_s
 
 
 @pytest.mark.thorough
-def test_a_twin_that_is_killed_is_reported_and_disturbs_nothing(running, tmp_path):
+def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     client = running(campaign({}), twin=TwinSwitch.ON)
     pid = until(client, lambda status: status.twin is not None and status.twin.pid > 0).twin.pid
     os.kill(pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""A recording that was altered, robbed of its seal or exchanged passes as intact with no command."""
+"""No command accepts an altered, unsealed or swapped recording as intact."""
 
 import hashlib
 import shutil
@@ -122,7 +122,7 @@ def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, fold
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("how", ["copied over", "sealed anew"])
-def test_another_recording_under_the_name_is_refused_by_every_command(vibench_here, folder, how):
+def test_a_swapped_recording_is_refused_by_every_command(vibench_here, folder, how):
     noted(folder, ("dwell", "noise"))
     assert {code for code, _ in said_by_all(vibench_here, folder).values()} == {0}
     if how == "copied over":

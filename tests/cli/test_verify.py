@@ -1,4 +1,4 @@
-"""`vibench verify`, and what other commands say of recordings that are damaged or made to harm."""
+"""`vibench verify`, and how other commands treat damaged or malicious recordings."""
 
 import contextlib
 import hashlib
@@ -81,7 +81,7 @@ def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
     assert vibench_here("verify", "one.h5", cwd=folder).returncode == 0
 
 
-def test_a_key_is_requested_by_name(vibench_here, folder):
+def test_a_wrong_or_missing_key_is_reported(vibench_here, folder):
     (folder / "key").write_text("a key that was not used here")
     found = vibench_here("verify", ".", "--key", "key", "--json", cwd=folder)
     assert found.returncode == 1
@@ -92,7 +92,7 @@ def test_a_key_is_requested_by_name(vibench_here, folder):
 
 
 @pytest.mark.parametrize("arguments", [("analyse", "two.h5", "--json"), ("export", "two.h5", "--to", "csv")])
-def test_no_number_is_taken_from_a_damaged_recording(vibench_here, folder, arguments):
+def test_damaged_recordings_are_not_analysed(vibench_here, folder, arguments):
     damage(folder / "two.h5")
     found = vibench_here(*arguments, cwd=folder)
     assert found.returncode == 1
@@ -122,7 +122,7 @@ def packed(vibench_here, folder):
     return found, names, {each["@id"]: each for each in graph}
 
 
-def test_a_whole_folder_is_packed_without_a_complaint(vibench_here, folder):
+def test_an_intact_folder_is_packed_without_warnings(vibench_here, folder):
     found, names, graph = packed(vibench_here, folder)
     assert (found.returncode, "error" in found.stderr) == (0, False), found.stderr
     assert {"one.h5", "two.h5", "three.h5"} < names
@@ -130,7 +130,7 @@ def test_a_whole_folder_is_packed_without_a_complaint(vibench_here, folder):
     assert "cannot be trusted" not in graph["./"]["description"]
 
 
-def test_a_recording_that_is_not_finished_is_left_out_of_a_crate_and_named(vibench_here, folder):
+def test_unfinished_recordings_are_excluded_from_a_crate_and_named(vibench_here, folder):
     with growing(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     found, names, _ = packed(vibench_here, folder)
@@ -138,7 +138,7 @@ def test_a_recording_that_is_not_finished_is_left_out_of_a_crate_and_named(viben
     assert "note: five.h5.part is not finished and was omitted" in found.stderr
 
 
-def test_a_crate_calls_no_damaged_recording_complete(vibench_here, folder):
+def test_a_crate_marks_damaged_recordings(vibench_here, folder):
     damage(folder / "two.h5")
     (folder / "three.h5").write_bytes((folder / "three.h5").read_bytes()[:5000])
     found, names, graph = packed(vibench_here, folder)
@@ -156,7 +156,7 @@ def test_a_crate_calls_no_damaged_recording_complete(vibench_here, folder):
     assert "; complete: " in graph["one.h5"]["description"]
 
 
-def test_a_crate_names_what_its_campaign_made_and_does_not_lie_there(vibench_here, folder):
+def test_a_crate_names_missing_recordings_of_its_campaign(vibench_here, folder):
     campaign = folder / "tiny.toml"
     campaign.write_text(TINY)
     made = vibench_here("measure", "tiny.toml", "--out", ".", "--check", "waived", cwd=folder)
@@ -179,7 +179,7 @@ def test_a_crate_names_what_its_campaign_made_and_does_not_lie_there(vibench_her
         ("import", "two.h5", "--json"),
     ],
 )
-def test_a_recording_that_gives_out_other_files_is_refused(vibench_here, folder, arguments):
+def test_a_recording_with_external_links_is_refused(vibench_here, folder, arguments):
     point_outside(folder / "two.h5")
     found = vibench_here(*arguments, cwd=folder)
     assert found.returncode == 1
@@ -189,14 +189,14 @@ def test_a_recording_that_gives_out_other_files_is_refused(vibench_here, folder,
     assert not list(folder.glob("*.csv"))
 
 
-def test_it_is_read_when_the_user_says_so(vibench_here, folder):
+def test_external_links_are_read_on_request(vibench_here, folder):
     point_outside(folder / "two.h5")
     found = vibench_here("export", "two.h5", "--to", "csv", "--allow-external", cwd=folder)
     assert found.returncode == 0, found.stderr
     assert (folder / "two.csv").exists()
 
 
-def test_anything_that_was_left_of_a_recording_is_read_when_the_user_says_so(vibench_here, folder):
+def test_recover_follows_external_links_on_request(vibench_here, folder):
     with growing(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     with h5py.File(folder / "five.h5.part", "r+") as file:
@@ -219,7 +219,7 @@ def test_a_finished_recording_under_the_name_of_a_growing_one_is_not_recovered(v
     assert (folder / "four.h5.part").read_bytes() == before
 
 
-def test_one_bad_recording_does_not_spoil_a_folder(vibench_here, folder):
+def test_one_bad_recording_does_not_affect_its_folder(vibench_here, folder):
     shutil.copy(folder / "one.h5", folder / "four.h5")
     with h5py.File(folder / "four.h5", "r+") as file:
         del file["seal"]
@@ -243,7 +243,7 @@ def test_one_bad_recording_does_not_spoil_a_folder(vibench_here, folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
-def test_a_name_that_is_no_text_is_refused_in_a_sentence_where_it_would_stand_in_a_file(folder, vibench_here):
+def test_an_undecodable_name_is_refused_where_it_would_be_stored(folder, vibench_here):
     name = os.fsdecode(b"\xff.h5")
     (folder / "one.h5").rename(folder / name)
     told = vibench_here("export", name, "--to", "csv", "--out", "x", cwd=folder)

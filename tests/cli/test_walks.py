@@ -1,4 +1,4 @@
-"""A number takes a short way to the engine: frames, and files that one prediction loads."""
+"""A prediction passes few call frames and loads few files."""
 
 import runpy
 from pathlib import Path
@@ -14,7 +14,7 @@ def found():
     return WALKS["amplitude_to_engine"]()
 
 
-def test_an_amplitude_is_at_most_six_frames_from_the_engine(found):
+def test_a_prediction_reaches_the_engine_within_six_frames(found):
     assert found.frames[0].endswith("predict.py:predict")
     assert found.frames[-1].endswith("library.py:Engine.run")
     assert len(found.frames) <= MOST_FRAMES, found.frames

@@ -73,7 +73,7 @@ def vibench(*arguments):
 
 @pytest.mark.thorough
 @sees_locks
-def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench_here, tmp_path):
+def test_a_run_can_be_held_released_and_stopped_from_another_terminal(running, vibench_here, tmp_path):
     seen = json.loads(vibench("watch", "--json").stdout)["engines"]
     assert [each["pid"] for each in seen] == [running.pid]
     assert seen[0]["status"]["run"]["name"] == "dwell"
@@ -90,7 +90,7 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_a_stop_of_an_engine_that_stands_still_is_kept_and_reported(running, tmp_path):
+def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, tmp_path):
     with frozen(running.pid):
         told = vibench("stop", "--level", "abort", "--reason", "while it stood still")
         assert told.returncode == 1
@@ -115,14 +115,14 @@ def test_watching_shows_the_run_and_its_end(running):
     assert "dwell" in said
 
 
-def test_where_no_engine_runs_it_is_stated():
+def test_watch_reports_that_no_engine_runs():
     told = vibench("stop")
     assert told.returncode == 1
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
     assert f"looked for in {os.environ['VIBENCH_STATE_DIR']}" in told.stderr
 
 
-def test_where_the_state_folder_cannot_be_made_it_is_stated(vibench_here, tmp_path):
+def test_watch_reports_an_unwritable_state_folder(vibench_here, tmp_path):
     (tmp_path / "state").write_text("a file")
     told = vibench_here("stop", cwd=tmp_path, environment={"VIBENCH_STATE_DIR": str(tmp_path / "state")})
     assert told.returncode == 1
@@ -131,7 +131,7 @@ def test_where_the_state_folder_cannot_be_made_it_is_stated(vibench_here, tmp_pa
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
-def test_nobody_else_can_read_the_token(tmp_path):
+def test_the_token_is_readable_by_its_owner_only(tmp_path):
     state = Path(os.environ["VIBENCH_STATE_DIR"])
     with announce(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", unheard):
         (file,) = (state / "engines").iterdir()
@@ -181,7 +181,7 @@ class TestWithoutAnEngine:
             assert recording.reason == "from elsewhere"
         assert list((Path(os.environ["VIBENCH_STATE_DIR"]) / "engines").iterdir()) == []
 
-    def test_what_only_engines_do_is_refused(self, script, vibench_here, tmp_path):
+    def test_engine_commands_are_refused_for_other_programs(self, script, vibench_here, tmp_path):
         held = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert held.returncode == 1
         assert "is no engine and cannot be held" in held.stderr
@@ -204,7 +204,7 @@ class TestWithoutAnEngine:
         assert check.returncode == 3
 
 
-def test_two_switches_of_one_process_are_both_reached(tmp_path):
+def test_two_stop_switches_of_one_process_are_both_reached(tmp_path):
     first, second = StopSwitch(), StopSwitch()
     with stop_on_signal(first, "first"), stop_on_signal(second, "second"):
         (program,) = announced_programs(Program)
@@ -214,7 +214,7 @@ def test_two_switches_of_one_process_are_both_reached(tmp_path):
     assert announced_programs(Program) == ()
 
 
-def test_a_program_stays_announced_when_its_first_part_has_ended(tmp_path):
+def test_a_program_stays_announced_until_its_last_run_ends(tmp_path):
     with ExitStack() as first:
         first.enter_context(stop_on_signal(StopSwitch(), "first"))
         second = first.enter_context(ExitStack())

@@ -504,7 +504,7 @@ class TestStopLevels:
         assert_ended_without_a_jump(bench)
 
     @pytest.mark.thorough
-    def test_a_hold_ends_when_the_recording_is_full(self, bench, tmp_path):
+    def test_a_hold_ends_after_its_longest_time(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)
         run.switch.hold()

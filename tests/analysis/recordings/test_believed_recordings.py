@@ -72,7 +72,7 @@ def test_a_chain_is_not_shaken_by_a_damaged_recording(damaged):
 
 
 @pytest.mark.parametrize("number_from", [analyse, hidden_motion, xarray_dataset])
-def test_no_number_is_taken_from_a_damaged_recording(damaged, number_from):
+def test_damaged_recordings_are_not_analysed(damaged, number_from):
     with open_recording(damaged) as recording, pytest.raises(UnusableData, match="is damaged"):
         number_from(recording)
 
