@@ -21,7 +21,7 @@ def section(rng, period=1, scatter=0.0, count=1200):
 
 
 @pytest.mark.parametrize("period", [1, 2, 3, 7, 32])
-def test_a_motion_that_repeats_is_periodic_with_its_own_period(period):
+def test_a_repeating_motion_is_periodic_with_its_period(period):
     rng = np.random.default_rng(period)
     noise = 1e-3
     found = motion_verdict(Points(section(rng, period, noise), np.full(2, noise)), DRIVE_HZ)
@@ -49,7 +49,7 @@ def test_narrow_band_noise_is_not_chaotic():
     assert found.evidence.zero_one.k > 0.9, "the naive test is fooled, or this test says nothing"
 
 
-def test_a_motion_on_a_closed_curve_is_quasi_periodic_and_its_rotation_is_found():
+def test_a_motion_on_a_closed_curve_is_quasi_periodic_with_its_rotation_number():
     turns = (np.sqrt(5) - 1) / 2 / 2
     angle = 2 * np.pi * turns * np.arange(1000)
     points = np.column_stack((np.cos(angle) + 0.2 * np.cos(3 * angle), np.sin(angle + 0.4)))
@@ -59,7 +59,7 @@ def test_a_motion_on_a_closed_curve_is_quasi_periodic_and_its_rotation_is_found(
     assert found.evidence.rotation.turns_per_period == pytest.approx(turns, abs=1e-6)
 
 
-def test_a_motion_that_still_dies_out_is_undecided():
+def test_a_decaying_motion_is_undecided():
     decay = np.exp(-np.arange(1200) / 400)[:, np.newaxis] * np.array([1.0, 0.5])
     found = motion_verdict(Points(1 + decay, QUIET), DRIVE_HZ)
     assert (found.kind, found.evidence.is_settled) == (MotionKind.UNDECIDED, False)
@@ -77,28 +77,28 @@ def chaos():
     return points
 
 
-def test_chaos_that_ends_is_classified_by_what_it_became(chaos):
+def test_transient_chaos_is_classified_by_the_motion_after_it(chaos):
     points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
     assert "2100 drive periods, otherwise before" in found.why
 
 
-def test_a_periodic_motion_that_is_lost_for_good_is_classified_by_the_chaos_after_it(chaos):
+def test_a_periodic_motion_that_turns_chaotic_is_chaotic(chaos):
     points = np.vstack((np.full((750, 2), 0.2), chaos[:2250]))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.CHAOTIC
     assert found.evidence.periods == 2100, "the block in which it was lost is not judged"
 
 
-def test_a_settled_end_is_classified_by_itself_though_the_transient_was_longer(chaos):
+def test_a_settled_end_is_classified_without_its_longer_transient(chaos):
     points = np.vstack((chaos[:2100], np.full((900, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 900)
     assert "900 drive periods, otherwise before" in found.why
 
 
-def test_a_motion_that_is_lost_late_is_undecided(chaos):
+def test_a_motion_that_changes_late_is_undecided(chaos):
     points = np.vstack((np.full((2100, 2), 0.2), chaos[:900]))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
@@ -107,7 +107,7 @@ def test_a_motion_that_is_lost_late_is_undecided(chaos):
 
 @pytest.mark.parametrize("count", [200, 202, 650, 1200])
 @pytest.mark.parametrize("lost", [1, 15, 40])
-def test_a_motion_that_is_lost_in_the_last_periods_is_undecided(count, lost):
+def test_a_motion_that_changes_in_the_last_periods_is_undecided(count, lost):
     rng = np.random.default_rng(lost)
     points = section(rng, count=count, scatter=1e-5)
     points[-lost:] += rng.standard_normal((lost, 2))
@@ -116,19 +116,19 @@ def test_a_motion_that_is_lost_in_the_last_periods_is_undecided(count, lost):
     assert "fewer than 200 drive periods before the end" in found.why
 
 
-def test_chaos_with_calm_stretches_is_one_motion(chaos):
+def test_intermittent_chaos_is_one_motion(chaos):
     points = chaos[:1500].copy()
     points[300:450] = points[900:1200] = 0.2
     assert motion_verdict(Points(points, QUIET), DRIVE_HZ).evidence.periods == 1500
 
 
-def test_a_short_record_carries_no_verdict():
+def test_a_short_record_gives_no_verdict():
     found = motion_verdict(Points(np.ones((150, 2)), QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
     assert "150 drive periods" in found.why
 
 
-def test_scatter_close_to_the_noise_carries_no_verdict():
+def test_scatter_close_to_the_noise_gives_no_verdict():
     rng = np.random.default_rng(3)
     found = motion_verdict(Points(section(rng, 1, 0.3), np.full(2, 0.1)), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
@@ -144,7 +144,7 @@ def test_scatter_close_to_the_noise_carries_no_verdict():
     ],
     ids=["no contact", "impacts that repeat", "chaos"],
 )
-def test_the_specimen_moves_as_its_points_state(frequency_hz, amplitude_m, kind, period):
+def test_verdicts_from_points_match_the_simulated_specimen(frequency_hz, amplitude_m, kind, period):
     states = stroboscopic_section(gong2025(), Harmonic(frequency_hz, amplitude_m), 2600)[1100:]
     points = states[:, [0, 3]] / np.array([1.0, 2 * np.pi * frequency_hz])
     size = np.sqrt(np.mean(points**2))
@@ -215,7 +215,7 @@ def known_exponent(name):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["duffing", "henon", "stops"])
-def test_the_exponent_of_points_is_no_less_than_is_stated(name):
+def test_the_exponent_of_points_is_within_its_bound(name):
     """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
     points, exponent = known_exponent(name)
     points = points / (np.sqrt(2) * points.std(axis=0))
@@ -230,7 +230,7 @@ def test_the_exponent_of_points_is_no_less_than_is_stated(name):
     assert said or name == "stops"
 
 
-def test_points_that_only_scatter_have_no_exponent():
+def test_scattered_points_have_no_exponent():
     rng = np.random.default_rng(2)
     found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
     assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
@@ -285,13 +285,13 @@ def test_a_motion_that_noise_could_hide_is_not_called_periodic():
         (np.zeros((500, 2)), QUIET, -260.0, "a drive frequency of -260.0 Hz is not allowed"),
     ],
 )
-def test_points_that_are_none_are_refused(value, noise, drive_hz, said):
+def test_lost_points_are_refused(value, noise, drive_hz, said):
     """One lost point among five hundred chaotic ones was "quasi-periodic"."""
     with pytest.raises(AnalysisError, match=said):
         motion_verdict(Points(value, noise), drive_hz)
 
 
-def test_a_period_must_leave_less_than_all_of_a_small_scatter():
+def test_a_period_must_explain_a_small_scatter():
     """A slow transient of 0.3 % of the orbit was "every 10 periods", which left most of its scatter."""
     place, rng = np.arange(700), np.random.default_rng(1)
     moved = 0.0032 * np.exp((0.201j * np.pi - 2e-4) * place)

@@ -49,18 +49,18 @@ def autoregression(rng, count):
 
 
 @pytest.mark.parametrize(("growth", "k"), [(4.0, 1.0), (3.55, 0.0)])
-def test_the_zero_one_test_tells_chaos_from_period_eight(growth, k):
+def test_the_zero_one_test_separates_chaos_from_period_eight(growth, k):
     assert zero_one(logistic(growth, 2000)).k == pytest.approx(k, abs=0.01)
 
 
 @pytest.mark.parametrize(("stride", "is_oversampled"), [(1, True), (5, True), (20, False)])
-def test_an_oversampled_flow_is_known_for_it(lorenz, stride, is_oversampled):
+def test_an_oversampled_flow_is_detected(lorenz, stride, is_oversampled):
     found = zero_one(lorenz[::stride][:2000])
     assert found.is_oversampled is is_oversampled
     assert (found.k > 0.9) is not is_oversampled
 
 
-def test_the_zero_one_test_does_not_mind_a_shift_or_a_scale():
+def test_the_zero_one_test_is_invariant_to_shift_and_scale():
     series = logistic(3.9, 1000)
     assert zero_one(3 * series + 40).k == pytest.approx(zero_one(series).k, abs=0.01)
 
@@ -70,21 +70,21 @@ def test_the_zero_one_test_does_not_mind_a_shift_or_a_scale():
     [(logistic(4.0, 3000), 1, np.log(2)), (henon(5000), 2, 0.41922)],
     ids=["logistic", "henon"],
 )
-def test_neighbours_part_at_the_rate_of_the_exponent(series, delays, exponent):
+def test_neighbours_diverge_at_the_rate_of_the_exponent(series, delays, exponent):
     found = divergence(delay_vectors(series, delays), steps=25)
     assert found.is_resolved
     assert found.exponent == pytest.approx(exponent, rel=0.03)
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
 
 
-def test_neighbours_of_a_flow_part_at_the_rate_of_the_exponent(lorenz):
+def test_neighbours_of_a_flow_diverge_at_the_rate_of_the_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
     # 400 s of this flow have an exponent of their own, some per cent from that of all time.
     assert found.exponent / 0.01 == pytest.approx(0.9056, rel=0.08)
 
 
-def test_there_is_no_exponent_where_noise_fills_the_package_below_saturation():
+def test_no_exponent_is_found_when_noise_reaches_saturation():
     noise = np.random.default_rng(0).standard_normal((2000, 3))
     assert not divergence(noise, steps=8).is_resolved
     clean, noisy = henon(3000), henon(3000) + 0.2 * np.random.default_rng(1).standard_normal(3000)
@@ -92,7 +92,7 @@ def test_there_is_no_exponent_where_noise_fills_the_package_below_saturation():
     assert not divergence(delay_vectors(noisy, 2), steps=20, noise=0.2).is_resolved
 
 
-def test_henon_with_noise_is_more_than_linear_noise_and_an_autoregression_is_not():
+def test_noisy_henon_is_nonlinear_and_an_autoregression_is_not():
     rng = np.random.default_rng(2)
     series = henon(2000)
     noisy = series + 0.1 * series.std() * rng.standard_normal(2000)
@@ -110,7 +110,7 @@ def test_linear_noise_is_rejected_no_more_often_than_the_test_states():
     assert rejected <= 5
 
 
-def test_a_series_whose_surrogates_miss_its_spectrum_is_not_judged():
+def test_a_series_with_wrong_surrogate_spectra_is_undecided():
     found = surrogate_test(autoregression(np.random.default_rng(3), 2000) ** 3)
     assert not found.is_valid
     assert not found.rejects_linear_noise
@@ -135,7 +135,7 @@ def test_a_neighbour_is_the_nearest_point_that_is_not_near_in_time():
         assert reach[neighbour] == pytest.approx(distance)
 
 
-def test_anything_that_is_too_short_is_refused():
+def test_too_short_series_are_refused():
     with pytest.raises(NotEnoughData, match="200 values"):
         zero_one(np.ones(100))
     with pytest.raises(NotEnoughData, match="neighbour"):

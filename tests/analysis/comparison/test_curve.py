@@ -36,7 +36,7 @@ def test_a_peak_is_placed_between_the_points_with_its_width():
     assert peak.damping_ratio == pytest.approx(DAMPING, rel=0.05)
 
 
-def test_noise_that_its_own_spread_explains_is_no_peak():
+def test_peaks_within_the_spread_of_noise_are_ignored():
     rng = np.random.default_rng(1)
     frequency_hz = np.arange(50.0, 600.0)
     values = np.exp(0.3 * rng.standard_normal(frequency_hz.size))
@@ -51,7 +51,7 @@ def test_noise_that_its_own_spread_explains_is_no_peak():
     assert curve_peaks(flat) == ()
 
 
-def test_half_the_height_lies_six_decibels_below_at_any_frequencies():
+def test_half_height_is_six_decibels_below_the_peak():
     upper, lower = mode(np.arange(100.0, 400.0, 1.0)), mode(np.arange(150.3, 500.0, 0.9), 0.5)
     found = curve_difference(upper, lower)
     assert found.frequency_hz[0] == 151.0
@@ -67,7 +67,7 @@ def test_curves_without_a_common_frequency_have_no_difference():
         curve_difference(mode(np.arange(10.0, 20.0)), mode(np.arange(30.0, 40.0)))
 
 
-def test_a_curve_is_read_between_its_points_and_nowhere_else():
+def test_a_curve_is_interpolated_and_never_extrapolated():
     curve = mode(np.array([100.0, 200.0]))
     values = curve.at(np.array([50.0, 100.0, np.sqrt(2) * 100, 300.0])).magnitude
     assert np.isnan(values[[0, 3]]).all()
@@ -75,14 +75,14 @@ def test_a_curve_is_read_between_its_points_and_nowhere_else():
     assert values[2] == pytest.approx(np.sqrt(curve.magnitude[0] * curve.magnitude[1]))
 
 
-def test_a_sweep_downwards_is_turned_round():
+def test_a_downward_sweep_is_reversed():
     frequency_hz = np.array([300.0, 200.0, 200.0, 100.0])
     turned = sorted_curve(mode(frequency_hz))
     assert np.array_equal(turned.frequency_hz, [100.0, 200.0, 300.0])
     assert turned.magnitude[2] == mode(frequency_hz).magnitude[0]
 
 
-def test_a_known_point_of_the_exported_svg_lies_where_it_belongs(tmp_path):
+def test_a_known_point_of_the_exported_svg_is_at_its_coordinates(tmp_path):
     """The corner of a curve of three points, measured against the ends of the same curve."""
     frequency_hz = np.array([100.0, 300.0, 900.0])
     curve = Curve(
@@ -109,7 +109,7 @@ def test_a_known_point_of_the_exported_svg_lies_where_it_belongs(tmp_path):
     assert (x1, height - y1) == pytest.approx(tuple(expected), abs=0.2)
 
 
-def test_tables_carry_units_and_every_curve_its_own_file(tmp_path):
+def test_tables_have_units_and_one_file_per_curve(tmp_path):
     curves = [mode(np.arange(50.0, 600.0, 0.7)), mode(np.arange(100.0, 400.0), 0.5, "other")]
     written = comparison_figure("both", curves, (curves[0], curves[1]), [266.0]).save(tmp_path)
     names = {each.name for each in written}
@@ -120,7 +120,7 @@ def test_tables_carry_units_and_every_curve_its_own_file(tmp_path):
     assert len(text) == 1 + curves[0].frequency_hz.size
 
 
-def test_a_band_in_few_columns_holds_the_whole_band():
+def test_a_band_reduced_to_few_columns_covers_the_whole_band():
     curve = mode(np.arange(50.0, 600.0, 0.1), sd=0.05)
     frequency_hz, low, high = curve.band(100)
     assert frequency_hz.size == low.size == high.size == 100
@@ -140,7 +140,7 @@ def respond(frequency_hz, modes_hz, damping=0.005):
 
 
 @pytest.mark.parametrize("depth", [0.15, 0.3, 0.5])
-def test_chaotic_wiggles_are_no_modes_and_a_resonance_beside_them_stays_one(depth):
+def test_chaotic_scatter_gives_no_modes_beside_a_resonance(depth):
     """A peak of a chaotic stretch at 231.79 Hz was listed with a damping of 0.781 %."""
     frequency_hz = np.arange(60.0, 400.0, 0.3)
     smooth = respond(frequency_hz, (95.0,))
@@ -181,7 +181,7 @@ def test_a_figure_gives_one_colour_to_a_recording_and_one_dash_to_a_kind():
     assert len(dashes) == 6
 
 
-def test_a_name_of_a_file_is_drawn_as_it_is_and_not_as_mathematics(tmp_path):
+def test_file_names_are_not_drawn_as_mathematics(tmp_path):
     frequency_hz = np.array([100.0, 300.0, 900.0])
     named = ("a$x_{$<b>\x1b[2J", CurveOrigin.MEASURED, CurveKind.RESPONSE_I)
     curve = Curve(*named, frequency_hz, np.array([1.0, 100.0, 10.0]), np.full(3, np.nan))

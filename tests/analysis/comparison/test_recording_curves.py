@@ -20,7 +20,7 @@ def compared(streamed_file):
     return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
-def test_a_transmission_crosses_to_another_process_with_its_spread(compared):
+def test_a_transmission_is_passed_between_processes_with_its_spread(compared):
     (curve,) = pickle.loads(pickle.dumps(compared)).curves
     assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)
     assert np.median(curve.magnitude) == pytest.approx(2.0, rel=0.01)
@@ -35,13 +35,13 @@ def test_the_whole_result_is_kept_for_reports(compared):
     assert failures == ()
 
 
-def test_anything_that_is_requested_is_what_is_estimated(streamed_file):
+def test_the_requested_quantities_are_estimated(streamed_file):
     found = compare_recording(
         streamed_file(), FrequencyResponseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
     )
     assert found.curves[0].note.startswith("h1, ")
 
 
-def test_a_recording_that_ended_too_early_reports_it(streamed_file):
+def test_a_too_short_recording_is_reported(streamed_file):
     with pytest.raises(NotEnoughData, match="streamed"):
         compare_recording(streamed_file(samples=10), FrequencyResponseRequest(), Simulation.LEFT_OUT)

@@ -24,7 +24,7 @@ def swept():
     )
 
 
-def test_a_swept_run_states_what_the_chain_itself_did(swept):
+def test_a_swept_chain_reports_its_simulated_motion(swept):
     (run,) = swept.runs
     drive, chain = LinearSweep(150.0, 600.0, 3.0, 10e-6), chain_of(gong2025(), 3)
     alone = integrate_chain(chain, drive, 3.0, sample_rate_hz=20e3)
@@ -59,7 +59,7 @@ def test_a_recorded_base_motion_drives_a_chain_and_is_reported_where_it_is_coher
     assert chain_figure(found).svg
 
 
-def test_cells_take_turns_and_what_is_replaced_is_replaced_in_all():
+def test_alternating_cells_repeat_and_changes_apply_to_all():
     others = (SpecimenTable.model_validate("heavy"), SpecimenTable.model_validate("asymmetric"))
     request = ChainRequest(others=others, lengths=(5,), gap_m=30e-6)
     chain = request.chain(5)
@@ -97,7 +97,7 @@ def test_a_steady_chain_reaches_a_requested_error():
     assert np.all(np.isnan(truth.transmission_error))
 
 
-def test_the_error_of_lines_holds_in_nineteen_cases_of_twenty():
+def test_stated_errors_of_lines_hold_in_95_percent():
     random = np.random.default_rng(5)
     drawn = random.standard_normal((400, 16, 2)) @ np.array([1.0, 1j])
     held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]
@@ -112,6 +112,6 @@ def test_the_error_of_lines_holds_in_nineteen_cases_of_twenty():
         ({"drive": "swept", "stop_hz": 300.0}, "needs a steady drive, not swept"),
     ],
 )
-def test_what_a_target_of_a_chain_decides_is_not_given_beside_it(given, said):
+def test_options_fixed_by_an_error_target_of_a_chain_are_refused(given, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**{"error": 0.01, **given})

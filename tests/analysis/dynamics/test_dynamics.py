@@ -55,7 +55,7 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
         (BranchMethod.BALANCE, "No harmonic balance of at most 64 harmonics was found"),
     ],
 )
-def test_that_nothing_was_found_is_reported_in_the_words_of_the_method(method, said):
+def test_an_empty_result_is_explained_by_its_method(method, said):
     """A balance finds none among stops that knock, where shooting finds motions; "none" alone was said."""
     none = BranchDiagram(BranchRequest(start=100.0, stop=120.0, method=method, harmonics=64), (), 1.0)
     assert none.cost_sentence.startswith(said)
@@ -96,12 +96,12 @@ def computed():
         ({"gap_m": -1.0}, "greater than 0"),
     ],
 )
-def test_what_branches_cannot_be_asked_is_refused_in_a_sentence(options, said):
+def test_invalid_branch_requests_are_refused_in_a_sentence(options, said):
     with pytest.raises(ValidationError, match=said):
         BranchRequest(**options)
 
 
-def test_the_ends_of_a_range_are_points_where_the_step_fits():
+def test_a_range_includes_its_ends_if_the_step_fits():
     assert SpectrumRequest(start=0.1, stop=0.7, step=0.1).values == pytest.approx(np.arange(1, 8) / 10)
     assert SpectrumRequest(start=240.0, stop=249.0, step=5.0).values == (240.0, 245.0)
     assert SpectrumRequest(start=5.0, stop=5.0, step=1.0).values == (5.0,)
@@ -125,7 +125,7 @@ def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
     assert path.read_bytes() == before
 
 
-def test_another_file_is_no_branches(tmp_path):
+def test_a_foreign_file_is_not_read_as_branches(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file["a"] = 1
     (tmp_path / "y.h5").write_text("no HDF5")
@@ -144,7 +144,7 @@ def test_the_document_is_json_with_every_point(computed):
     assert {event["kind"] for event in found["branches"][0]["events"]} >= {"grazing", "symmetry breaking"}
 
 
-def test_stable_and_unstable_stretches_are_curves_of_their_own():
+def test_stable_and_unstable_parts_are_separate_curves():
     curves = {(each.origin, each.response): each for each in DIAGRAM.curves()}
     stable = curves[CurveOrigin.STABLE, CurveKind.RESPONSE_I]
     unstable = curves[CurveOrigin.UNSTABLE, CurveKind.RESPONSE_I]
@@ -175,7 +175,7 @@ def test_a_recorded_level_is_the_median_in_each_bin_and_ascends():
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_a_figure_has_dashes_where_motions_are_unstable_and_marks_at_events(along):
+def test_a_figure_dashes_unstable_parts_and_marks_events(along):
     request = BranchRequest(along=along, start=1e-6 if along is Parameter.AMPLITUDE else 100.0, stop=120.0)
     drawn = branches_figure(BranchDiagram(request, (FOLDED,), 1.0))
     first, second = drawn.figure.axes
@@ -189,7 +189,7 @@ def test_a_figure_has_dashes_where_motions_are_unstable_and_marks_at_events(alon
     assert [each.name for each in drawn.tables] == ["branches", "branches_special_points"]
 
 
-def test_what_a_bench_can_hold_is_reported_in_figure_sentence_table_and_json():
+def test_holdable_motions_are_reported_in_figure_text_table_and_json():
     growth_s = FOLDED.growth_time_s
     assert np.isinf(growth_s[:3]).all()
     assert growth_s[3:] == pytest.approx([1 / (115.0 * math.log(1.2)), 1 / (105.0 * math.log(1.5))])
@@ -215,7 +215,7 @@ def test_what_a_bench_can_hold_is_reported_in_figure_sentence_table_and_json():
     assert len(branches_figure(DIAGRAM).figure.axes) == 2
 
 
-def test_a_phase_resonance_is_drawn_by_its_frequency_with_what_was_tracked_on_it():
+def test_a_phase_resonance_is_drawn_with_its_tracked_points():
     request = BranchRequest(along=Parameter.AMPLITUDE, start=1e-8, stop=1e-7, resonance_band_hz=(92.0, 97.0))
     diagram = diagram_of(request)
     (found,) = diagram.lines
@@ -240,7 +240,7 @@ def test_a_phase_resonance_is_drawn_by_its_frequency_with_what_was_tracked_on_it
     assert first.get_lines()[0].get_ydata() == pytest.approx(found.frequency_hz)
 
 
-def test_a_spectrum_adds_up_and_is_kept(tmp_path):
+def test_a_spectrum_has_the_right_sum_and_is_stored(tmp_path):
     request = SpectrumRequest(start=255.0, stop=260.0, step=5.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)
     assert found.largest_sum_difference < 1e-6
@@ -260,7 +260,7 @@ def test_a_spectrum_adds_up_and_is_kept(tmp_path):
     assert lower.get_ylabel() == "dimension"
 
 
-def test_a_lossy_contact_has_no_check_by_the_dampers_and_reports_it():
+def test_a_lossy_contact_reports_the_missing_damping_check():
     request = SpectrumRequest(model="rigid:0.8", start=260.0, stop=260.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)
     assert math.isnan(found.largest_sum_difference)
@@ -269,7 +269,7 @@ def test_a_lossy_contact_has_no_check_by_the_dampers_and_reports_it():
 
 
 @pytest.mark.thorough
-def test_a_balance_states_how_far_its_harmonics_reach():
+def test_a_balance_reports_the_convergence_of_its_harmonics():
     options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
     first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))
     many = diagram_of(BranchRequest(method=BranchMethod.BALANCE, **options))

@@ -51,9 +51,7 @@ def test_a_dwell_has_no_level_over_frequency(dwell_file):
         level_of_drive(compared(dwell_file()))
 
 
-def test_a_report_lays_branches_over_the_steps_and_states_how_their_levels_differ(
-    diagram, stepped_file, tmp_path
-):
+def test_a_report_overlays_branches_and_states_level_differences(diagram, stepped_file, tmp_path):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
     (drawn,) = draw_branches(results, [diagram])
     measured = [each for each in drawn.figure.axes[0].get_lines() if "measured" in str(each.get_label())]
@@ -69,7 +67,7 @@ def test_a_report_lays_branches_over_the_steps_and_states_how_their_levels_diffe
 
 
 @pytest.mark.thorough
-def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_path):
+def test_like_takes_range_and_level_of_the_recording(stepped_file, level, tmp_path):
     options = ("--places", "2", "--starts", "0", "--json", "--out", str(tmp_path / "like"))
     result = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), *options])
     assert result.exit_code == 0, result.output
@@ -85,7 +83,7 @@ def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_pat
 
 
 @pytest.mark.thorough
-def test_an_analysis_takes_branches_that_were_kept(diagram, stepped_file, tmp_path):
+def test_an_analysis_uses_saved_branches(diagram, stepped_file, tmp_path):
     kept = write_diagram(diagram, tmp_path / "b.h5")
     arguments = [
         "analyse",

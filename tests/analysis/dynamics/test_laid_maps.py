@@ -25,7 +25,7 @@ def small_map(stepped_file):
     )
 
 
-def test_a_recordings_level_lies_on_the_map_with_every_measured_response(small_map, stepped_file):
+def test_a_map_shows_the_recorded_level_and_responses(small_map, stepped_file):
     level = recorded_response(stepped_file)
     figure = map_figure(small_map, levels=[level]).figure
     lines = [line for axes in figure.axes for line in axes.get_lines() if line.get_label() == level.name]
@@ -36,9 +36,7 @@ def test_a_recordings_level_lies_on_the_map_with_every_measured_response(small_m
     assert points == sum(len(curve.frequency_hz) for curve in level.measured) > 0
 
 
-def test_a_report_lays_recordings_on_maps_over_frequency_and_amplitude_only(
-    small_map, stepped_file, tmp_path
-):
+def test_a_report_overlays_recordings_only_on_frequency_amplitude_maps(small_map, stepped_file, tmp_path):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
     other = solve_map(Map(model="linear", damping_time_s=Range(start=1e-5, stop=2e-5, points=2)))
     on_it, beside = (each.figure for each in draw_maps(results, [small_map, other]))

@@ -28,7 +28,7 @@ OWN = {"name": "mine", "masses_kg": (5.8e-3, 2.1e-3, 2.2e-3)}
         ({"x_m": 1e-7}, "Specimen gong2025, frequency_hz = 260, x_m = 1e-07;"),
     ],
 )
-def test_a_caption_names_all_that_a_map_changes_of_its_specimen(said, words):
+def test_a_caption_names_every_changed_specimen_value(said, words):
     # So small a drive touches nothing: nothing is followed.
     levels = Range(start=1e-9, stop=2e-9, points=2)
     plan = Map.model_validate({"amplitude_m": levels, "periods": 100, "window_periods": 10, **said})

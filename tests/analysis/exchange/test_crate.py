@@ -50,7 +50,7 @@ def test_every_byte_is_packed_and_described(folder, crate):
     assert not (folder / "ro-crate-metadata.json").exists()
 
 
-def test_what_a_link_leads_to_outside_the_folder_is_not_published(folder, tmp_path):
+def test_links_out_of_the_folder_are_not_published(folder, tmp_path):
     """In a folder that was received, it may be a private key of whoever packs it."""
     (tmp_path / "private").write_text("a key")
     (folder / "notes.txt").symlink_to(tmp_path / "private")
@@ -64,7 +64,7 @@ def test_a_crate_is_never_overwritten(folder, crate):
         pack_folder(folder, crate, CrateFacts(LICENCE), {})
 
 
-def test_anything_that_cannot_be_deposited_is_refused(folder, tmp_path):
+def test_an_invalid_deposit_is_refused(folder, tmp_path):
     with pytest.raises(InvalidRequest, match="no address of a licence"):
         pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
     with pytest.raises(InvalidRequest, match="without a name"):
@@ -92,7 +92,7 @@ def test_anything_that_cannot_be_deposited_is_refused(folder, tmp_path):
         ("https://example.org", "example.org"),
     ],
 )
-def test_a_licence_is_named_as_people_name_it(folder, tmp_path, address, name):
+def test_licences_may_be_given_by_common_names(folder, tmp_path, address, name):
     pack_folder(folder, tmp_path / "crate.zip", CrateFacts(address), {})
     assert described(tmp_path / "crate.zip")[address]["name"] == name
 

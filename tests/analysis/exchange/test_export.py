@@ -24,7 +24,7 @@ RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")
 
 
-def test_csv_reads_back_every_value_with_its_unit_and_time(known, known_values, tmp_path):
+def test_csv_contains_every_value_with_unit_and_time(known, known_values, tmp_path):
     path, _ = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
     with path.open(newline="", encoding="utf-8") as file:
         assert next(csv.reader(file)) == ["time [s]", "drive_voltage [V]", "m0_velocity [m s-1]"]
@@ -44,7 +44,7 @@ def test_an_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_pa
     assert json.loads(facts.read_text("utf-8"))["first_sample"] == 51_200
 
 
-def test_what_csv_cannot_hold_stands_beside_it(known, tmp_path):
+def test_metadata_without_place_in_csv_is_written_beside_it(known, tmp_path):
     _, facts = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
     said = json.loads(facts.read_text("utf-8"))
     assert facts.name == "a.csv.facts.json"
@@ -69,7 +69,7 @@ def test_pyuff_reads_every_value_of_a_universal_file(known, known_values, tmp_pa
         np.testing.assert_array_equal(each["data"], known_values[role])
 
 
-def test_a_universal_file_keeps_the_digits_of_the_rate_that_its_increment_loses(known, tmp_path):
+def test_a_universal_file_keeps_all_digits_of_the_rate(known, tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     path, _ = export_samples(excerpt(known, from_s=1.0), Format.UFF, tmp_path / "a.uff")
     first = pyuff.UFF(str(path)).read_sets(1)
@@ -99,7 +99,7 @@ def test_segments_in_a_matlab_file_are_indices_of_its_own_arrays(known, tmp_path
     assert segments["last"].tolist() == [70_000 - 51_200, 120_000 - 51_200]
 
 
-def test_wav_keeps_the_counts_of_the_converter_behind_full_scale(known, known_values, tmp_path):
+def test_wav_keeps_converter_counts_relative_to_full_scale(known, known_values, tmp_path):
     path, facts = export_samples(excerpt(known), Format.WAV, tmp_path / "a.wav")
     rate, data = wavfile.read(path)
     assert (rate, data.dtype) == (RATE_HZ, np.int32)
@@ -119,7 +119,7 @@ def test_a_rate_that_wav_cannot_state_is_refused(known, tmp_path):
 
 
 @pytest.mark.parametrize(("to", "hours", "said"), [(Format.MAT, 1, "2 GiB"), (Format.WAV, 6, "4 GiB")])
-def test_more_than_the_format_holds_is_refused_before_anything_is_written(known, tmp_path, to, hours, said):
+def test_data_beyond_the_format_is_refused_before_writing(known, tmp_path, to, hours, said):
     samples = round(hours * 3600 * RATE_HZ)
     with pytest.raises(InvalidRequest, match=said):
         export_samples(excerpt(replace(known, samples=samples)), to, tmp_path / "a")
@@ -127,7 +127,7 @@ def test_more_than_the_format_holds_is_refused_before_anything_is_written(known,
 
 
 @pytest.mark.parametrize("to", list(Format))
-def test_nothing_is_overwritten_and_nothing_is_left_of_a_refusal(known, tmp_path, to):
+def test_a_refused_export_overwrites_and_leaves_nothing(known, tmp_path, to):
     taken = tmp_path / f"a.{to.value}"
     taken.write_text("mine")
     with pytest.raises(InvalidRequest, match="nothing is ever overwritten"):
@@ -135,7 +135,7 @@ def test_nothing_is_overwritten_and_nothing_is_left_of_a_refusal(known, tmp_path
     assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_watcher_hears_of_every_value(known, tmp_path):
+def test_export_progress_covers_every_value(known, tmp_path):
     for to in Format:
         heard = []
         chosen = excerpt(known)
@@ -153,7 +153,7 @@ def test_an_interrupted_export_leaves_no_file(known, tmp_path):
 
 
 @pytest.mark.parametrize(("from_s", "to_s"), [(-1.0, None), (2.0, 1.0), (0.0, 100.0), (1.0, 1.0)])
-def test_a_stretch_outside_the_recording_is_refused_with_its_length(known, from_s, to_s):
+def test_a_range_outside_the_recording_is_refused_with_its_length(known, from_s, to_s):
     with pytest.raises(InvalidRequest, match=r"goes from 0 to 2\.34375 s"):
         excerpt(known, (), from_s, to_s)
 
@@ -195,7 +195,7 @@ def test_saved_results_become_structs_in_matlab(with_results, tmp_path):
     assert json.loads(found["settings_json"]) == {"estimator": "h1"}
 
 
-def test_a_recording_that_still_grows_is_exported_as_far_as_it_is_safe(tmp_path):
+def test_a_growing_recording_is_exported_up_to_its_committed_samples(tmp_path):
     channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
     header = RecordingHeader((channel,), 1000.0, 5000, Origin.SIMULATED)
     with create_recording(tmp_path / "grows.h5", header) as writer:

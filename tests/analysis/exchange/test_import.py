@@ -114,7 +114,7 @@ def test_a_file_in_volts_is_scaled_by_the_sensitivity_of_the_sensor(tmp_path):
         import_recording(tmp_path / "a.h5", scaled, tmp_path / "second.h5")
 
 
-def test_values_that_are_no_numbers_are_lost_samples(tmp_path):
+def test_non_numeric_values_are_lost_samples(tmp_path):
     wanted = signals()
     wanted[0, 55_000:55_003] = np.nan
     wanted[1, 10] = np.inf
@@ -160,7 +160,7 @@ def test_a_unit_in_the_file_gives_the_scale_or_refuses_another(tmp_path, said, m
     assert_same(values, [signals()[0], factor * signals()[1]])
 
 
-def test_a_tdms_file_brings_its_rate_and_its_values(tmp_path):
+def test_a_tdms_file_is_imported_with_rate_and_values(tmp_path):
     nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     about = {"wf_increment": 1 / RATE_HZ, "unit_string": "V"}
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
@@ -217,7 +217,7 @@ def test_samples_near_a_stated_full_scale_are_overloads(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize(("binary", "single"), [(0, False), (0, True), (1, False)])
-def test_universal_files_of_pyuff_read_as_pyuff_wrote_them(tmp_path, binary, single):
+def test_universal_files_written_by_pyuff_are_read(tmp_path, binary, single):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     file = pyuff.UFF(str(tmp_path / "a.uff"))
     wanted = signals()[:, :4001]
@@ -264,7 +264,7 @@ def test_binary_samples_of_single_precision_and_the_other_byte_order_are_read(kn
 
 
 @pytest.mark.parametrize("ending", ["    -1\n", "\n    -1\n", "\r\n    -1\r\n"])
-def test_what_a_maker_puts_behind_binary_samples_does_not_matter(known, known_values, tmp_path, ending):
+def test_trailing_bytes_after_binary_samples_are_ignored(known, known_values, tmp_path, ending):
     path, _ = export_samples(excerpt(known, to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head, *bodies = path.read_bytes().split(b"    -1\n    58b")
     kept = [body.removesuffix(b"    -1\n") for body in bodies]
@@ -276,14 +276,14 @@ def test_what_a_maker_puts_behind_binary_samples_does_not_matter(known, known_va
 
 
 @pytest.mark.parametrize("unit", [b"m/s\xb2 ", b"m/s\xc2\xb2"])
-def test_a_unit_may_have_a_sign_that_ascii_has_not(known, tmp_path, unit):
+def test_units_may_contain_non_ascii_characters(known, tmp_path, unit):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.1), Format.UFF, tmp_path / "a.uff")
     path.write_bytes(path.read_bytes().replace(b"m s-1", unit))
     with opened_source(path) as source:
         assert source.channels[0].unit == "m/s²"
 
 
-def test_samples_that_look_like_a_delimiter_are_samples(known, tmp_path):
+def test_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("drive_voltage",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     raw = path.read_bytes()
     at = raw.rindex(b"    -1\n") - 8 * 100
@@ -348,7 +348,7 @@ def test_imported_noise_gives_the_transmission_of_the_recording_it_came_from(noi
     np.testing.assert_allclose(found.response.frequency_response.value, wanted.value, rtol=1e-4)
 
 
-def test_neither_export_nor_import_holds_a_long_file_in_memory(tmp_path):
+def test_export_and_import_use_bounded_memory(tmp_path):
     samples = 2_000_000
     with h5py.File(tmp_path / "long.h5", "w") as file:
         file["v"] = np.random.default_rng(0).standard_normal(samples)
@@ -364,7 +364,7 @@ def test_neither_export_nor_import_holds_a_long_file_in_memory(tmp_path):
     assert peak < 0.4 * samples * 8
 
 
-def test_a_recording_states_where_it_came_from(tmp_path):
+def test_an_imported_recording_names_its_source(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     recording, _ = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", 'serial = "V-7"')))
     said = recording.bench["imported"]
@@ -397,7 +397,7 @@ def test_a_wrong_mapping_names_its_key(tmp_path, old, new, said):
         load_toml(tmp_path / "map.toml", ImportMapping)
 
 
-def test_a_mapping_that_does_not_fit_the_file_is_refused_and_leaves_nothing(tmp_path):
+def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["x/v"], file["y/v"], file["short"] = (*signals(), np.ones(5))
     one = ("x/v", "m0_velocity", "")
@@ -476,7 +476,7 @@ def test_a_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, in
 
 
 @pytest.mark.parametrize("to", [Format.UFF, Format.MAT, Format.CSV])
-def test_a_rate_that_contradicts_what_was_exported_here_is_refused(known, tmp_path, to):
+def test_a_rate_that_contradicts_a_vibench_export_is_refused(known, tmp_path, to):
     path, *_ = export_samples(excerpt(known, to_s=0.5), to, tmp_path / f"a.{to.value}")
     source = "m0_velocity.values" if to is Format.MAT else "m0_velocity"
     for each in (path, known.path):
@@ -542,9 +542,7 @@ def hdf5_bytes(kept):
         ),
     ],
 )
-def test_anything_that_is_wrong_with_a_file_is_stated_once_and_in_plain_words(
-    known, tmp_path, name, content, said
-):
+def test_file_errors_are_stated_once_in_plain_words(known, tmp_path, name, content, said):
     (tmp_path / name).write_bytes(uff_bytes(known, **content) if isinstance(content, dict) else content)
     with pytest.raises(UnusableData, match=said) as refused, opened_source(tmp_path / name) as source:
         source.read(source.channels[0], 0, source.channels[0].samples)
@@ -588,13 +586,13 @@ def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
         ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
     ],
 )
-def test_a_file_that_is_not_what_its_suffix_states_is_one_sentence(tmp_path, name, content, said):
+def test_a_file_with_a_wrong_suffix_gives_one_sentence(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises((InvalidRequest, UnusableData), match=said), opened_source(tmp_path / name):
         pass
 
 
-def test_a_tdms_file_that_is_none_is_one_sentence(tmp_path):
+def test_an_invalid_tdms_file_gives_one_sentence(tmp_path):
     pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     (tmp_path / "a.tdms").write_bytes(b"nothing of the kind")
     with pytest.raises(UnusableData, match="is no TDMS file"), opened_source(tmp_path / "a.tdms"):
@@ -611,7 +609,7 @@ def test_objects_inside_hdf5_are_never_offered(tmp_path):
         assert [each.name for each in source.channels] == ["/v"]
 
 
-def test_a_file_that_points_into_another_one_is_read_only_when_that_is_allowed(tmp_path):
+def test_external_links_are_read_only_if_allowed(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["v"] = signals()[0]
         file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
@@ -642,14 +640,14 @@ def test_an_interrupted_import_leaves_nothing(tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.wav", "map.toml"]
 
 
-def test_the_mapping_in_the_manual_is_one(tmp_path):
+def test_the_mapping_in_the_manual_is_valid(tmp_path):
     manual = (Path(__file__).parents[3] / "docs" / "exchange.md").read_text(encoding="utf-8")
     (tmp_path / "map.toml").write_text(manual.split("```toml\n")[1].split("```")[0], encoding="utf-8")
     meaning = load_toml(tmp_path / "map.toml", ImportMapping)
     assert [each.kind[1] for each in meaning.channels] == ["V", "m s-2", "m s-1", "N"]
 
 
-def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
+def test_one_channel_of_a_file_can_be_imported_as_two(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
     _, values = imported(tmp_path / "a.wav", meaning)
@@ -657,7 +655,7 @@ def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
 
 
 @pytest.mark.parametrize("to", [Format.MAT, Format.CSV])
-def test_anything_that_was_exported_as_matlab_or_text_comes_back(known, known_values, tmp_path, to):
+def test_matlab_and_text_exports_can_be_imported(known, known_values, tmp_path, to):
     path, *_ = export_samples(excerpt(known, to_s=1.0), to, tmp_path / f"a.{to.value}")
     head = DWELL.replace("8000.0", "51200.0").replace("settle_s = 1,", "settle_s = 0,")
     channels = (
@@ -694,7 +692,7 @@ def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
         ("time,Vib (m/s)\n0,1.5\n0.001,-2\n0.004,1e-3\n", "Vib", None),
     ],
 )
-def test_columns_of_text_are_read_however_they_are_written(tmp_path, text, label, rate_hz):
+def test_common_formats_of_text_columns_are_read(tmp_path, text, label, rate_hz):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with opened_source(tmp_path / "a.csv") as source:
         _, column = source.channels
@@ -714,7 +712,7 @@ def spoiled(raw, dice):
 
 
 @pytest.mark.parametrize("suffix", ["uff", "h5", "wav", "tdms", "mat", "csv"])
-def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, suffix):
+def test_a_corrupted_file_never_crashes_the_import(known, tmp_path, suffix):
     path = tmp_path / f"a.{suffix}"
     data = signals()[:, :500]
     match suffix:
@@ -748,21 +746,21 @@ def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, su
 
 
 @pytest.mark.parametrize(("said", "found"), [("", "simulated"), ('origin = "simulated"\n', "simulated")])
-def test_simulated_samples_stay_simulated_on_their_way_through_a_universal_file(known, tmp_path, said, found):
+def test_a_universal_file_keeps_the_mark_of_simulated_samples(known, tmp_path, said, found):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = said + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("settle_s = 1,", "settle_s = 0,")
     recording, _ = imported(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head))
     assert recording.origin.value == found
 
 
-def test_a_mapping_that_calls_simulated_samples_real_is_refused(known, tmp_path):
+def test_a_mapping_cannot_declare_simulated_samples_real(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = 'origin = "real"\n' + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("= 1,", "= 0,")
     with pytest.raises(InvalidRequest, match=r"says origin = 'real', and a\.uff that it is simulated"):
         import_recording(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head), tmp_path / "b.h5")
 
 
-def test_a_text_that_announces_more_numbers_than_it_holds_is_refused_at_once(known, tmp_path):
+def test_a_text_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
     lines = path.read_bytes().split(b"\n")
     place = next(n for n, line in enumerate(lines) if line.startswith(b"    58b"))
@@ -775,7 +773,7 @@ def test_a_text_that_announces_more_numbers_than_it_holds_is_refused_at_once(kno
         pass
 
 
-def test_a_frequency_response_in_text_is_no_channel_and_no_damage(known, tmp_path):
+def test_a_frequency_response_in_text_is_neither_channel_nor_damage(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
     before = path.read_bytes()
     lines = before.split(b"\n")

@@ -62,7 +62,7 @@ def test_values_are_physical_and_errors_are_half_a_step(nexus, known, known_valu
             assert data["values_errors"][5] == pytest.approx(step / 2)
 
 
-def test_silx_opens_a_recording_itself_with_a_labelled_curve_of_each_channel(known_file, known_values):
+def test_silx_shows_a_labelled_curve_of_each_channel(known_file, known_values):
     nxdata = pytest.importorskip("silx.io.nxdata", reason="pip install vibench[test] brings silx")
     with h5py.File(known_file) as file:
         assert nxdata.get_default(file).group.name == "/view/m0_velocity"
@@ -80,7 +80,7 @@ def test_silx_opens_a_recording_itself_with_a_labelled_curve_of_each_channel(kno
             np.testing.assert_allclose(found.axes[0][::2], 128 * np.arange(len(low)) / RATE_HZ, atol=1e-12)
 
 
-def test_silx_finds_a_labelled_plot_by_itself(nexus):
+def test_silx_finds_the_default_plot(nexus):
     nxdata = pytest.importorskip("silx.io.nxdata", reason="pip install vibench[test] brings silx")
     with h5py.File(nexus) as file:
         for group in (file, file["entry"], file["entry"]["drive_voltage"]):

@@ -86,7 +86,7 @@ def test_h5dump_shows_the_counts(with_result):
     assert counts[2:].tolist() == [-(2**31), -(2**31)]
 
 
-def test_h5py_alone_reads_it_in_a_program_without_vibench(with_result, known_values, tmp_path):
+def test_h5py_reads_a_recording_without_vibench(with_result, known_values, tmp_path):
     script = tmp_path / "reader.py"
     script.write_text(
         "import sys, h5py, numpy\n"
@@ -115,7 +115,7 @@ def test_complex_results_are_two_real_arrays_over_one_axis(with_result):
         assert axis.attrs["units"] == b"Hz"
 
 
-def test_a_recording_that_xarray_holds_open_is_not_called_cut_short(known_file):
+def test_a_recording_open_in_xarray_is_not_reported_as_truncated(known_file):
     xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
     with (
         xarray.open_dataset(known_file, engine="h5netcdf"),

@@ -52,7 +52,7 @@ def test_the_kept_samples_of_unstable_motions_are_more_invasive_than_their_autho
 
 
 @pytest.mark.parametrize("name", ["stable_v16_5", "unstable_v16_5"])
-def test_what_a_mapping_makes_of_a_file_is_what_least_squares_make_of_its_numbers(cycles, name):
+def test_imported_lines_match_least_squares_of_the_file(cycles, name):
     heave, target = 0.18 * loadmat(FOLDER / f"CBC_{name}.mat")["data"][:2].astype(float)
     found = cycles[name]
     assert found.largest_m == pytest.approx(heave.max() - heave.mean(), rel=1e-6)

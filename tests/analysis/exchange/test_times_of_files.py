@@ -141,7 +141,7 @@ def allowed(kind, fault):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize("kind", [*SAYS_TIMES, *SAYS_STARTS, "wav"])
 @pytest.mark.parametrize("seed", [43])
-def test_what_a_file_states_of_time_reaches_the_recording(tmp_path, kind, seed):
+def test_times_of_a_file_are_kept_in_the_recording(tmp_path, kind, seed):
     rng = np.random.default_rng(seed)
     third = SAYS_TIMES.index(kind) % 3 if kind in SAYS_TIMES else 0
     faults = (
@@ -187,7 +187,7 @@ COLUMN_FAULTS = ("sound", "gap", "drop", "repeat", "swap", "restart", "drift", "
 
 @pytest.mark.parametrize("seed", [43])
 @pytest.mark.parametrize("fault", COLUMN_FAULTS)
-def test_a_column_that_rises_evenly_places_samples_whatever_it_is_called(tmp_path, fault, seed):
+def test_any_evenly_rising_column_can_be_the_time(tmp_path, fault, seed):
     rng = np.random.default_rng(seed)
     scales = {**dict.fromkeys(HEADINGS, 1.0), **UNITS_OF_TIME, **dict.fromkeys(COUNTS, RATE_HZ), None: 1.0}
     # Each fault under a third of the headings, each heading with a third of the faults.
@@ -261,7 +261,7 @@ def test_starts_and_rates_beside_channels_are_read(tmp_path, suffix, fact):
         import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "wrong.h5")
 
 
-def test_a_mapping_overrides_the_times_of_a_file_and_reports_it(tmp_path):
+def test_a_mapping_overrides_file_times_with_a_report(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
     content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}
     with open_recording(

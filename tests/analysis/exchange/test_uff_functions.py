@@ -133,7 +133,7 @@ def recorded(path, parts):
         ([("", 2.5, VOLTS)], 1.0, "over 2.5 s of the recording"),
     ],
 )
-def test_densities_are_over_what_was_played_and_report_it(tmp_path, parts, lines_hz, told):
+def test_densities_cover_and_name_the_played_signal(tmp_path, parts, lines_hz, told):
     run = CliRunner().invoke(
         app, ["export", str(recorded(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
     )
@@ -145,7 +145,7 @@ def test_densities_are_over_what_was_played_and_report_it(tmp_path, parts, lines
     assert read["id4"].endswith(told), read["id4"]
 
 
-def test_where_nothing_was_played_there_are_no_densities(tmp_path):
+def test_a_recording_without_drive_has_no_densities(tmp_path):
     with open_recording(recorded(tmp_path / "a.h5", RUN)) as recording:
         for stretch in ((0.0, 1.5), (0.0, 2.4)):
             with pytest.raises(
@@ -154,13 +154,13 @@ def test_where_nothing_was_played_there_are_no_densities(tmp_path):
                 spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest())
 
 
-def test_a_format_without_a_place_for_spectra_states_which_has_one(known, tmp_path):
+def test_formats_without_spectra_name_a_suitable_format(known, tmp_path):
     with pytest.raises(InvalidRequest, match=r"spectra were requested as csv.*ask for uff"):
         export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())
 
 
-def test_an_import_passes_spectra_over(known, tmp_path):
+def test_an_import_ignores_spectra(known, tmp_path):
     hz = np.arange(1.0, 5.0)
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     mixed, _ = export_samples(excerpt(known), Format.UFF, tmp_path / "b.uff")

@@ -201,7 +201,7 @@ def test_quantities_get_the_prefix_in_which_they_read_one_to_a_thousand(largest,
     assert unit == expected[1]
 
 
-def test_a_figure_of_steps_is_titled_and_reported_by_its_own_kind(stepped_file):
+def test_a_figure_of_steps_is_titled_by_its_kind(stepped_file):
     found = result(stepped_file).analysis
     plan = SettledSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5)
     assert STEPPED_FREQUENCIES.title(plan, found.response).startswith("Settled sine, 2 Vpp")

@@ -43,7 +43,7 @@ def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(colli
 
 
 @pytest.mark.thorough
-def test_a_motion_that_the_described_masses_do_not_explain_shows_no_gap(collided):
+def test_a_motion_inconsistent_with_the_masses_gives_no_gap(collided):
     """Motion tells m1 and the springs by their ratio to m0 and m2, which must be right."""
     m0, m1, m2 = TRUE.masses
     found, why = tracked_numbers(collided, replace(TRUE, masses=(1.04 * m0, m1, m2)))

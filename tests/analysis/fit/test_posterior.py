@@ -34,7 +34,7 @@ def cases():
     return found
 
 
-def test_bounds_of_95_percent_hold_as_often_and_are_as_wide_as_they_must(cases):
+def test_bounds_of_95_percent_hold_and_are_not_too_wide(cases):
     bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
     held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905
     count = held[:, :2].size
@@ -45,12 +45,12 @@ def test_bounds_of_95_percent_hold_as_often_and_are_as_wide_as_they_must(cases):
     assert np.all(width[:2] < 1.4 * best)
 
 
-def test_what_the_statistics_do_not_know_stays_as_wide_as_it_was(cases):
+def test_uninformative_statistics_keep_the_prior_width(cases):
     wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
     assert np.median(wide) > 0.85 * 2.0
 
 
-def test_statistics_of_the_model_fit_and_those_of_another_do_not(cases):
+def test_only_statistics_of_the_right_model_fit(cases):
     assert sum(not each.fits for _, each in cases) <= 3
     runs = Linear(5)
     off = np.linalg.svd(runs.gain[:2])[2][-1]  # what no parameter does
@@ -58,7 +58,7 @@ def test_statistics_of_the_model_fit_and_those_of_another_do_not(cases):
     assert not posterior(runs, strange, BOX, 5, ROUNDS).fits
 
 
-def test_a_run_of_the_model_is_hardly_ever_refused_however_few_it_is_held_against():
+def test_a_run_of_the_model_is_rarely_refused_by_few_reference_runs():
     """Runs that had a part in what they were held against seemed near: of 80, two in five others were not."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):
@@ -70,7 +70,7 @@ def test_a_run_of_the_model_is_hardly_ever_refused_however_few_it_is_held_agains
     assert refused <= 1
 
 
-def test_a_box_that_nothing_narrows_is_not_drawn_from_again():
+def test_an_unchanged_parameter_box_is_not_sampled_again():
     """Runs of noise that knows no parameter: all of the first box stay within the second."""
     rng, made = np.random.default_rng(7), []
 

@@ -66,7 +66,7 @@ def true():
     return with_values(NOMINAL, TRUE)
 
 
-def test_parameters_are_read_back_as_they_were_given(true):
+def test_parameters_round_trip(true):
     for name, value in TRUE.items():
         assert parameter_value(true, name) == pytest.approx(value, rel=1e-12)
     assert true.masses == NOMINAL.masses
@@ -74,7 +74,7 @@ def test_parameters_are_read_back_as_they_were_given(true):
     assert with_values(true, {Parameter.GAP: 50e-6}).gap_m == 50e-6
 
 
-def test_a_wider_gap_and_more_damping_keep_the_proportions_of_a_specimen_of_ones_own():
+def test_scaled_gaps_and_dampings_keep_their_ratios():
     """Two gaps keep their ratio, and dampings theirs, be one of them zero."""
     own = replace(gong2025(gap_m=(60e-6, 30e-6)), dampings=(0.3, 0.0, 0.02))
     read = {name: parameter_value(own, name) for name in (*LINEAR, Parameter.GAP)}
@@ -94,14 +94,14 @@ def test_a_wider_gap_and_more_damping_keep_the_proportions_of_a_specimen_of_ones
     assert stiffer.dampings == pytest.approx((0.3, 0.0, 0.08), rel=1e-12)
 
 
-def test_a_transmission_without_noise_gives_the_specimen_back(true):
+def test_a_noise_free_transmission_recovers_the_specimen(true):
     clean = measured(true, np.random.default_rng(0), sd=1e-9)
     fit = fit_specimen(clean, NOMINAL)
     for name, value in TRUE.items():
         assert fit.value(name).value == pytest.approx(value, rel=1e-6)
 
 
-def test_the_intervals_hold_the_truth_as_often_as_they_state_and_are_no_wider_than_they_must(true):
+def test_fit_intervals_have_their_stated_coverage_and_width(true):
     rng = np.random.default_rng(20250101)
     draws = 120
     fits = [fit_specimen(measured(true, rng), NOMINAL) for _ in range(draws)]
@@ -121,7 +121,7 @@ def test_the_intervals_hold_the_truth_as_often_as_they_state_and_are_no_wider_th
 
 
 @pytest.mark.thorough
-def test_intervals_hold_as_often_where_the_scatter_comes_from_three_realisations(true):
+def test_fit_intervals_hold_with_scatter_from_three_realisations(true):
     """Few lines tell damping and the first frequency, and each line's own scatter is known to half."""
     rng, held, draws = np.random.default_rng(2), [], 120
     for _ in range(draws):
@@ -132,7 +132,7 @@ def test_intervals_hold_as_often_where_the_scatter_comes_from_three_realisations
     assert sum(held) > 0.95 * len(held) - 3 * math.sqrt(0.95 * 0.05 * len(held))
 
 
-def test_lines_that_noise_covers_refuse_no_right_model_and_run_no_search_away(true):
+def test_noisy_lines_do_not_reject_a_right_model_or_diverge(true):
     rng, said = np.random.default_rng(3), []
     for sd in np.geomspace(0.03, 0.5, 30):
         try:
@@ -145,7 +145,7 @@ def test_lines_that_noise_covers_refuse_no_right_model_and_run_no_search_away(tr
     assert all(each.endswith("measure longer or with more drive") for each in said)
 
 
-def test_a_high_pass_and_a_delay_of_a_channel_move_nothing(true):
+def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
     clean = measured(true, np.random.default_rng(6), sd=1e-3)
     turned = 0.5 / LINES_HZ + 2 * np.pi * LINES_HZ * 20e-6
     fit = fit_specimen(replace(clean, value=clean.value * np.exp(1j * turned)), NOMINAL)
@@ -155,7 +155,7 @@ def test_a_high_pass_and_a_delay_of_a_channel_move_nothing(true):
     assert fit.reduced_chi_square < 1.5
 
 
-def test_no_frequency_is_claimed_better_than_the_converters_clock(true):
+def test_frequency_intervals_include_the_converter_clock(true):
     """A clock that runs 40 ppm fast shows all frequencies low by that, and no scatter tells it."""
     slow = measured(true, np.random.default_rng(7), sd=1e-6)
     fit = fit_specimen(replace(slow, frequency_hz=LINES_HZ * (1 - 40e-6)), NOMINAL)
@@ -165,7 +165,7 @@ def test_no_frequency_is_claimed_better_than_the_converters_clock(true):
         assert found.low <= value <= found.high, name
 
 
-def test_anything_that_is_not_free_stays_as_the_bench_states(true):
+def test_fixed_parameters_keep_the_values_of_the_bench(true):
     fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
     assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
@@ -173,7 +173,7 @@ def test_anything_that_is_not_free_stays_as_the_bench_states(true):
         fit.value(Parameter.F0)
 
 
-def test_masses_in_series_are_the_specimen_s_own_transmissibility(true):
+def test_masses_in_series_reproduce_the_transmissibility(true):
     ours = own_response(true, LINES_HZ, np.zeros(0))
     assert ours == pytest.approx(base_transmissibility(true, LINES_HZ)[:, 0], rel=1e-10)
 
@@ -187,7 +187,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("assumption", WRONG)
-def test_a_model_with_one_wrong_assumption_is_refused_and_that_one_is_named(true, assumption):
+def test_one_wrong_assumption_is_refused_and_named(true, assumption):
     factors = WRONG[assumption]
     other = with_values(true, {each: f * parameter_value(true, each) for each, f in factors.items()})
     gain = 1.01 if assumption is Assumption.SENSITIVITY else 1.0
@@ -206,7 +206,7 @@ def test_a_model_with_one_wrong_assumption_is_refused_and_that_one_is_named(true
         assert abs(mended.value - parameter_value(other, free)) < 4 * mended.sd
 
 
-def test_what_the_data_cannot_tell_apart_is_named_together(true):
+def test_indistinguishable_causes_are_named_together(true):
     """One level of linear motion shows a damper and friction alike."""
     other = with_values(true, {Parameter.C0: 3.0 * parameter_value(true, Parameter.C0)})
     fit = fit_specimen(measured(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
@@ -216,7 +216,7 @@ def test_what_the_data_cannot_tell_apart_is_named_together(true):
     }
 
 
-def test_a_stated_uncertainty_of_the_sensors_allows_a_scale_and_widens_what_depends_on_it(true):
+def test_sensor_uncertainty_widens_dependent_intervals(true):
     """One per cent of sensitivity is no contradiction where the calibrations are no better than that."""
     off = measured(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
     allowed = fit_specimen(off, NOMINAL, scale_sd=0.01)
@@ -227,7 +227,7 @@ def test_a_stated_uncertainty_of_the_sensors_allows_a_scale_and_widens_what_depe
 
 
 @pytest.mark.parametrize("averages", [3, 12])
-def test_chi_square_of_a_right_model_is_one_however_few_averages_its_scatter_comes_from(true, averages):
+def test_chi_square_of_a_right_model_is_one_for_few_averages(true, averages):
     rng = np.random.default_rng(30 + averages)
     lines_hz = np.arange(60.0, 560.0, 1.0)
     draws = 0.01 * (rng.standard_normal((averages, lines_hz.size, 2)))
@@ -246,7 +246,7 @@ def test_chi_square_of_a_right_model_is_one_however_few_averages_its_scatter_com
     assert fit.reduced_chi_square == pytest.approx(1.0, abs=4 / math.sqrt(lines_hz.size))
 
 
-def test_it_finds_a_specimen_that_is_far_from_what_the_bench_states():
+def test_a_fit_finds_a_specimen_far_from_its_description():
     far = with_values(NOMINAL, {name: value * 1.07 for name, value in TRUE.items()})
     fit = fit_specimen(measured(far, np.random.default_rng(3)), NOMINAL)
     for name in LINEAR:

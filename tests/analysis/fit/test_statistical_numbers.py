@@ -44,7 +44,7 @@ def holds(number, true):
 
 
 @pytest.mark.thorough
-def test_the_mean_gap_and_m1_are_reported_and_what_is_flat_is_not_determined(buried):
+def test_mean_gap_and_m1_are_determined_and_flat_parameters_are_not(buried):
     with open_recording(buried.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
     told = {each.what: each for each in found}
@@ -71,7 +71,7 @@ def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(buried):
     assert np.abs(z).max() < student.isf(0.005 / z.size, runs - 1)
 
 
-def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_drawn(buried, tmp_path):
+def test_a_rig_with_a_wrong_base_response_is_refused_early(buried, tmp_path):
     other = shutil.copy(buried.path, tmp_path / "other.h5")
     with h5py.File(other, "r+") as file:
         bench = json.loads(file["configuration/bench_json"][()])
@@ -93,12 +93,12 @@ def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),
     ],
 )
-def test_what_statistics_cannot_tell_is_stated_in_a_sentence(buried, specimen, stretch_s, why):
+def test_undetermined_parameters_are_explained_in_a_sentence(buried, specimen, stretch_s, why):
     with open_recording(buried.path) as recording, pytest.raises(AnalysisError, match=why):
         statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
 
 
-def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_harmonics():
+def test_statistics_are_reproducible_and_side_changes_flip_even_harmonics():
     rate_hz, time_s = 20_000.0, np.arange(40_000) / 20_000.0
     turn = 2 * math.pi * 250.0 * time_s
     base = np.sin(turn) + 1e-3 * np.random.default_rng(1).standard_normal(turn.size)
@@ -117,7 +117,7 @@ def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_h
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_fit_tells_numbers_of_a_motion_that_noise_hides_from_tracking(buried):
+def test_a_fit_determines_parameters_of_an_untrackable_motion(buried):
     updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
     gap = {each.what: each for each in updated.collisions.determined}[Hidden.MEAN_GAP]
     assert holds(gap, 51e-6)

@@ -80,7 +80,7 @@ def updated(measured):
     return update_model(measured)
 
 
-def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(updated):
+def test_true_parameters_lie_within_intervals_that_exclude_the_description(updated):
     assert [each.parameter for each in updated.values] == [*LINEAR, Parameter.GAP]
     for each in updated.values:
         truth = parameter_value(TRUE, each.parameter)
@@ -111,13 +111,13 @@ def test_the_intervals_are_useful(updated):
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_is_where_the_first_impact_was(recorded, measured):
+def test_the_onset_is_the_first_impact(recorded, measured):
     (onset,) = onsets(measured.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recorded[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
 
 
-def test_a_base_that_collisions_push_off_its_course_moves_no_gap(measured):
+def test_base_motion_from_collisions_does_not_bias_the_gap(measured):
     sweep = measured.sweeps[0].analysis
     (before,) = onsets(sweep, TRUE)
     pushed = np.where(
@@ -143,7 +143,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
         bracketed_gap(dwells[:1], gong2025())
 
 
-def test_a_swept_response_lags_by_what_its_rate_states():
+def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
     """Against the motion itself, for which the steady answer comes too early."""
     rate, free, at_hz = 10.0, gong2025(contact="linear"), np.array([252.0, 257.0, 262.0, 272.0, 280.0])
     motion = synthetic.chirp(8.0, 225.0, 305.0, 1e-6)
@@ -159,7 +159,7 @@ def test_a_swept_response_lags_by_what_its_rate_states():
     assert np.max(np.abs(lagging / seen - 1)) < 0.5 * np.max(np.abs(steady / seen - 1))
 
 
-def test_without_a_sweep_the_gap_stays_and_the_fit_states_why(measured):
+def test_without_a_sweep_the_gap_is_not_fitted_and_the_reason_given(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
     found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
@@ -169,7 +169,7 @@ def test_without_a_sweep_the_gap_stays_and_the_fit_states_why(measured):
     assert math.isnan(only_sweep.reduced_chi_square)
 
 
-def test_nothing_to_fit_is_one_sentence(measured):
+def test_missing_data_for_a_fit_give_one_sentence(measured):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep enters"):

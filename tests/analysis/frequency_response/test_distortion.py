@@ -65,7 +65,7 @@ def analysed(tmp_path_factory):
     return played
 
 
-def test_a_line_is_driven_where_the_plan_drives_it_however_noisy_the_recorded_drive(analysed):
+def test_driven_lines_come_from_the_plan_not_the_noisy_drive(analysed):
     quiet, noisy = (analysed(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
     driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
     np.testing.assert_array_equal(driven, quiet.excitation.excited_lines)
@@ -74,7 +74,7 @@ def test_a_line_is_driven_where_the_plan_drives_it_however_noisy_the_recorded_dr
     assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
-def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):
+def test_a_square_distorts_even_lines_and_a_cube_odd_lines(analysed):
     square = distortion(analysed(lambda velocity: 0.05 * velocity**2).response.periodic)
     cube = distortion(analysed(lambda velocity: 0.02 * velocity**3).response.periodic)
     noise = square.detection_noise_m_per_s
@@ -85,7 +85,7 @@ def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_without_distortion_only_noise_is_left_and_it_is_the_noise_that_was_put_in(analysed):
+def test_without_distortion_the_remainder_is_the_added_noise(analysed):
     found = distortion(analysed(np.zeros_like).response.periodic)
     # White noise of variance s^2 puts 4 s^2 over the averaged samples on the square of an amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))
@@ -108,7 +108,7 @@ def _mode(natural_hz, hz, damping=0.08):
         ({"through": lambda hz, number: _mode(200, hz, 0.08 + 0.002 * number)}, "all lines together"),
     ],
 )
-def test_what_drifts_from_realisation_to_realisation_is_not_called_distortion(analysed, drifting, named):
+def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drifting, named):
     analysis = analysed(np.zeros_like, **drifting)
     found = distortion(analysis.response.periodic)
     assert found.distortion_share < 3 * found.noise_share
@@ -130,7 +130,7 @@ def test_what_drifts_from_realisation_to_realisation_is_not_called_distortion(an
         lambda v: v * (np.abs(v) > 2.0),
     ],
 )
-def test_no_drift_is_reported_where_none_is(analysed, distorted):
+def test_no_false_drift_is_reported(analysed, distorted):
     assert "Drift" not in [each.what for each in analysed(distorted).checks]
 
 
@@ -148,7 +148,7 @@ def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
     assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
 
 
-def test_one_realisation_states_that_it_cannot_show_distortion(analysed):
+def test_one_realisation_reports_that_distortion_is_unknown(analysed):
     periodic = analysed(np.zeros_like, realisations=1).response.periodic
     assert distortion(periodic).distortion_share is None
     assert "one realisation cannot show distortion" in distortion_caption(periodic)
@@ -164,7 +164,7 @@ def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse
     assert "noise of the channels or chaos of the specimen" in caption, "chaos is not called noise"
 
 
-def test_a_narrow_mode_that_moves_between_few_lines_is_a_drift(analysed):
+def test_a_shifting_narrow_mode_is_reported_as_drift(analysed):
     """1.2 % of distortion was reported of a linear specimen whose mode at 264 Hz moved by 0.3 %."""
 
     def through(hz, number):

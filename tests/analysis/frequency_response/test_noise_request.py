@@ -31,7 +31,7 @@ def response(path, **asked):
 @pytest.mark.parametrize(
     ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]
 )
-def test_an_estimator_that_noise_biases_is_remarked(streamed_noise, tmp_path, estimator, biased_by, noisy):
+def test_an_estimator_biased_by_noise_gives_a_remark(streamed_noise, tmp_path, estimator, biased_by, noisy):
     plan, base, velocity, parts = streamed_noise
     rng = np.random.default_rng(4)
     if noisy == "base":
@@ -58,7 +58,7 @@ def test_the_resolution_requested_is_the_noise_bandwidth_of_a_line(streamed_file
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("averages", [4.0, 25.0])
-def test_the_averages_requested_are_reached_and_hardly_passed(streamed_file, averages):
+def test_the_requested_averages_are_reached_and_hardly_exceeded(streamed_file, averages):
     found = response(streamed_file(), averages=averages).frequency_response
     assert averages <= found.n_eff < 1.25 * averages
 
@@ -100,7 +100,7 @@ def test_an_overloaded_realisation_is_left_out(noise_file):
         response(noise_file(overloads=both))
 
 
-def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
+def test_periodic_noise_accepts_an_estimator_and_refuses_segments(noise_file):
     found = response(noise_file(), estimator=Estimator.HV, noise_ratio=1e-6, confidence=0.8)
     assert found.frequency_response.settings.estimator is Estimator.HV
     assert found.frequency_response.settings.confidence == 0.8
@@ -124,7 +124,7 @@ def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
         ({"confidence": 95.0}, "between 0 and 1"),
     ],
 )
-def test_a_request_without_meaning_states_what_is_allowed(asked, said):
+def test_an_invalid_noise_request_names_the_allowed_values(asked, said):
     with pytest.raises(InvalidRequest, match=said):
         FrequencyResponseRequest(**asked)
 
@@ -144,7 +144,7 @@ def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(str
         response(streamed_file(), **asked)
 
 
-def test_a_view_turns_displacements_into_what_was_recorded(streamed_file):
+def test_a_view_converts_displacements_to_recorded_quantities(streamed_file):
     found = response(streamed_file()).frequency_response
     view = quantities_named("velocity/acceleration", MagnitudeScale.DECIBEL)
     shown = view.shown(found)

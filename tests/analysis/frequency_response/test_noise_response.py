@@ -78,7 +78,7 @@ def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(respon
     assert np.median(np.abs(found.value / truth - 1)) < 5e-3
 
 
-def test_weak_noise_shows_the_three_resonances_where_they_are(responses):
+def test_weak_noise_shows_the_three_true_resonances(responses):
     found = responses[WEAK_VPP].resonances
     assert len(found) == 3
     for each, (frequency_hz, damping_ratio) in zip(found, poles(), strict=True):

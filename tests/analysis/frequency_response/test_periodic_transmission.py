@@ -47,7 +47,7 @@ def linear_realisation(rng, orders, period_samples, samples, delay_samples=0.0):
 
 @settings(max_examples=12, deadline=None)
 @given(offset_ppm=st.floats(-90, 90), period=st.floats(700, 1500), periods=st.integers(2, 6))
-def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(offset_ppm, period, periods):
+def test_lines_are_exact_for_any_clock_ratio_and_period(offset_ppm, period, periods):
     true_period = period * (1 + offset_ppm * 1e-6)
     orders = np.arange(3, int(0.3 * period), 7)
     rng = np.random.default_rng(1)
@@ -75,7 +75,7 @@ def test_the_measured_period_scatters_as_stated():
     assert np.mean(periods) == pytest.approx(512.01, abs=4 * stated / np.sqrt(150))
 
 
-def test_images_of_a_held_waveform_neither_mislead_the_clock_nor_enter_the_band():
+def test_zero_order_hold_images_do_not_affect_clock_or_band():
     """8192 points held over a period put an image of the band 8192 lines higher, 22 dB down."""
     rng = np.random.default_rng(9)
     period = 51200 * (1 + 60e-6)
@@ -103,7 +103,7 @@ def test_the_delay_of_the_response_channel_is_removed():
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
-def test_the_bounds_hold_the_truth_as_often_as_they_state(count):
+def test_transmission_bounds_have_their_stated_coverage(count):
     """Noise and distortion both: a static cube makes the realisations differ beyond the noise."""
     rng = np.random.default_rng(count)
     period, orders, cube = 128, np.arange(1, 31), 0.02
@@ -156,7 +156,7 @@ def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
     assert abs(np.mean(error.real)) < 4 / np.sqrt(orders.size)
 
 
-def test_one_realisation_states_that_its_bounds_hold_noise_only():
+def test_bounds_of_one_realisation_are_marked_as_noise_only():
     orders = np.arange(5, 105)
     drive = multisine(orders, orders**2.0, 512, 2048)
     result = periodic_frequency_response([(drive, drive, drive)], RATE, repetition_hz=10.0)

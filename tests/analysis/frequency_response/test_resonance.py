@@ -82,7 +82,7 @@ def test_a_single_mode_is_recovered_exactly(natural_hz, damping):
     assert found.half_power_bandwidth_hz == pytest.approx(2 * damping * natural_hz, rel=2e-3)
 
 
-def test_the_three_modes_of_the_specimen_are_found_where_its_eigenvalues_are():
+def test_the_three_modes_match_the_eigenvalues():
     frequency_hz = np.arange(20.0, 600.0, 0.5)
     found = resonances(curve(frequency_hz, specimen(frequency_hz), 1e-3), low_hz=30, high_hz=590)
     exact_hz, damping = modes()
@@ -93,7 +93,7 @@ def test_the_three_modes_of_the_specimen_are_found_where_its_eigenvalues_are():
         assert one.is_resolved
 
 
-def test_the_stated_spreads_are_the_scatter():
+def test_the_stated_spreads_match_the_scatter():
     rng = np.random.default_rng(1)
     frequency_hz = np.arange(200, 330, 1.0)
     clean = single(frequency_hz, 266.0, 0.02)
@@ -114,7 +114,7 @@ def test_the_stated_spreads_are_the_scatter():
     assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
 
 
-def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
+def test_a_resonance_in_noise_is_found_with_a_resolution_verdict():
     rate, natural = 5120.0, 2 * np.pi * 260
     section = signal.bilinear([natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
     x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
@@ -175,7 +175,7 @@ def test_bounds_of_streamed_noise_hold_under_every_window(window):
     ("apart_hz", "shares"),
     [(2.0, (1.0, 1.0)), (4.0, (1.0, 0.4)), (2.0, (1.0, -0.7)), (4.0, (1.0, 0.6, 1.0))],
 )
-def test_close_modes_are_not_one(apart_hz, shares):
+def test_close_modes_are_separated(apart_hz, shares):
     modes = [(200 + apart_hz * place, 0.01, share) for place, share in enumerate(shares)]
     found = resonances(_streamed(np.random.default_rng(16), modes, 0.01), low_hz=150, high_hz=250)
     assert len(found) > 1
@@ -186,7 +186,7 @@ def test_close_modes_are_not_one(apart_hz, shares):
 @pytest.mark.parametrize(
     ("shares", "seed", "draw"), [((1.0, -0.7), 77, 0), ((1.0, -0.7), 77, 3), ((1.0, 0.6, 1.0), 777, 2)]
 )
-def test_bounds_of_close_modes_allow_for_one_that_a_boxcar_hides(shares, seed, draw):
+def test_bounds_of_close_modes_include_a_hidden_mode(shares, seed, draw):
     coverage = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks" / "resonance_coverage.py"))
     (number, scene) = next(
         (number, scene)
@@ -221,7 +221,7 @@ def test_a_band_with_too_few_lines_is_refused():
 
 
 @pytest.mark.thorough
-def test_frequency_and_damping_of_every_mode_are_held_by_their_bounds():
+def test_frequency_and_damping_of_every_mode_are_within_bounds():
     frequency_hz = np.arange(50.0, 601.0)
     exact = specimen(frequency_hz)
     # The same absolute noise on every line: the mode at 500 Hz stands on the skirts of the other two.
@@ -279,7 +279,7 @@ def test_bounds_of_every_mode_hold_where_two_realisations_show_the_noise(acceler
 
 
 @pytest.mark.thorough
-def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known_to():
+def test_correlated_lines_widen_resonance_bounds():
     """As collisions do: fits that take lines as independent hold fewer than six of ten frequencies."""
     frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 30
     rng, independent, together = np.random.default_rng(13), 0, 0
@@ -314,14 +314,14 @@ def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known
     assert together > 0.83 * draws
 
 
-def test_a_resonance_of_one_realisation_only_is_none():
+def test_a_resonance_in_one_realisation_only_is_rejected():
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 200.0, 0.03)), low_hz=100, high_hz=300)
     assert scattered_resonances([found], [[found], [], []]) == ()
     assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
-def test_what_the_choice_of_a_fit_moves_is_not_taken_for_what_realisations_do():
+def test_changes_of_the_fit_are_not_taken_for_scatter_of_realisations():
     """Seven of twelve leave-outs fit all modes together, as the whole does, and five this one alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)

@@ -20,7 +20,7 @@ def told(rng, sizes, freedom):
 
 @pytest.mark.parametrize("sizes", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.3, 0.2, 0.2), (0.0, 0.0, 1.0)])
 @pytest.mark.parametrize("freedom", [2, 8])
-def test_the_scatter_of_each_line_is_what_its_noises_make(sizes, freedom):
+def test_the_scatter_of_each_line_follows_from_its_noises(sizes, freedom):
     rng, ratios = np.random.default_rng(3), []
     for _ in range(40):
         true, own = told(rng, 1e-6 * np.array(sizes), freedom)
@@ -33,7 +33,7 @@ def test_the_scatter_of_each_line_is_what_its_noises_make(sizes, freedom):
     assert np.median(np.std(ratios, axis=0)) < 0.25
 
 
-def test_lines_that_are_not_known_spoil_no_other():
+def test_unknown_lines_do_not_affect_others():
     true, own = told(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
     value = RESPONSE.copy()
     value[40], own[90] = np.nan, np.inf
@@ -42,7 +42,7 @@ def test_lines_that_are_not_known_spoil_no_other():
     assert np.nanmax(found / true) < 2.0
 
 
-def test_no_noise_is_no_scatter_and_many_averages_are_left_alone():
+def test_zero_noise_gives_zero_scatter_and_many_averages_are_unchanged():
     none = np.zeros(RESPONSE.size)
     np.testing.assert_array_equal(steady_relative_sd(none, RESPONSE, POWER, 2), none)
     own = np.random.default_rng(5).random(RESPONSE.size)
@@ -51,7 +51,7 @@ def test_no_noise_is_no_scatter_and_many_averages_are_left_alone():
 
 @pytest.mark.parametrize("freedom", [1e-3, 0.06, 1.9])
 @pytest.mark.parametrize("lines", [2, 5, RESPONSE.size])
-def test_averages_that_are_worth_hardly_one_still_have_a_scatter(freedom, lines):
+def test_less_than_one_effective_average_has_a_scatter(freedom, lines):
     _, own = told(np.random.default_rng(6), np.array([1e-6, 0.0, 0.0]), 2)
     found = steady_relative_sd(own[:lines], RESPONSE[:lines], POWER[:lines], freedom)
     assert np.all(np.isfinite(found) & (found > 0))

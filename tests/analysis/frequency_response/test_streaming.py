@@ -61,7 +61,7 @@ def test_four_times_the_record_needs_no_more_memory():
     assert channels.longest_read < channels.samples / 5
 
 
-def test_a_watcher_hears_every_stage_and_how_far_it_is_read(streamed_file):
+def test_progress_reports_every_stage_and_position(streamed_file):
     heard = []
     with open_recording(streamed_file()) as recording:
         analyse(recording, observer=heard.append)

@@ -121,7 +121,7 @@ def test_hv_does_not_depend_on_the_unit_of_the_response(power):
     np.testing.assert_allclose(scaled.value / scale, base.value, rtol=1e-9)
 
 
-def test_a_delay_turns_the_phase_and_is_removed_again():
+def test_a_known_delay_is_removed_from_the_phase():
     x = noise(11, 60_003)
     result = transmissibility(x[3:], x[:-3], RATE, segment_samples=1024)
     line = 40
@@ -132,7 +132,7 @@ def test_a_delay_turns_the_phase_and_is_removed_again():
     assert straight.settings.delay_s == 3 / RATE
 
 
-def test_gaps_cost_segments_but_not_coherence():
+def test_gaps_reduce_segments_but_not_coherence():
     x = noise(14, 200_000)
     y = 2 * x
     valid = np.ones(x.size, dtype=bool)
@@ -147,7 +147,7 @@ def test_gaps_cost_segments_but_not_coherence():
     assert result.segments_used + touched == 399
 
 
-def test_gaps_lower_the_number_of_effective_averages_as_they_fall():
+def test_gaps_reduce_the_effective_averages():
     """Every second of the half-overlapped segments missing: the rest are independent."""
     x = noise(15, 10_000)
     valid = np.ones(x.size, dtype=bool)
@@ -172,7 +172,7 @@ def test_gaps_lower_the_number_of_effective_averages_as_they_fall():
         ({"confidence": 95.0}, "between 0 and 1"),
     ],
 )
-def test_a_meaningless_request_names_what_is_allowed(choice, says):
+def test_an_invalid_transmission_request_names_the_allowed_values(choice, says):
     with pytest.raises(InvalidRequest, match=says):
         transmissibility(noise(16, 1000), noise(17, 1000), RATE, segment_samples=100, **choice)
 

@@ -29,7 +29,7 @@ def alarms_after(levels, usual=USUAL):
     return next((number for number, each in enumerate(levels, 1) if watch.take(each)), None)
 
 
-def test_half_a_second_that_lies_out_is_an_alarm_and_less_is_none():
+def test_deviation_for_half_a_second_triggers_the_alarm():
     assert alarms_after([OUT] * 20) == 5
     assert alarms_after([math.inf] * 20) == 5
     assert alarms_after(([OUT] * 4 + [WITHIN] * 25) * 10) is None
@@ -41,7 +41,7 @@ def test_the_alarm_is_given_once():
     assert watch.has_changed
 
 
-def test_blocks_that_lie_out_by_chance_bring_alarms_as_rarely_as_is_stated():
+def test_the_false_alarm_rate_is_within_its_bound():
     """At a share so large that alarms can be counted, Lorden's bound of their rate holds; and as stated."""
     rng = np.random.default_rng(8)
     day = np.where(rng.random(10 * 36_000) < 0.01, OUT, WITHIN)
@@ -53,7 +53,7 @@ def test_blocks_that_lie_out_by_chance_bring_alarms_as_rarely_as_is_stated():
     assert all(often)
 
 
-def test_a_level_that_is_not_known_is_learnt_from_two_seconds():
+def test_an_unknown_level_is_learnt_from_two_seconds():
     rng = np.random.default_rng(9)
     watch = ChangeWatch()
     levels = 0.9 + 0.02 * rng.standard_normal(20)
@@ -63,7 +63,7 @@ def test_a_level_that_is_not_known_is_learnt_from_two_seconds():
     assert [watch.take(2.0) for _ in range(5)][-1]
 
 
-def test_a_baseline_is_kept_and_one_that_cannot_be_read_is_none(tmp_path, monkeypatch, virtual_rig):
+def test_a_baseline_is_stored_and_an_unreadable_one_ignored(tmp_path, monkeypatch, virtual_rig):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     path = baseline_path(virtual_rig, gong2025())
     assert path != baseline_path(virtual_rig, gong2025(gap_m=46e-6))

@@ -26,14 +26,14 @@ def impacts(spread, error_m=0.0, loss_s_per_m=0.0, count=400):
     )
 
 
-def test_impacts_that_differ_tell_gaps():
+def test_differing_impacts_determine_gaps():
     for gap in free_gaps(impacts(0.5, error_m=1e-7)):
         assert gap.value_m == pytest.approx(GAP_M, abs=2 * gap.sd_m)
         assert gap.sd_m < 0.3e-6
 
 
 @pytest.mark.parametrize("error_m", [0.0, 1e-7, 4e-7])
-def test_impacts_all_alike_show_no_gap(error_m):
+def test_identical_impacts_determine_no_gap(error_m):
     """A motion that had settled told (48.0 +- 1.1) um of 45: a line through one point leads anywhere."""
     alike = impacts(0.03, error_m)
     assert free_gaps(alike) == (None, None)
@@ -41,11 +41,11 @@ def test_impacts_all_alike_show_no_gap(error_m):
 
 
 @pytest.mark.parametrize("loss_s_per_m", [0.0, 0.2, 0.8])
-def test_the_loss_is_reported_by_speeds(loss_s_per_m):
+def test_the_impact_loss_is_reported_by_speed(loss_s_per_m):
     assert free_loss(impacts(0.5, loss_s_per_m=loss_s_per_m)) == pytest.approx(loss_s_per_m, abs=0.02)
 
 
-def test_few_impacts_show_nothing():
+def test_few_impacts_determine_nothing():
     few = impacts(0.5, count=6)
     assert free_gaps(few) == (None, None)
     assert free_loss(few) is None

@@ -57,7 +57,7 @@ def impacts_scored(motion, recorded, found, true):
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "seed"), [(260.0, 1.5, 43), ("sweep", 1.5, 44), ("noise", 10.0, 45)]
 )
-def test_a_track_continues_where_the_vibrometer_has_no_light(world_recording, kind, level_vpp, seed):
+def test_a_track_continues_through_vibrometer_drop_outs(world_recording, kind, level_vpp, seed):
     """Ten times a second; bridges that were taken for motion lost a third of the track and all numbers."""
     recorded = world_recording(kind, level_vpp, seed=seed, duration_s=3.0, dropouts_per_s=10.0)
     motion = told(recorded)
@@ -96,7 +96,7 @@ def test_tracked_p_and_its_impacts_match_the_world(world_recording, kind, level_
 
 
 @pytest.mark.thorough
-def test_a_stop_on_one_side_is_followed_and_its_numbers_are_found(world_recording):
+def test_a_one_sided_stop_is_tracked_and_identified(world_recording):
     """No number is told of the side on which there is none, and what is not told stands together."""
     one_sided = gong2025(gap_m=(30e-6, np.inf))
     recorded = world_recording(180.0, 0.5, seed=11, specimen=one_sided)
@@ -118,7 +118,7 @@ def test_a_stop_on_one_side_is_followed_and_its_numbers_are_found(world_recordin
 
 
 @pytest.mark.thorough
-def test_a_mass_that_chatters_along_its_stop_is_followed_where_no_contact_model_shows_its_impacts(
+def test_chattering_is_tracked_without_a_contact_model(
     world_recording,
 ):
     """Five impacts a period, most of them with hardly any flight between."""
@@ -139,7 +139,7 @@ def test_a_mass_that_chatters_along_its_stop_is_followed_where_no_contact_model_
 
 
 @pytest.mark.thorough
-def test_ten_times_the_noise_is_still_followed(world_recording):
+def test_motion_is_tracked_at_ten_times_the_noise(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
@@ -170,7 +170,7 @@ def test_without_a_contact_model_motion_impacts_and_gaps_are_reported(
     assert np.mean(gaps) == pytest.approx(np.mean(recorded.specimen.gaps_m), abs=0.5e-6)
 
 
-def test_wrong_gaps_and_m1_are_found_from_the_motion(world_recording, described_otherwise):
+def test_wrong_gaps_and_m1_are_corrected_from_the_motion(world_recording, described_otherwise):
     recorded = world_recording(260.0, 1.5, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.03, gaps=(0.98, 1.04))
     motion = told(recorded, specimen=wrong)
@@ -189,7 +189,7 @@ def test_wrong_gaps_and_m1_are_found_from_the_motion(world_recording, described_
 
 
 @pytest.mark.thorough
-def test_wrong_springs_and_dampers_are_found_too(world_recording):
+def test_wrong_springs_and_dampers_are_corrected_from_the_motion(world_recording):
     recorded = world_recording("noise", 10.0, seed=41)
     (k0, k1, k2), dampings = recorded.specimen.stiffnesses, recorded.specimen.dampings
     wrong = replace(
@@ -209,7 +209,7 @@ def test_wrong_springs_and_dampers_are_found_too(world_recording):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("loss_s_per_m", [0.05, 0.3])
-def test_a_stop_that_loses_energy_is_not_taken_for_a_damper(world_recording, loss_s_per_m):
+def test_contact_loss_is_not_attributed_to_a_damper(world_recording, loss_s_per_m):
     """Described as Hertz's, its loss of 0.05 s/m was found as a c1 five times its bounds off."""
     hertz = gong2025()
     stops = HuntCrossley(hertz.contact.stops.contact_stiffness, loss_s_per_m)
@@ -225,7 +225,7 @@ def test_a_stop_that_loses_energy_is_not_taken_for_a_damper(world_recording, los
 
 
 @pytest.mark.thorough
-def test_a_motion_that_has_settled_for_half_of_the_time_is_searched_all_the_same(world_recording):
+def test_a_motion_that_settles_half_way_is_identified(world_recording):
     """Its later impacts are all alike, and a search that looked at its middle began 1.3 um off."""
     recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
     m0, m1, m2 = recorded.specimen.masses
@@ -236,7 +236,7 @@ def test_a_motion_that_has_settled_for_half_of_the_time_is_searched_all_the_same
 
 
 @pytest.mark.thorough
-def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_reported(world_recording):
+def test_parameters_of_an_unstable_track_are_not_reported(world_recording):
     """Of rigid stops, described as Hertz's, gaps were told as (42.3 +- 0.9) um, where 45 is true."""
     usual = gong2025()
     recorded = world_recording(
@@ -247,7 +247,7 @@ def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_reported(w
 
 
 @pytest.mark.thorough
-def test_what_no_track_confirms_is_reported_without_bounds(world_recording):
+def test_unconfirmed_parameters_have_no_bounds(world_recording):
     """Of an m0 that is 3 % heavier than described both gaps were told as (44.0 +- 0.2) um; 45 is true."""
     usual = gong2025()
     m0, m1, m2 = usual.masses
@@ -266,7 +266,7 @@ def test_what_no_track_confirms_is_reported_without_bounds(world_recording):
     assert len(motion.sentences) < 10
 
 
-def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
+def test_two_gaps_and_a_linear_law_are_tracked(world_recording):
     specimen = replace(
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
     )
@@ -279,7 +279,7 @@ def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
     assert motion.specimen.exponent == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_track_that_does_not_hold_is_stated_and_not_shown(world_recording, described_otherwise):
+def test_an_invalid_track_is_reported_and_not_shown(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
@@ -300,7 +300,7 @@ def test_a_motion_that_meets_no_stop_determines_no_gap(world_recording):
     assert motion.free_gaps == (None, None)
 
 
-def test_anything_that_cannot_be_reported_is_refused_in_a_sentence(world_recording):
+def test_requests_without_a_result_are_refused_in_a_sentence(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):
@@ -328,7 +328,7 @@ def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
 @pytest.mark.parametrize(
     ("further", "confirms"), [("m2_velocity", True), ("m1_velocity", True), ("m2_acceleration", None)]
 )
-def test_a_sensor_on_another_mass_confirms_a_right_track_or_cannot_tell(world_recording, further, confirms):
+def test_another_sensor_never_refutes_a_right_track(world_recording, further, confirms):
     """Collisions on m2 were taken for drop-outs of its vibrometer, and bridging them took minutes."""
     motion = told(world_recording(260.0, 1.5, further=further), numbers=Numbers.AS_DESCRIBED)
     (check,) = motion.mass_checks
@@ -344,9 +344,7 @@ def test_a_sensor_on_another_mass_confirms_a_right_track_or_cannot_tell(world_re
 
 
 @pytest.mark.parametrize(("scale", "late"), [(0.8, 0), (1.0, 40)])
-def test_a_sensor_on_another_mass_refutes_a_track_with_another_amplitude_or_phase(
-    world_recording, scale, late
-):
+def test_another_sensor_refutes_a_wrong_amplitude_or_phase(world_recording, scale, late):
     """Nothing then has bounds, since either the track or the sensor is wrong."""
     recorded = world_recording(260.0, 1.5, further="m2_velocity")
     with open_recording(recorded.path) as recording:

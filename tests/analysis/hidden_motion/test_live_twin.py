@@ -25,7 +25,7 @@ def dwell(live_world):
     return running, seen, said, running.p()
 
 
-def test_p_is_the_worlds_while_samples_come(dwell):
+def test_live_p_matches_the_simulated_world(dwell):
     _, seen, said, truth = dwell
     assert said == []
     late = [(end, each) for end, each in seen if end > 0.6 * 51_200]
@@ -38,7 +38,7 @@ def test_p_is_the_worlds_while_samples_come(dwell):
         assert end - (each.first + each.p.size) == 16 + 307
 
 
-def test_gaps_and_mass_are_found_on_the_way(dwell):
+def test_gaps_and_mass_are_identified_during_the_run(dwell):
     running, *_ = dwell
     found = {each.what: each for each in running.twin.found}
     for side in (Hidden.LOWER_GAP, Hidden.UPPER_GAP):
@@ -48,7 +48,7 @@ def test_gaps_and_mass_are_found_on_the_way(dwell):
     assert found[Hidden.M1].value == pytest.approx(2.1e-3, rel=1e-3)
 
 
-def test_a_forecast_errs_as_it_states(dwell):
+def test_forecast_errors_match_their_stated_size(dwell):
     _, seen, _, truth = dwell
     errors, said = [], []
     for end, each in seen:
@@ -68,7 +68,7 @@ def test_a_forecast_errs_as_it_states(dwell):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "level_vpp"), [(258.0, 1.6), ("noise", 8.0)])
-def test_gaps_wider_by_a_micrometre_are_noticed_within_a_second_and_found(live_world, dwell, kind, level_vpp):
+def test_a_gap_change_of_1_um_is_detected_within_a_second(live_world, dwell, kind, level_vpp):
     running = live_world(kind, level_vpp, 7.0, seed=72, known=dwell[0].twin.known)
     while running.samples < 3.03 * 51_200:
         assert running.go_on(BLOCK) == ()
@@ -93,7 +93,7 @@ def test_gaps_wider_by_a_micrometre_are_noticed_within_a_second_and_found(live_w
     assert np.sqrt(np.mean(error**2)) < 0.3e-6
 
 
-def test_after_a_hole_nothing_older_is_shown(live_world):
+def test_data_before_a_gap_are_not_shown(live_world):
     running = live_world(260.0, 1.5, 2.0, seed=73)
     for _ in range(8):
         running.go_on(BLOCK)
@@ -109,7 +109,7 @@ def test_after_a_hole_nothing_older_is_shown(live_world):
     assert running.twin.newest.state is LiveState.TRACKED
 
 
-def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, at_once):
+def test_untrackable_benches_and_specimens_are_refused(live_world, at_once):
     rig = live_world(260.0, 1.5, 0.1, seed=1).rig
     rigid = replace(gong2025(), contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match="cannot be tracked"):
@@ -121,7 +121,7 @@ def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "level_vpp"), [(261.0, 1.7), ("noise", 8.0)])
-def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_vpp):
+def test_vibrometer_drop_outs_trigger_no_change_alarm(live_world, kind, level_vpp):
     lost = []
     for seed in (74, 75, 76):  # one draw of a colliding motion may lose its track once, for 33 ms
         running = live_world(kind, level_vpp, 4.2, seed=seed, dropouts_per_s=8.0)
@@ -142,7 +142,7 @@ def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_
 
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
-def test_hours_without_a_change_bring_no_alarm(live_world):
+def test_hours_without_a_change_trigger_no_alarm(live_world):
     """LIVE_HOURS=H and LIVE_SEED=S in the environment ask for so much rig time, and for other rigs."""
     rng, out, blocks, seed = np.random.default_rng(SEED), 0, 0, SEED
     while blocks < 36_000 * HOURS:

@@ -71,12 +71,12 @@ def covered(found):
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
-def test_noise_alone_shows_nothing(factor):
+def test_noise_alone_determines_no_parameter(factor):
     assert not told(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
 
 
 @pytest.mark.thorough
-def test_one_weak_sine_does_not_show_the_dampers_that_were_described():
+def test_one_weak_sine_does_not_determine_the_dampers():
     """Bounds as narrow as the search, about the description, missed the truth in each of ten."""
     rng = np.random.default_rng(3)
     inside = []
@@ -87,7 +87,7 @@ def test_one_weak_sine_does_not_show_the_dampers_that_were_described():
 
 
 @pytest.mark.thorough
-def test_weak_noise_tells_dampers_that_are_described_far_off():
+def test_weak_noise_corrects_wrong_dampers():
     rng = np.random.default_rng(4)
     inside, dampers = [], []
     for factors in ((1, 1.5, 1), (1, 0.7, 1), (1, 1, 0.8), (1.05, 1.3, 0.9)):

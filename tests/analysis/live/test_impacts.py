@@ -17,7 +17,7 @@ def kinked(times_s, duration_s, noise=3e-6, seed=1):
 
 
 @pytest.mark.parametrize("block", [100, 2560, 51_200])
-def test_every_impact_is_counted_once_whatever_the_blocks(block):
+def test_every_impact_is_counted_once_for_any_block_size(block):
     times_s = 0.1 + 0.0123 * np.arange(60)
     velocity = kinked(times_s, 1.0)
     counter = ImpactCounter(RATE)
@@ -25,7 +25,7 @@ def test_every_impact_is_counted_once_whatever_the_blocks(block):
     assert counter.count == found == 60
 
 
-def test_a_smooth_motion_with_harmonics_has_none():
+def test_a_smooth_motion_with_harmonics_has_no_impacts():
     time_s = np.arange(int(3 * RATE)) / RATE
     velocity = 0.02 * np.sin(2 * np.pi * 260 * time_s) + 0.0008 * np.sin(2 * np.pi * 780 * time_s)
     counter = ImpactCounter(RATE)
@@ -33,7 +33,7 @@ def test_a_smooth_motion_with_harmonics_has_none():
     assert counter.count == 0
 
 
-def test_noise_alone_has_none():
+def test_noise_alone_has_no_impacts():
     counter = ImpactCounter(RATE)
     counter.add(np.random.default_rng(3).standard_normal(int(5 * RATE)))
     assert counter.count == 0

@@ -13,7 +13,7 @@ def block(peaks, samples=100):
     return values
 
 
-def test_shares_are_of_full_scale():
+def test_levels_are_fractions_of_full_scale():
     meters = LevelMeters(np.array([5.0, 10.0]), RATE)
     square = np.array([[2.5, -2.5] * 50, [1.0, -1.0] * 50], dtype=np.float32)
     first, second = meters.add(square)
@@ -22,7 +22,7 @@ def test_shares_are_of_full_scale():
     assert first.verdict is LevelVerdict.GOOD
 
 
-def test_a_peak_is_held_and_then_let_go():
+def test_a_peak_is_held_for_a_limited_time():
     meters = LevelMeters(np.array([5.0]), RATE)
     meters.add(block([4.9]))
     for _ in range(int(HOLD_S * 10) - 1):
@@ -43,7 +43,7 @@ def test_a_channel_is_quiet_after_three_seconds_and_not_before():
     assert meters.add(block([0.06]))[0].verdict is LevelVerdict.GOOD
 
 
-def test_lost_samples_leave_the_meters_as_they_were():
+def test_lost_samples_keep_the_meters_unchanged():
     meters = LevelMeters(np.array([5.0]), RATE)
     before = meters.add(block([1.0]))
     assert meters.add(np.full((1, 10), np.nan, dtype=np.float32)) == before

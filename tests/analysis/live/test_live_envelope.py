@@ -8,7 +8,7 @@ from vibench.analysis.live import column_starts, envelope, zigzag
 
 
 @pytest.mark.parametrize("place", [0, 1, 51_199, 77_777, 102_397])
-def test_an_impact_of_three_samples_is_seen_wherever_it_falls(place):
+def test_an_impact_of_three_samples_is_visible_at_any_position(place):
     samples = np.zeros((2, 102_400), dtype=np.float32)
     samples[1, place : place + 3] = (5.0, -7.0, 6.0)
     low, high = envelope(samples, 1000)
@@ -19,7 +19,7 @@ def test_an_impact_of_three_samples_is_seen_wherever_it_falls(place):
     assert not high[0].any()
 
 
-def test_columns_are_the_extremes_of_their_own_samples_and_of_no_others():
+def test_columns_are_the_extremes_of_exactly_their_samples():
     samples = np.random.default_rng(3).standard_normal(10_007)
     low, high = envelope(samples, 333)
     edges = [*column_starts(10_007, 333), 10_007]
@@ -28,7 +28,7 @@ def test_columns_are_the_extremes_of_their_own_samples_and_of_no_others():
         assert high[column] == samples[begin:end].max()
 
 
-def test_lost_samples_hide_no_others_and_a_lost_column_stays_empty():
+def test_lost_samples_only_empty_their_own_columns():
     samples = np.arange(40.0)
     samples[5] = np.nan
     samples[10:20] = np.nan
@@ -40,7 +40,7 @@ def test_lost_samples_hide_no_others_and_a_lost_column_stays_empty():
     assert (low[2], high[3]) == (20.0, 39.0)
 
 
-def test_fewer_samples_than_columns_are_drawn_as_they_are():
+def test_fewer_samples_than_columns_are_drawn_individually():
     samples = np.array([3.0, 1.0, 2.0])
     low, high = envelope(samples, 10)
     assert np.array_equal(low, samples)

@@ -17,7 +17,7 @@ def fed(samples, block, settings=SETTINGS):
 
 
 @pytest.mark.parametrize("block", [17, 500, 5000])
-def test_the_spectrum_is_welchs_whatever_the_blocks(block):
+def test_the_spectrum_matches_welch_for_any_block_size(block):
     samples = np.random.default_rng(1).standard_normal((2, 20_500))
     found = fed(samples, block).spectrum()
     frequency_hz, density = welch(samples, RATE, "hann", 1000, 500, detrend=False)
@@ -31,7 +31,7 @@ def test_old_samples_are_forgotten():
     assert fed(samples, 1000).spectrum().amplitude_density.max() == 0.0
 
 
-def test_a_lost_sample_spoils_two_segments_and_no_more():
+def test_a_lost_sample_invalidates_two_segments():
     samples = np.random.default_rng(3).standard_normal((2, 20_500))
     whole = fed(samples, 700).frequency_response((0, 1), low_hz=100.0, high_hz=1000.0)
     samples[0, 10_250] = np.nan
@@ -63,7 +63,7 @@ def test_the_transmission_of_an_integrator_is_known_and_within_its_bounds():
     assert found.coherence[0] > 0.95 > found.coherence[-1]
 
 
-def test_a_delay_of_the_response_channel_is_taken_off_the_phase():
+def test_the_delay_of_the_response_channel_is_corrected():
     samples = np.random.default_rng(5).standard_normal(40_500)
     late = np.stack((samples, np.roll(samples, 3)))
     late = fed(late, 1000)
@@ -80,12 +80,12 @@ def test_one_segment_has_no_transmission_and_none_no_spectrum():
     assert spectra.frequency_response((0, 1), low_hz=100.0, high_hz=1000.0) is None
 
 
-def test_settings_that_average_nothing_are_refused():
+def test_settings_without_averages_are_refused():
     with pytest.raises(InvalidRequest, match="1 segments"):
         SpectrumSettings(averages=1)
 
 
-def test_anything_that_is_left_out_counts_no_more_and_what_comes_after_does():
+def test_rejected_segments_are_excluded_and_later_ones_counted():
     rng = np.random.default_rng(5)
     spectra = fed(rng.standard_normal((2, 10_000)), 1000)
     spectra.add(np.full((2, 2000), 1e6, dtype=np.float32))

@@ -86,13 +86,13 @@ def test_meters_and_impacts_are_read(view):
     assert view.impacts == 0
 
 
-def test_blocks_that_overlap_change_nothing(view):
+def test_overlapping_blocks_do_not_change_the_view(view):
     before = view.next_sample
     view.add(before - 1000, volts(before - 1000, 1000))
     assert view.next_sample == before
 
 
-def test_a_run_without_a_base_channel_is_still_watched():
+def test_a_run_without_base_channel_can_be_viewed():
     found = LiveView(CHANNELS[:2], RATE, band_hz=(150.0, 350.0))
     found.add(0, volts(0, 51_200)[:2])
     assert found.frequency_response() is None
@@ -126,7 +126,7 @@ def watched_sweep(lead_in_s):
     return view
 
 
-def test_anything_that_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_its_course():
+def test_ramp_and_ringing_before_a_sweep_give_no_points():
     history = watched_sweep(LEAD_IN_S).history()
     assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
     assert history.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)
@@ -137,7 +137,7 @@ def test_anything_that_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_i
     assert everything.response_i.max() > 2.5
 
 
-def test_a_section_holds_no_points_of_the_lead_in():
+def test_a_section_excludes_the_lead_in():
     settled = watched_sweep(LEAD_IN_S).section.displacement_m
     assert 0 < settled.size < watched_sweep(0.0).section.displacement_m.size
     assert np.ptp(settled) < 0.1 * A0

@@ -23,18 +23,18 @@ def test_the_edges_of_a_steady_sine_are_straight(frequency_hz, noise):
     assert low[4:-4] == pytest.approx(-0.7, abs=room)
 
 
-def test_a_wave_of_many_columns_is_left_a_wave():
+def test_slow_waves_are_not_smoothed():
     wave = sine(260.0, 0.2)
     for drawn, plain in zip(outline(wave, COLUMNS), envelope(wave, COLUMNS), strict=True):
         assert np.array_equal(drawn, plain)
 
 
-def test_noise_is_left_as_it_is():
+def test_noise_is_not_smoothed():
     noise = np.random.default_rng(2).standard_normal(102_400).astype(np.float32)
     assert np.array_equal(outline(noise, COLUMNS)[1], envelope(noise, COLUMNS)[1])
 
 
-def test_an_impact_of_three_samples_is_in_the_outline_and_near_its_place():
+def test_an_impact_of_three_samples_is_in_the_outline():
     wave = sine(260.0, 2.0)
     wave[51_200:51_203] = 5.0
     _, high = outline(wave, COLUMNS)

@@ -30,7 +30,7 @@ def recording(tmp_path_factory):
 
 
 @pytest.mark.parametrize("columns", [10, 100, 1000, 1563, 5000])
-def test_an_impact_of_three_samples_is_in_every_picture_of_the_whole(recording, columns):
+def test_an_impact_of_three_samples_is_in_every_overview(recording, columns):
     picture = overview_of(recording).picture(CHANNELS, 0, SAMPLES, columns)
     assert picture.high[2].shape[0] <= columns
     assert np.nanmax(picture.high[2]) == pytest.approx(0.4, rel=1e-5)

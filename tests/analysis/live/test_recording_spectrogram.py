@@ -53,7 +53,7 @@ def at(found, time_s, frequency_hz):
 
 
 @pytest.mark.parametrize("spacing", RowSpacing)
-def test_a_sine_stands_where_it_is_with_its_power_over_the_bandwidth_of_the_window(request_, spacing):
+def test_a_sine_has_its_power_over_the_window_bandwidth(request_, spacing):
     found = recording_spectrogram(replace(request_, spacing=spacing))
     bandwidth_hz = 1.5 / found.segment_s
     assert at(found, 1.5, 250.0) == pytest.approx(10 * np.log10(0.5**2 / 2 / bandwidth_hz), abs=0.1)
@@ -61,7 +61,7 @@ def test_a_sine_stands_where_it_is_with_its_power_over_the_bandwidth_of_the_wind
     assert found.unit == "m s-1"
 
 
-def test_white_noise_has_its_density_whatever_the_length_of_the_windows(request_):
+def test_the_density_of_white_noise_does_not_depend_on_window_length(request_):
     for stretch_s in (0.6, 2.9):
         asked = replace(request_, start=int(3 * RATE), stop=int((3 + stretch_s) * RATE))
         found = recording_spectrogram(asked)
@@ -70,12 +70,12 @@ def test_white_noise_has_its_density_whatever_the_length_of_the_windows(request_
         assert found.time_s == pytest.approx((3.0, 3.0 + stretch_s), abs=0.05)
 
 
-def test_a_stretch_shorter_than_a_window_is_refused_in_a_sentence(request_):
+def test_a_range_shorter_than_a_window_is_refused_in_a_sentence(request_):
     with pytest.raises(NotEnoughData, match="10 samples"):
         recording_spectrogram(replace(request_, stop=10))
 
 
 @pytest.mark.parametrize("width_hz", [1.0, 5.0, 50.0])
-def test_lines_are_as_wide_as_was_wished(request_, width_hz):
+def test_lines_have_the_requested_width(request_, width_hz):
     found = recording_spectrogram(replace(request_, resolution_hz=width_hz))
     assert found.resolution_hz == pytest.approx(width_hz, rel=0.3)

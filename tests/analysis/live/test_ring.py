@@ -10,7 +10,7 @@ def numbered(first, count):
 
 
 @pytest.mark.parametrize("length", [1, 7, 99, 100, 101, 250])
-def test_the_newest_samples_lie_in_one_piece_whatever_the_blocks(length):
+def test_the_newest_samples_are_contiguous_for_any_block_size(length):
     ring = Ring(2, 100)
     for first in range(40, 1000, length):
         ring.add(first, numbered(first, length))
@@ -20,7 +20,7 @@ def test_the_newest_samples_lie_in_one_piece_whatever_the_blocks(length):
         assert np.array_equal(window.values, expected)
 
 
-def test_a_ring_hands_out_no_more_than_has_come():
+def test_a_ring_returns_only_received_samples():
     ring = Ring(1, 100)
     assert ring.newest(10).values.shape == (1, 0)
     ring.add(5, np.ones((1, 3), dtype=np.float32))
@@ -28,7 +28,7 @@ def test_a_ring_hands_out_no_more_than_has_come():
     assert ring.newest(10).first_sample == 5
 
 
-def test_samples_that_come_twice_are_kept_once():
+def test_repeated_samples_are_stored_once():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 20))
     ring.add(10, numbered(10, 20))
@@ -36,7 +36,7 @@ def test_samples_that_come_twice_are_kept_once():
     assert np.array_equal(ring.newest(50).values, numbered(0, 30))
 
 
-def test_lost_samples_are_not_a_number_and_what_is_older_stays():
+def test_lost_samples_are_nan_and_older_ones_remain():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 20))
     ring.add(30, numbered(30, 5))
@@ -47,13 +47,13 @@ def test_lost_samples_are_not_a_number_and_what_is_older_stays():
     assert np.array_equal(values[:, 30:], numbered(30, 5))
 
 
-def test_since_gives_what_is_new():
+def test_since_returns_new_samples():
     ring = Ring(2, 50)
     ring.add(0, numbered(0, 45))
     assert np.array_equal(ring.since(40).values, numbered(40, 5))
     assert ring.since(45).values.shape == (2, 0)
 
 
-def test_a_ring_of_nothing_is_refused():
+def test_an_empty_ring_is_refused():
     with pytest.raises(InvalidRequest, match="0 channels"):
         Ring(0, 10)

@@ -33,7 +33,7 @@ def sine(frequency_hz, samples, first=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
-def test_a_tone_is_found_between_lines(frequency_hz):
+def test_a_tone_between_lines_is_found(frequency_hz):
     tone = drive_tone(sine(frequency_hz, look_samples(RATE)).values[0], RATE)
     assert tone.frequency_hz == pytest.approx(frequency_hz, abs=2e-3)
     assert tone.amplitude == pytest.approx(0.3, rel=1e-3)
@@ -60,7 +60,7 @@ def test_responses_of_a_known_motion_are_found(frequency_hz):
     assert point.lower == pytest.approx(A0 * omega * slope.min(), rel=2e-3)
 
 
-def test_a_point_of_a_sweep_stands_at_the_frequency_of_its_own_time():
+def test_a_point_of_a_sweep_has_the_frequency_of_its_time():
     time_s = np.arange(int(2 * RATE)) / RATE
     phase = 2 * np.pi * (255.0 * time_s + 0.5 * 2.0 * time_s**2)
     window = RingWindow(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))
@@ -95,7 +95,7 @@ def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate
     assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
 
 
-def test_no_point_is_made_of_lost_samples_or_too_few():
+def test_lost_or_too_few_samples_give_no_point():
     window = sine(260.0, 60_000)
     assert sine_point(RingWindow(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
     window.values[1, -50] = np.nan
@@ -140,7 +140,7 @@ def test_points_of_overlapping_portraits_are_kept_once_and_none_is_missed():
     assert section.displacement_m.size == pytest.approx(28_160 / RATE * 260 + 70 - 40, abs=2)
 
 
-def test_a_section_forgets_the_oldest():
+def test_a_section_drops_its_oldest_points():
     section = PoincareSection(most=10)
     section.add(portrait(sine(260.0, portrait_samples(260.0, RATE) + 13_000), 0, 2, RATE))
     assert section.displacement_m.size == section.velocity_m_per_s.size == 10

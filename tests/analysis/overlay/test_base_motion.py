@@ -24,7 +24,7 @@ def motion_of(path):
         return recorded_base_motion(recording, plan_of(recording))
 
 
-def test_the_displacement_is_the_one_that_was_played_within_a_thousandth(dwell_file, dwell_motions):
+def test_the_displacement_matches_the_played_one_within_0_1_percent(dwell_file, dwell_motions):
     found = motion_of(dwell_file("strong"))
     true = dwell_motions["strong"][0].displacement_m
     assert found.low_hz == 65.0
@@ -33,7 +33,7 @@ def test_the_displacement_is_the_one_that_was_played_within_a_thousandth(dwell_f
     assert abs(np.mean(found.displacement_m)) < 1e-4 * 5e-6
 
 
-def test_a_hole_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_file):
+def test_a_gap_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_file):
     with pytest.raises(UnusableData, match="30 samples of the base's acceleration were lost"):
         motion_of(dwell_file("weak", hole=(9000, 9030)))
 
@@ -54,11 +54,11 @@ def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
         (SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=80, stop_hz=90, step_hz=5)), 80),
     ],
 )
-def test_the_lowest_frequency_played_sets_the_band(plan, lowest_hz):
+def test_the_lowest_played_frequency_sets_the_band(plan, lowest_hz):
     assert lowest_frequency_hz(Measurement(name="m", excitation=plan)) == lowest_hz
 
 
-def test_a_run_in_pieces_is_the_run_in_one(dwell_motions):
+def test_a_run_in_pieces_equals_the_whole_run(dwell_motions):
     base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
     base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
     velocity, impacts = shaken(gong2025(), base, RATE, Accuracy.STANDARD)

@@ -27,7 +27,7 @@ def curve(rng, draws, points, shift=0.0, scatter=0.1):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 40), (8, 40)])
-def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, points):
+def test_an_agreeing_twin_exceeds_its_limit_in_one_percent(draws, points):
     rng = np.random.default_rng(1)
     trials = 3000
     outside = sum(not curve(rng, draws, points).agrees for _ in range(trials))
@@ -36,7 +36,7 @@ def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, point
 
 
 @pytest.mark.thorough
-def test_a_magnitude_that_is_mostly_chance_passes_its_limit_no_more_often():
+def test_random_magnitudes_exceed_their_limit_in_one_percent():
     rng = np.random.default_rng(8)
     outside = 0
     for _ in range(2000):
@@ -57,7 +57,7 @@ def long_tails(rng, size):
 
 @pytest.mark.parametrize("drawn", [rare_dips, long_tails])
 @pytest.mark.parametrize(("draws", "points"), [(8, 200), (16, 1000)])
-def test_long_tails_of_a_curve_pass_its_limit_no_more_often(drawn, draws, points):
+def test_long_tails_exceed_their_limit_in_one_percent(drawn, draws, points):
     """With the limit of normal values 14 to 100 % lay outside."""
     rng, outside = np.random.default_rng(6), 0
     for _ in range(100):
@@ -67,7 +67,7 @@ def test_long_tails_of_a_curve_pass_its_limit_no_more_often(drawn, draws, points
 
 
 @pytest.mark.parametrize("draws", [5, 8, 16, 48, 200])
-def test_one_in_a_hundred_lies_beyond_the_limit_that_few_draws_tell(draws):
+def test_limits_from_few_draws_are_exceeded_in_one_percent(draws):
     """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % lay beyond."""
     largest = np.random.default_rng(10).gumbel(3.7, 0.3, (20000, draws + 1))
     beyond = np.mean([each[0] > largest_of_chance(each[1:]) for each in largest])
@@ -75,7 +75,7 @@ def test_one_in_a_hundred_lies_beyond_the_limit_that_few_draws_tell(draws):
     assert beyond == pytest.approx(0.01, abs=0.0025)
 
 
-def test_one_line_far_off_lies_outside_whatever_the_draws_are():
+def test_one_distant_line_lies_outside_any_draws():
     rng = np.random.default_rng(7)
     values = rare_dips(rng, (17, 1000))
     values[0, 500] = 3.0
@@ -84,7 +84,7 @@ def test_one_line_far_off_lies_outside_whatever_the_draws_are():
     assert found.limit < 8
 
 
-def test_each_draw_is_set_into_the_others():
+def test_each_draw_is_ranked_among_the_others():
     found = curve(np.random.default_rng(9), 9, 40)
     by_hand = [
         EnsembleCurve("q", found.frequency_hz, each, np.delete(found.draws, place, axis=0)).z
@@ -93,13 +93,13 @@ def test_each_draw_is_set_into_the_others():
     np.testing.assert_allclose(found._z_of_draws, by_hand, rtol=1e-9)
 
 
-def test_the_band_holds_a_further_draw_as_often_as_it_states():
+def test_the_band_contains_further_draws_at_its_stated_rate():
     rng = np.random.default_rng(2)
     held = np.mean([curve(rng, 16, 40).share_in_band for _ in range(400)])
     assert held == pytest.approx(0.95, abs=0.006)
 
 
-def test_ranks_of_a_further_draw_are_even():
+def test_ranks_of_further_draws_are_uniform():
     rng = np.random.default_rng(3)
     ranks = [int(curve(rng, 9, 1).rank[0]) for _ in range(4000)]
     assert chisquare(np.bincount(ranks, minlength=10)).pvalue > 0.001
@@ -142,7 +142,7 @@ def test_a_rate_of_escape_covers_the_true_one():
     assert 0.94 <= covered / told <= 0.99
 
 
-def test_an_end_that_all_runs_share_is_an_edge_and_no_chance():
+def test_an_end_shared_by_all_runs_is_not_random():
     runs = [Ending("collisions", 0.0, 60.0 + 0.05 * k, ended=True) for k in range(17)]
     assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
     lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17
@@ -153,7 +153,7 @@ def test_an_end_that_all_runs_share_is_an_edge_and_no_chance():
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.45])
-def test_half_of_the_draws_give_the_verdict_of_all_where_they_agree_clearly(shift):
+def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
     """So a wrong twin is not passed for want of draws: `benchmarks/twin_agreement.py --stop`."""
     rng = np.random.default_rng(12)
     decided = 0

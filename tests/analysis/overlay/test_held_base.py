@@ -40,12 +40,12 @@ def played_hz(excitation):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_a_measurement_holds_the_base_where_its_plan_says_so_and_only_there(name):
+def test_the_base_is_held_only_if_planned(name):
     assert (name in HELD_UM) == bool(list(SHIPPED[name].excitation.held_accelerations()))
 
 
 @pytest.mark.parametrize(("name", "held_um"), HELD_UM.items())
-def test_the_base_motion_is_the_one_that_is_held(name, held_um):
+def test_the_predicted_base_motion_is_the_held_one(name, held_um):
     excitation = SHIPPED[name].excitation
     base = base_motion(excitation, RIG, played_hz(excitation))
     np.testing.assert_allclose(1e6 * base.amplitude_m, held_um, rtol=2e-3)

@@ -34,7 +34,7 @@ def test_the_amplitude_of_a_dwell_is_the_stroke_of_its_plan():
     )
 
 
-def test_noise_is_stood_for_by_a_sine_of_the_same_rms():
+def test_noise_is_represented_by_a_sine_of_equal_rms():
     base = base_motion(QUICK["noise"].excitation, RIG, np.array([100.0, 200.0]))
     rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[BaseQuantity.STROKE].rms
     assert base.amplitude_m == pytest.approx(np.sqrt(2) * rms_m)
@@ -49,7 +49,7 @@ def lowest_hz(start_hz, stop_hz, amplitude_vpp):
     return predict_measurement(Measurement(name="sweep", excitation=sweep), RIG).collision_bands_hz[0][0]
 
 
-def test_a_sweep_is_predicted_on_the_branch_that_it_comes_along():
+def test_a_sweep_is_predicted_on_its_branch():
     """Upwards the specimen stays clear of the stops until its linear motion reaches them; downwards it
     goes on striking, and how far is a draw of its chaos."""
     levels_vpp = (1.45, 1.5, 1.55)

@@ -40,7 +40,7 @@ def test_a_colliding_dwell_counts_impacts_and_agrees_in_its_statistics(dwell_fil
         assert simulated.decibel == pytest.approx(measured.decibel, abs=4)
 
 
-def test_a_sweep_and_its_simulation_begin_to_collide_within_a_hertz_and_agree_before(sweep_file):
+def test_a_sweep_and_its_simulation_collide_within_1_hz(sweep_file):
     analysis, laid = laid_over(sweep_file)
     assert isinstance(laid, SweepOverlay)
     measured, simulated = analysis.collisions.regions[0], laid.collisions.regions[0]
@@ -49,7 +49,7 @@ def test_a_sweep_and_its_simulation_begin_to_collide_within_a_hertz_and_agree_be
     assert np.max(np.abs(laid.difference.decibel[before])) < 0.02
 
 
-def test_what_disagrees_with_the_twin_is_stated_first(sweep_file):
+def test_disagreements_with_the_twin_are_stated_first(sweep_file):
     _, laid = laid_over(sweep_file)
     (curve, *_) = laid.ensemble
     draws = 1 + 1e-3 * np.random.default_rng(1).standard_normal((9, 1))
@@ -79,7 +79,7 @@ def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):
     assert "0.05" in basis
 
 
-def test_another_specimen_can_be_laid_over(dwell_file):
+def test_another_specimen_can_be_overlaid(dwell_file):
     _, laid = laid_over(dwell_file("weak"), specimen=gong2025(damping_time_s=1e-4))
     exact = np.abs(base_transmissibility(gong2025(damping_time_s=1e-4), 260.0)[0, 0])
     assert laid.response.response_ii == pytest.approx(exact, rel=2e-3)

@@ -22,7 +22,7 @@ def level(volts, low_hz=240.0, high_hz=290.0):
 
 
 @pytest.mark.parametrize(("played_rms", "own_rms"), [(5e-4, 4e-4), (2e-4, 4e-4), (5e-4, 1e-4)])
-def test_noise_that_the_converter_added_shakes_nothing(played_rms, own_rms):
+def test_converter_noise_does_not_drive_the_twin(played_rms, own_rms):
     """With it, and once more for what is not known, a weak dwell lay 2 standard deviations off."""
     rng = np.random.default_rng(5)
     wanted, found, recorded = [], [], []
@@ -39,7 +39,7 @@ def test_noise_that_the_converter_added_shakes_nothing(played_rms, own_rms):
         assert np.mean(recorded) > 1.4 * np.mean(wanted)
 
 
-def test_a_drive_stays_as_it_was_recorded_and_draws_scatter_by_what_is_not_known():
+def test_draws_keep_the_recorded_drive_within_its_uncertainty():
     rng = np.random.default_rng(6)
     volts = TONE_V + 1e-4 * rng.standard_normal(TIME_S.size)
     voltage = PlayedVoltage(volts, 1e-4)
@@ -51,7 +51,7 @@ def test_a_drive_stays_as_it_was_recorded_and_draws_scatter_by_what_is_not_known
 
 
 @pytest.mark.parametrize("samples", [7, 1000])
-def test_a_short_voltage_and_one_without_noise_are_given_as_they_are(samples):
+def test_short_and_noise_free_voltages_are_unchanged(samples):
     volts = TONE_V[20_000 : 20_000 + samples]
     rng = np.random.default_rng(7)
     np.testing.assert_array_equal(PlayedVoltage(volts, 0.0).drawn(rng), volts)

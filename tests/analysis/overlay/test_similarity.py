@@ -30,7 +30,7 @@ def test_the_difference_is_the_one_of_equation_six():
     assert backwards.difference == pytest.approx([1 / 3])
 
 
-def test_what_the_logarithm_is_taken_of_decides():
+def test_similarity_depends_on_the_argument_of_the_logarithm():
     reference, model = curve(np.full(50, 2.0)), curve(np.full(50, 1.5))
     rates = {of: similarity(reference, model, of).rate for of in LogarithmOf}
     # log10(0.75) = -0.125 against logarithms of 0.3, 5, 2 and 1.
@@ -72,7 +72,7 @@ def test_the_interval_covers_the_rate_of_the_process_that_made_the_points():
     assert 0.87 <= covered / 200 <= 0.99
 
 
-def test_points_that_come_in_runs_widen_the_interval():
+def test_clustered_points_widen_the_interval():
     rng = np.random.default_rng(4)
     runs = np.repeat(rng.random(10) < 0.6, 10)
     mixed = rng.permutation(runs)
@@ -83,7 +83,7 @@ def test_points_that_come_in_runs_widen_the_interval():
     assert widths[0] > 1.5 * widths[1]
 
 
-def test_a_curve_is_read_between_its_points_and_never_beyond():
+def test_similarity_interpolates_and_never_extrapolates():
     power = SimilarityCurve(np.array([10.0, 100.0]), np.array([1.0, 100.0]), 1e-6)
     assert power.at(np.array([20.0])).response == pytest.approx([4.0])
     with pytest.raises(InvalidRequest, match="10 to 100 Hz"):
@@ -98,7 +98,7 @@ def test_a_curve_is_read_between_its_points_and_never_beyond():
         ([1.0], [1.0], 0.0, "positive"),
     ],
 )
-def test_a_curve_that_cannot_be_one_is_refused(frequencies, responses, amplitude_m, complaint):
+def test_an_invalid_curve_is_refused(frequencies, responses, amplitude_m, complaint):
     with pytest.raises(InvalidRequest, match=complaint):
         SimilarityCurve(np.array(frequencies), np.array(responses), amplitude_m)
 

@@ -56,7 +56,7 @@ def chaotic(recordings):
     return laid(recordings / "dwell.h5")
 
 
-def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
+def test_a_chaotic_dwell_is_consistent_with_its_draws(chaotic):
     run = chaotic.laid.run
     assert run.driven is Driven.AMPLIFIER
     assert run.draws in {8, 12, 16}
@@ -64,7 +64,7 @@ def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
 
 
-def test_under_the_base_motion_the_same_dwell_is_reported_as_one_run_without_a_place(recordings, chaotic):
+def test_a_dwell_under_the_base_motion_has_no_rank(recordings, chaotic):
     base = laid(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).laid
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
     assert all(not each.compared for each in base.ensemble)
@@ -115,7 +115,7 @@ def unsaid(recording):
     return replace(recording, bench=bench)
 
 
-def test_noise_of_an_unknown_shaker_is_laid_under_the_fitted_one(recordings):
+def test_noise_of_an_unknown_shaker_uses_the_fitted_shaker(recordings):
     with open_recording(recordings / "noise.h5") as recording:
         analysis = analyse(unsaid(recording))
         found = overlay(unsaid(recording), analysis, draws=5)
@@ -124,7 +124,7 @@ def test_noise_of_an_unknown_shaker_is_laid_under_the_fitted_one(recordings):
     assert found.quantity("transmission").agrees
 
 
-def test_a_dwell_of_an_unknown_shaker_states_why_the_base_drives_it(recordings):
+def test_a_dwell_of_an_unknown_shaker_explains_its_base_drive(recordings):
     with open_recording(recordings / "dwell.h5") as recording:
         analysis = analyse(unsaid(recording))
         found = overlay(unsaid(recording), analysis)

@@ -34,7 +34,7 @@ def noise_power(acceleration, rate_hz):
     return float(np.mean(lines[slice(*(round(each) for each in BETWEEN_HZ))]))
 
 
-def test_draws_have_the_noise_of_an_amplifier_that_no_channel_shows(recording):
+def test_draws_include_unrecorded_amplifier_noise(recording):
     """Without it the base of the draws was 0.7 times as noisy, and limits of weak motions too narrow."""
     source = voltage_source(recording, specimen_of(RIG), draws=8)
     rate_hz = recording.sample_rate_hz
@@ -45,6 +45,6 @@ def test_draws_have_the_noise_of_an_amplifier_that_no_channel_shows(recording):
     assert source.why == ""
 
 
-def test_a_twin_says_where_no_silence_shows_the_noise_of_the_amplifier(recording):
+def test_a_twin_reports_unknown_amplifier_noise(recording):
     unheard = replace(recording, segments=())
     assert "noise of the amplifier is unknown" in voltage_source(unheard, specimen_of(RIG)).why

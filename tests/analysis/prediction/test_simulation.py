@@ -32,7 +32,7 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 
         ({"gap_m": -1.0}, "greater than 0"),
     ],
 )
-def test_anything_that_cannot_be_simulated_is_refused_in_words(given, said):
+def test_invalid_simulations_are_refused_with_a_reason(given, said):
     with pytest.raises(ValidationError, match=re.escape(said)):
         SimulationRequest(**given)
 
@@ -42,7 +42,7 @@ def test_one_model_named_twice_is_simulated_once():
     assert SimulationRequest(step_hz=50.0).points == 24
 
 
-def test_the_answer_grows_to_the_linear_transmission():
+def test_the_incremental_result_reaches_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)
@@ -56,7 +56,7 @@ def test_the_answer_grows_to_the_linear_transmission():
     assert trace.name == "model linear, 5 µm, Response II, predicted"
 
 
-def test_the_answer_matches_the_specimen_that_is_named(tmp_path):
+def test_the_result_belongs_to_the_named_specimen(tmp_path):
     """A shipped one by its name, one of one's own by its file."""
     file = tmp_path / "own.toml"
     file.write_text(
@@ -136,7 +136,7 @@ def test_a_stricter_accuracy_is_said_to_cost_more():
     assert MEASURED[Accuracy.REFERENCE].chaos < MEASURED[Accuracy.QUICK].chaos
 
 
-def test_a_long_request_that_is_dropped_is_overtaken_by_a_short_one():
+def test_a_short_request_replaces_a_dropped_long_one():
     """The real process; the answer to the short request comes whole."""
     first, second, pool = [], [], Pool(1)
     long = SimulationRequest(**{**LINEAR, "step_hz": 0.05})

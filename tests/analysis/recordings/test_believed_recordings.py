@@ -39,7 +39,7 @@ def packed_wave(path):
         file.attrs.modify("samples", np.int64(CHUNK * CHUNKS))
 
 
-def test_a_small_file_that_declares_more_than_the_memory_is_refused(dwell_file, tmp_path):
+def test_a_small_file_that_declares_huge_data_is_refused(dwell_file, tmp_path):
     path = tmp_path / "packed.h5"
     path.write_bytes(Path(dwell_file("weak")).read_bytes())
     packed_wave(path)
@@ -50,7 +50,7 @@ def test_a_small_file_that_declares_more_than_the_memory_is_refused(dwell_file, 
         analyse(recording)
 
 
-def test_even_a_sine_without_noise_does_not_pack_like_that(dwell_file):
+def test_a_noise_free_sine_is_not_mistaken_for_a_compression_bomb(dwell_file):
     with open_recording(dwell_file("weak")) as recording:
         assert 1 < recording.packing < 8
 
@@ -66,7 +66,7 @@ def damaged(dwell_file, tmp_path):
     return path
 
 
-def test_a_chain_is_not_shaken_by_a_damaged_recording(damaged):
+def test_a_damaged_recording_cannot_drive_a_chain(damaged):
     with pytest.raises(UnusableData, match="is damaged"):
         _base_of(ChainRequest.model_construct(recording=str(damaged)))
 
@@ -77,6 +77,6 @@ def test_damaged_recordings_are_not_analysed(damaged, number_from):
         number_from(recording)
 
 
-def test_nor_is_hidden_motion_shown_of_it(damaged):
+def test_no_hidden_motion_is_shown_for_a_damaged_recording(damaged):
     with pytest.raises(UnusableData, match="is damaged"):
         hidden_view(HiddenViewRequest(damaged, 0.0, 0.5))

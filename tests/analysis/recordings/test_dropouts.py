@@ -75,13 +75,13 @@ def test_a_coarse_channel_and_its_impacts_have_no_dropouts(quantum, noise):
 
 
 @pytest.mark.parametrize("number", [6, 8])
-def test_a_sweep_with_dropouts_that_read_zero_says_nothing_wrong(number, tmp_path):
+def test_a_sweep_with_zero_drop_outs_gives_no_wrong_result(number, tmp_path):
     """Member 6 gave 3.452 +- 0.031 for 3.538."""
     chance = random.Random(f"4303:{number}")
     assert dark_recording(generator(chance), tmp_path).faults == ()
 
 
-def test_two_close_together_do_not_spoil_each_other():
+def test_two_close_drop_outs_are_both_bridged():
     velocity = motion(3)
     dark = darkened(darkened(velocity, 20_000, 12, 0.8), 20_250, 20, -0.6)
     found = found_dropouts(dark, RATE_HZ)
@@ -89,7 +89,7 @@ def test_two_close_together_do_not_spoil_each_other():
     assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
 
 
-def test_where_too_little_motion_is_left_between_them_the_samples_stay():
+def test_drop_outs_with_too_little_motion_between_them_are_not_bridged():
     dark = motion(10)[:1_500]
     many = tuple(Dropout(at, at + 40) for at in range(20, 1_440, 60))
     assert np.array_equal(bridged(dark, many), dark)
@@ -111,7 +111,7 @@ def test_an_impact_changes_the_velocity_for_good_and_is_no_dropout(step):
     assert found_dropouts(velocity, RATE_HZ) == ()
 
 
-def test_what_rings_after_a_blow_is_no_dropout():
+def test_ringing_after_an_impact_is_no_dropout():
     velocity = motion(5)
     after = np.arange(velocity.size - 20_000) / RATE_HZ
     velocity[20_000:] += 0.5 * np.exp(-after / 0.01) * np.sin(2 * np.pi * 4_000 * after)
@@ -123,15 +123,15 @@ def test_what_rings_after_a_blow_is_no_dropout():
     [np.zeros(51_200), np.full(51_200, np.nan), motion(6)[:300], np.round(motion(7), 2)],
     ids=["silent", "lost", "short", "coarse"],
 )
-def test_nothing_is_found_where_nothing_can_be_reported(velocity):
+def test_undecidable_signals_report_no_drop_outs(velocity):
     assert found_dropouts(velocity, RATE_HZ) == ()
 
 
-def test_a_longer_darkness_is_left_as_it_is():
+def test_long_drop_outs_are_not_bridged():
     assert found_dropouts(darkened(motion(8), 20_000, 2_000, 0.0), RATE_HZ) == ()
 
 
-def test_below_20_khz_nothing_is_looked_for():
+def test_drop_outs_are_not_searched_below_20_khz():
     assert found_dropouts(darkened(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
 
 
@@ -147,7 +147,7 @@ def rig():
     return load_rig("virtual_rig")
 
 
-def test_a_dwell_with_dropouts_states_what_it_states_without(rig, tmp_path):
+def test_bridged_drop_outs_do_not_change_a_dwell(rig, tmp_path):
     """Response I was 91 where it is 1.63, and a warning called that a lower bound."""
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
     results = []
@@ -164,9 +164,7 @@ def test_a_dwell_with_dropouts_states_what_it_states_without(rig, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("dropouts_per_s", "seed"), [(20.0, 2), (20.0, 13), (60.0, 1)])
-def test_a_dwell_with_clustered_dropouts_states_what_it_states_without_or_nothing(
-    rig, tmp_path, dropouts_per_s, seed
-):
+def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(rig, tmp_path, dropouts_per_s, seed):
     """Response I was 58 +- 16 where it is 3.21; with 60 a second, 48 +- 51."""
     document = rig.model_dump(mode="json")
     document["specimen"]["contact"] = "linear"
@@ -192,7 +190,7 @@ def test_a_dwell_with_clustered_dropouts_states_what_it_states_without_or_nothin
     ],
     ids=["chaos", "strong", "sweep", "noise"],
 )
-def test_among_collisions_every_dropout_is_found_and_no_collision_is_one(rig, tmp_path, plan):
+def test_drop_outs_and_collisions_are_distinguished(rig, tmp_path, plan):
     """The same run with light and without: what is read differs by a fiftieth of the motion at most."""
     with open_recording(measured(rig, plan, tmp_path / "light.h5", 0.0)) as recording:
         light = recording.read(ROLE)
@@ -207,7 +205,7 @@ def test_among_collisions_every_dropout_is_found_and_no_collision_is_one(rig, tm
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [7, 9])
-def test_dropouts_that_follow_each_other_within_milliseconds_are_all_found(rig, tmp_path, seed):
+def test_drop_outs_within_milliseconds_are_all_found(rig, tmp_path, seed):
     """With what rings of them they are longer than one may be: Response I was 617 where it is 22.6."""
     plan = Dwell(amplitude_vpp=0.02, frequency_hz=266, settle_s=1, duration_s=4)
     read = []
@@ -241,7 +239,7 @@ def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
             assert recording_facts(recording).dropouts == 0
 
 
-def test_a_part_is_read_as_the_whole(rig, tmp_path):
+def test_a_part_is_bridged_like_the_whole(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measured(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)
@@ -255,7 +253,7 @@ def test_a_part_is_read_as_the_whole(rig, tmp_path):
 
 
 @pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
-def test_a_recording_of_a_rate_that_no_converter_has_is_answered(rig, tmp_path, rate_hz):
+def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
     path = measured(rig, plan, tmp_path / "d.h5", 0.0)
     with h5py.File(path, "r+") as file:
@@ -264,7 +262,7 @@ def test_a_recording_of_a_rate_that_no_converter_has_is_answered(rig, tmp_path, 
         assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
 
 
-def test_a_recording_that_is_often_dark_is_warned_of(rig, tmp_path):
+def test_many_drop_outs_give_a_warning(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measured(rig, plan, tmp_path / "d.h5", 1.0)) as recording:
         facts = recording_facts(recording)

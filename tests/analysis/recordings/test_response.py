@@ -80,7 +80,7 @@ def test_noise_has_the_same_resonances(noise_file, noise_motion, tmp_path, respo
 
 
 @SENSORS
-def test_anything_that_is_read_does_not_depend_on_where_it_begins(dwell_motions, tmp_path, response, made):
+def test_samples_do_not_depend_on_the_start_of_reading(dwell_motions, tmp_path, response, made):
     motion, velocity, _ = dwell_motions["strong"]
     path = synthetic.write_recording(
         tmp_path, dwell_plan(A0_STRONG), motion, made(velocity), [DWELL_PART], response=response
@@ -93,7 +93,7 @@ def test_anything_that_is_read_does_not_depend_on_where_it_begins(dwell_motions,
     assert np.abs(whole - velocity)[round(RATE) : -64].max() < 2e-3 * np.abs(velocity).max()
 
 
-def test_a_clipped_acceleration_marks_all_that_its_integral_reaches(dwell_motions, tmp_path):
+def test_a_clipped_acceleration_marks_all_affected_samples(dwell_motions, tmp_path):
     motion, velocity, _ = dwell_motions["strong"]
     path = synthetic.write_recording(
         tmp_path,
@@ -127,7 +127,7 @@ def test_an_acceleration_of_half_a_second_is_refused(dwell_motions, tmp_path):
         ResponseChannel(recording)
 
 
-def test_samples_near_a_hole_are_not_reported(dwell_motions, tmp_path):
+def test_samples_near_a_gap_are_excluded(dwell_motions, tmp_path):
     motion, velocity, _ = dwell_motions["weak"]
     path = synthetic.write_recording(
         tmp_path,

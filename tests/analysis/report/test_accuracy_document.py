@@ -51,7 +51,7 @@ def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark, page_o
     assert page.count("| **quick** |") == page.count("; Radau ") == 2
 
 
-def test_the_page_has_the_shares_of_scenes_whose_start_is_forgotten(benchmark, page_of):
+def test_the_page_has_the_shares_of_start_independent_scenes(benchmark, page_of):
     page = page_of(benchmark)
     (lottery,) = benchmark.lotteries
     rows = [line for line in page.splitlines() if line.startswith(f"| {lottery.lottery.name}")]
@@ -61,14 +61,12 @@ def test_the_page_has_the_shares_of_scenes_whose_start_is_forgotten(benchmark, p
     assert "start is forgotten" not in without
 
 
-def test_the_page_states_when_a_promise_is_not_kept(benchmark, page_of):
+def test_the_page_reports_missed_accuracy(benchmark, page_of):
     assert benchmark.worst_error(Accuracy.QUICK) <= Accuracy.QUICK.promise
     assert "**no**" not in page_of(replace(benchmark, lotteries=()))
 
 
-def test_a_transient_errs_by_no_more_than_the_promise_times_its_growth_and_than_its_answer_states(
-    benchmark, page_of
-):
+def test_transient_errors_are_within_their_stated_bounds(benchmark, page_of):
     page = page_of(benchmark)
     assert [each.accuracy for each in benchmark.transients] == list(Accuracy)
     for each in benchmark.transients:
@@ -79,7 +77,7 @@ def test_a_transient_errs_by_no_more_than_the_promise_times_its_growth_and_than_
         assert f"{state}; {each.response_error:.1e} ({each.stated_error:.1e})" in page
 
 
-def test_the_page_names_the_motions_on_which_a_level_buys_nothing(benchmark, page_of):
+def test_the_page_names_motions_that_a_higher_level_does_not_improve(benchmark, page_of):
     motion = benchmark.motions[0]
     quick, standard, reference = motion.levels
     stuck = replace(motion, levels=(quick, replace(standard, state_error=quick.state_error), reference))

@@ -40,7 +40,7 @@ def laid(*ensemble, by_voltage=True, why=""):
         (Of(laid=None), NOT_SIMULATED, Agreement.OPEN, "it did not reach its end"),
     ],
 )
-def test_agreement_is_what_was_compared(result, failure, agreement, reason):
+def test_agreement_names_the_compared_quantities(result, failure, agreement, reason):
     found, said = agreement_of(result, failure)
     assert found is agreement
     assert said.endswith(reason)

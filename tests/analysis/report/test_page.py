@@ -56,7 +56,7 @@ def test_light_dark_and_paper_have_their_own_rules_and_closed_folds_are_not_prin
         ("", ""),
     ],
 )
-def test_a_caption_keeps_the_sentences_that_fill_three_lines_and_loses_none(caption, shown):
+def test_long_captions_are_folded_after_three_lines(caption, shown):
     first, rest = divided_caption(SimpleNamespace(title="A title", caption=caption))
     assert first == shown
     assert f"{first} {rest}".strip() == caption

@@ -122,9 +122,7 @@ def test_every_figure_has_one_legend_without_repeated_entries(campaign):
         assert len(entries) == len(set(entries)), each.name
 
 
-def test_a_warning_that_changes_a_conclusion_is_at_the_top_and_any_other_at_its_recording(
-    dwell_file, tmp_path
-):
+def test_important_warnings_are_at_the_top_and_others_at_their_recording(dwell_file, tmp_path):
     analysis = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT).results[0].analysis
     assert {each.what for each in analysis.checks} >= CHANGE_A_CONCLUSION - {"Drop-outs"}
     for what, is_first in (("Overloads", True), ("Calibration", False)):
@@ -142,7 +140,7 @@ def test_a_report_states_how_it_was_measured_and_that_it_was_simulated(page):
     assert "Some of these recordings come from simulated instruments" in page.text
 
 
-def test_a_recording_without_a_result_is_named_first_and_stops_no_other(page, campaign):
+def test_a_recording_without_a_result_is_named_first_beside_the_others(page, campaign):
     assert [each.name for each in campaign.failures] == ["stopped.h5"]
     assert len(campaign.results) == 4
     assert page.visible.index("cable out") < page.visible.index("One recording of five gave no result.")
@@ -166,7 +164,7 @@ def test_one_recording_makes_its_own_report(dwell_file, tmp_path):
     assert "simulation takes the damping" not in page.text
 
 
-def test_a_report_of_nothing_is_refused(tmp_path):
+def test_an_empty_report_is_refused(tmp_path):
     with pytest.raises(NotEnoughData, match="give the paths"):
         analyse_files([], "empty")
     with pytest.raises(NotEnoughData, match="holds no recording"):

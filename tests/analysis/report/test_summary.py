@@ -64,7 +64,7 @@ def test_the_papers_campaign_is_reported_in_three_findings():
         (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, 199.0 Hz."),
     ],
 )
-def test_what_becomes_of_the_resonances_is_reported_as_it_was_measured(strong, words):
+def test_measured_changes_of_resonances_are_reported(strong, words):
     assert words in said(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
 
 
@@ -78,7 +78,7 @@ def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
     assert words.count("Vpp: resonances at 201.0 Hz.") == 1
 
 
-def test_undecided_motion_is_called_so_and_many_frequencies_stay_short():
+def test_undecided_motion_is_named_and_long_lists_are_shortened():
     assert said(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
     many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(50))
     words = said(dwells=many)

@@ -38,7 +38,7 @@ def test_a_recording_is_named_by_path_or_text(dwell_file):
     assert analyse(str(path)).response.response_ii == analyse(path).response.response_ii
 
 
-def test_a_weak_dwell_gives_the_closed_form_in_amplitude_and_phase(dwell_file):
+def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file):
     found = analysed(dwell_file("weak"))
     assert isinstance(found, DwellAnalysis)
     assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
@@ -94,7 +94,7 @@ def test_every_step_of_a_stepped_sine_is_its_own_dwell(stepped_file):
     assert found.response.direction == ("up", "up")
 
 
-def test_a_stopped_dwell_is_analysed_over_what_there_is_and_warns(dwell_file):
+def test_a_stopped_dwell_is_analysed_with_a_warning(dwell_file):
     path = dwell_file("weak", state=RecordingState.STOPPED, reason="cancelled", samples=round(4 * RATE))
     found = analysed(path)
     assert found.response.window_s < 2.0
@@ -103,19 +103,19 @@ def test_a_stopped_dwell_is_analysed_over_what_there_is_and_warns(dwell_file):
     assert verdict(found, "Parts") is Verdict.WARNING
 
 
-def test_a_recording_that_ended_before_its_dwell_reports_it_with_its_name_and_its_reason(dwell_file):
+def test_a_recording_without_its_dwell_is_reported_with_the_reason(dwell_file):
     path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
     with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
         analysed(path)
 
 
-def test_a_dwell_with_a_hole_is_refused_with_the_number_of_lost_samples(dwell_file):
+def test_a_dwell_with_a_gap_is_refused_with_the_number_of_lost_samples(dwell_file):
     path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
     with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
         analysed(path)
 
 
-def test_a_realisation_with_a_hole_is_left_out_and_the_other_one_stands(noise_file):
+def test_a_realisation_with_a_gap_is_excluded(noise_file):
     first = round(3.1 * RATE)
     found = analysed(noise_file(hole=(first, first + 10)))
     assert found.response.left_out == 1
@@ -147,7 +147,7 @@ def test_a_drive_at_another_frequency_than_the_plan_is_reported():
 @pytest.mark.parametrize(
     ("share", "told"), [(1.0, Verdict.PASSED), (0.6, Verdict.WARNING), (1.1, Verdict.NOTE)]
 )
-def test_a_drive_that_is_not_as_loud_as_its_plan_is_reported(dwell_file, share, told):
+def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
     generator = load_rig("virtual_rig").generator.model_dump(mode="json")
     facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
     setting_v = facts.measurement.excitation.amplitude_vpp / 2
@@ -163,7 +163,7 @@ def test_a_drive_that_is_not_as_loud_as_its_plan_is_reported(dwell_file, share, 
 
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
-def test_a_generator_that_this_version_does_not_know_has_no_least_level(dwell_file, generator):
+def test_an_unknown_generator_has_no_minimum_level(dwell_file, generator):
     facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
     (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
     assert found.verdict is Verdict.PASSED

@@ -63,21 +63,21 @@ def test_the_region_reaches_from_the_first_impact_to_the_last(amplitude_m, start
     assert not last.reaches_stop
 
 
-def test_no_impact_no_region():
+def test_without_impacts_there_is_no_collision_region():
     result, impacts_hz = found(2e-7, 225.0, 385.0)
     assert impacts_hz.size == 0
     assert result.regions == ()
     assert not result.is_colliding.any()
 
 
-def test_collisions_all_along_are_a_region_that_reaches_both_ends():
+def test_continuous_collisions_give_a_region_over_the_whole_sweep():
     result, _ = found(20e-6, 240.0, 300.0)
     (region,) = result.regions
     assert region.reaches_start
     assert region.reaches_stop
 
 
-def test_noise_ten_times_as_high_moves_no_edge():
+def test_ten_times_the_noise_does_not_move_the_edges():
     def spoil(velocity, rng):
         return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
 
@@ -86,7 +86,7 @@ def test_noise_ten_times_as_high_moves_no_edge():
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
 
 
-def test_drop_outs_of_the_laser_are_outvoted():
+def test_laser_drop_outs_do_not_change_the_region():
     def spoil(velocity, rng):
         spoilt = velocity.copy()
         for place in rng.integers(0, velocity.size - 20, 12):
@@ -104,9 +104,7 @@ def test_drop_outs_of_the_laser_are_outvoted():
 @pytest.mark.parametrize(
     ("start_hz", "stop_hz", "duration_s"), [(150, 330, 10), (330, 150, 6), (150, 330, 3), (60, 150, 5)]
 )
-def test_what_rings_of_the_steps_of_a_fast_weak_sweep_is_no_collision(
-    tmp_path, start_hz, stop_hz, duration_s
-):
+def test_ringing_after_steps_of_a_fast_sweep_is_no_collision(tmp_path, start_hz, stop_hz, duration_s):
     """m1 stays within half of its gap; "the masses collide from 257 to 304 Hz" was said."""
     plan = SineSweep(
         amplitude_vpp=0.1 if max(start_hz, stop_hz) > 200 else 0.01,
@@ -130,7 +128,7 @@ def test_what_rings_of_the_steps_of_a_fast_weak_sweep_is_no_collision(
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("duration_s", [6, 2])
-def test_a_fast_sweep_that_collides_is_reported_too(tmp_path, duration_s):
+def test_collisions_in_a_fast_sweep_are_reported(tmp_path, duration_s):
     plan = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=duration_s, settle_s=1)
     with open_bench(load_rig("virtual_rig")) as bench:
         run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
@@ -160,7 +158,7 @@ def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact
 
 
 @pytest.mark.parametrize("is_known", [True, False])
-def test_a_mode_that_rings_on_at_twice_the_drive_is_no_collision(is_known):
+def test_a_mode_ringing_at_twice_the_drive_is_no_collision(is_known):
     """Collisions from 46 to 39 Hz were reported of a specimen without stops, whose mode at 82 Hz rang on."""
     specimen = gong2025(damping_time_s=3.5e-6)
     outcome = simulate_and_analyse(
@@ -169,7 +167,7 @@ def test_a_mode_that_rings_on_at_twice_the_drive_is_no_collision(is_known):
     assert outcome.colliding == 0
 
 
-def test_what_rings_louder_than_the_drive_is_no_collision_of_an_unknown_specimen():
+def test_ringing_above_the_drive_level_is_no_collision():
     """Collisions from 97 to 118 Hz were reported of a specimen without stops, which rings."""
     specimen = gong2025(damping_time_s=4e-7)
     sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
@@ -177,7 +175,7 @@ def test_what_rings_louder_than_the_drive_is_no_collision_of_an_unknown_specimen
 
 
 @pytest.mark.parametrize(("damping_time_s", "is_stated"), [(3e-6, True), (2e-7, False)])
-def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(damping_time_s, is_stated):
+def test_steady_sines_are_compared_only_where_the_linear_run_matches(damping_time_s, is_stated):
     """32 % too much was stated where the specimen still rang of what was before the recording."""
     specimen = gong2025(damping_time_s=damping_time_s)
     outcome = simulate_and_analyse(FastSweep(specimen, 120.0, 45.0, 4.0, 1e-6, 1), "linear", specimen)
@@ -187,7 +185,7 @@ def test_steady_sines_are_compared_where_the_linear_run_reaches_what_was_swept(d
     assert np.isfinite(outcome.steady_over_swept) == is_stated
 
 
-def test_steady_sines_reach_as_far_as_the_linear_specimen_states():
+def test_the_steady_range_follows_from_the_linear_specimen():
     """22.104 was reported of a sweep at 20 Hz/s, and nothing of 22.815 under steady sines."""
     outcome = simulate_and_analyse(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))

@@ -27,7 +27,7 @@ def dwell(duration_s, orders, noise=0.0, drive_hz=DRIVE_HZ, seed=1):
     return np.cos(omega * time), -5e-6 * omega**2 * np.cos(omega * time), velocity
 
 
-def test_both_responses_of_a_linear_motion_are_its_amplitude_over_the_bases():
+def test_responses_of_a_linear_motion_are_its_amplitude_ratio():
     drive, base, velocity = dwell(4, {1: 15e-6 * np.exp(-0.7j)})
     result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=3)
     assert result.drive.frequency_hz == pytest.approx(DRIVE_HZ, rel=1e-9)
@@ -77,7 +77,7 @@ def test_the_spectrum_and_its_peaks_are_displacements():
     assert high.decibel == pytest.approx(20 * np.log10(0.02), abs=0.05)
 
 
-def test_the_stated_noise_bias_and_spread_are_what_repeated_dwells_show():
+def test_stated_noise_bias_and_spread_match_repeated_dwells():
     found = [
         dwell_response(*dwell(1.6, {1: 1e-7}, noise=1e-6, seed=seed), RATE, near_hz=260, window_s=1)
         for seed in range(40)
@@ -89,7 +89,7 @@ def test_the_stated_noise_bias_and_spread_are_what_repeated_dwells_show():
     assert stated == pytest.approx(np.std([each.response_ii for each in found]), rel=0.4)
 
 
-def test_twice_the_uncertainty_of_a0_holds_it_in_95_of_100_cases():
+def test_twice_the_uncertainty_of_a0_covers_it_in_95_percent():
     """Ten tenths of a window tell their own scatter to a quarter only: twice it held A0 in 92."""
     rng, draws, held = np.random.default_rng(4), 1000, 0
     for _ in range(draws):
@@ -101,7 +101,7 @@ def test_twice_the_uncertainty_of_a0_holds_it_in_95_of_100_cases():
 
 
 @pytest.mark.parametrize("count", [3, 10])
-def test_so_does_twice_that_of_either_part_of_a_complex_mean(count):
+def test_twice_the_uncertainty_of_a_complex_mean_covers_it_in_95_percent(count):
     values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
     held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
     assert held == pytest.approx(0.954, abs=0.012)

@@ -47,14 +47,14 @@ STEP = SegmentNote(
 )
 
 
-def test_only_bracketed_jumps_count():
+def test_only_bracketed_jumps_are_counted():
     steep = JUMP.model_copy(update={"how": JumpSearchEnd.STEEP})
     (jump,) = noted_jumps([JUMP, steep])
     assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")
     assert list(feedback_sentences([JUMP])) == ["Jumps between 100.94 and 101.25 Hz (down)."]
 
 
-def test_steps_are_counted_by_what_they_do():
+def test_steps_are_counted_by_their_outcome():
     tripled = STEP.model_copy(update={"period": 3})
     chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Held.OUTSIDE})
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
@@ -64,7 +64,7 @@ def test_steps_are_counted_by_what_they_do():
     ]
 
 
-def test_nothing_is_stated_without_feedback():
+def test_recordings_without_feedback_have_no_feedback_statement():
     assert list(feedback_sentences(())) == []
 
 

@@ -94,7 +94,7 @@ def test_the_ringing_of_a_linear_specimen_is_no_jump(start_hz, stop_hz, duration
     assert smooth_jumps(found, collisions(found)) == ()
 
 
-def test_a_leap_between_two_rough_sides_is_not_a_jump():
+def test_a_step_between_two_rough_sides_is_not_a_jump():
     rough = np.zeros(TIME_S.size, dtype=bool)
     assert jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), rough) == ()
     half = FREQUENCY_HZ < 250

@@ -47,7 +47,7 @@ def test_the_specimen_jumps_up_at_a_higher_level_than_it_falls_back_at(analysis)
     assert hysteresis_vpp((rise, fall)) == pytest.approx((0.3, 0.7 - fall.after_vpp))
 
 
-def test_between_the_jumps_the_way_decides_which_motion_there_is(analysis):
+def test_between_the_jumps_the_motion_depends_on_the_direction(analysis):
     found = analysis.response
     up, down = (
         {
@@ -64,7 +64,7 @@ def test_between_the_jumps_the_way_decides_which_motion_there_is(analysis):
     assert up[0.1] == pytest.approx(down[0.1], rel=0.01)
 
 
-def test_the_largest_of_a_step_is_not_that_of_the_steps_beside_it(analysis):
+def test_the_maximum_of_a_step_excludes_neighbouring_steps(analysis):
     """Without contact the motion is a sine, and both responses are one."""
     found = analysis.response
     rising = [
@@ -74,7 +74,7 @@ def test_the_largest_of_a_step_is_not_that_of_the_steps_beside_it(analysis):
     np.testing.assert_allclose(found.response_i[rising], found.response_ii[rising], rtol=5e-3)
 
 
-def test_figure_and_summary_tell_both_jumps(analysis):
+def test_figure_and_summary_show_both_jumps(analysis):
     (figure,) = result_figures(CampaignResults("levels", (Result(analysis, None),), ()))
     _, fall = level_jumps(analysis.response)
     assert "between 0.6 and 0.7 Vpp" in figure.caption
@@ -85,7 +85,7 @@ def test_figure_and_summary_tell_both_jumps(analysis):
     assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
 
 
-def test_the_report_speaks_of_levels_and_jumps_in_short(analysis):
+def test_the_report_summarises_levels_and_jumps(analysis):
     (said,) = findings(CampaignResults("levels", (Result(analysis, None),), ()))
     assert said.startswith("level: Level stepped at 195 Hz, 16 steps from 0.1 to 0.8 Vpp.")
     _, fall = level_jumps(analysis.response)
@@ -132,7 +132,7 @@ def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, factor, share)
     assert (jump.before_vpp, jump.after_vpp) == (0.2, 0.4)
 
 
-def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_point():
+def test_a_constant_response_has_no_jump_even_at_the_turning_point():
     steps = 6
     response = SteppedResponse(
         frequency_hz=np.full(steps, 195.0),

@@ -47,7 +47,7 @@ def dwell(frequency_hz, amplitude_vpp=WEAK_VPP, duration_s=3.0):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("frequency_hz", [95.0, 180.0, 260.0])
-def test_bounds_of_response_i_hold_it_in_noise_of_the_bench(frequency_hz, tmp_path):
+def test_bounds_of_response_i_hold_in_bench_noise(frequency_hz, tmp_path):
     held = []
     for noise_v, seed in product(AMPLIFIER_NOISE_V, range(1, 7)):
         folder = tmp_path / f"{noise_v}_{seed}"
@@ -61,7 +61,7 @@ def test_bounds_of_response_i_hold_it_in_noise_of_the_bench(frequency_hz, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_silence_that_heard_less_than_there_is_while_it_plays_is_not_believed_alone(tmp_path):
+def test_bounds_include_noise_that_appears_only_during_the_drive(tmp_path):
     """Noise rings the modes, nine times what was heard: Response I was 0.234 +- 0.030 where it is 0.107."""
     for seed in range(6, 12):
         folder = tmp_path / f"{seed}"
@@ -71,14 +71,14 @@ def test_a_silence_that_heard_less_than_there_is_while_it_plays_is_not_believed_
         assert covers(first, linear(404.1)), first.sentence
 
 
-def test_noise_that_moves_the_bench_more_than_the_drive_is_in_the_bounds(tmp_path):
+def test_bounds_include_noise_larger_than_the_drive(tmp_path):
     found = measured(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
     first = budgets_of(found)[1]
     assert first.value > 2 * linear(180.0)
     assert covers(first, linear(180.0)), first.sentence
 
 
-def test_what_a_periodic_motion_holds_besides_is_noise(tmp_path):
+def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
     """A twentieth of a linear motion did not repeat; the silence before it alone was believed.
 
     Response I was 0.863 +- 0.027 where it is 0.738: so much was lifted by the amplifier's noise.
@@ -96,13 +96,13 @@ def test_what_a_periodic_motion_holds_besides_is_noise(tmp_path):
     assert louder.with_rest_as_noise(is_known_to_repeat=True) is louder
 
 
-def test_anything_that_is_too_large_for_noise_stays_what_it_was(tmp_path):
+def test_motion_too_large_for_noise_is_kept(tmp_path):
     found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
     assert np.isnan(found.rest_error_i)
     assert found.with_rest_as_noise(is_known_to_repeat=True) is found
 
 
-def test_chaos_is_not_taken_for_noise(tmp_path):
+def test_chaos_is_not_reported_as_noise(tmp_path):
     found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
     first = budgets_of(found)[1]
     assert found.analysis.response.response_i > 1.5 * found.analysis.response.response_ii
@@ -110,13 +110,13 @@ def test_chaos_is_not_taken_for_noise(tmp_path):
     assert first.contributions[-2].source == "silence before the check"
 
 
-def test_noise_that_is_heard_before_is_not_called_chaos(tmp_path):
+def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
     """Of eight seeds this one's points look like more than linear noise to the surrogates."""
     found = measured(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
     assert found.analysis.motion.verdict.kind is MotionKind.UNDECIDED
 
 
-def test_without_a_silence_what_is_no_small_part_of_a_motion_is_not_determined(tmp_path):
+def test_without_a_silent_part_large_noise_is_not_determined(tmp_path):
     """The same recording once more, its check left out."""
     rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"amplifier_noise_v": 0.02})})
     path = tmp_path / "weak.h5"

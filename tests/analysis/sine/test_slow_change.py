@@ -44,7 +44,7 @@ def told(result, name):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_slow_beat_is_not_periodic_and_its_maximum_holds_for_another_record(dwell, seed):
+def test_a_slow_beat_is_not_periodic_and_its_bound_holds_for_another_record(dwell, seed):
     """30 % at 260.2 Hz was "periodic, Response I 6.373591 +- 0.000023"."""
     rng = np.random.default_rng(seed)
     beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))
@@ -84,7 +84,7 @@ def test_mains_hum_is_named(dwell):
     assert "mains hum" in verdict.why
 
 
-def test_a_transient_that_decays_has_no_long_period(dwell):
+def test_a_decaying_transient_has_no_long_period(dwell):
     """It was "every 11 periods"."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp((-0.2 + 2j * np.pi * 23.6) * time_s)).analysis.motion
     assert verdict.verdict.period in {None, 1}
@@ -119,7 +119,7 @@ def unsettled_step(folder, hz, damping, seed):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_step_that_has_not_settled_is_reported_to_change_or_has_a_bound_that_holds(tmp_path, seed):
+def test_an_unsettled_step_is_reported_or_has_a_valid_bound(tmp_path, seed):
     """44.38 +- 0.51 was said instead of 49.97, and 246.6 +- 0.58 instead of 249.8."""
     rng = np.random.default_rng(seed)
     hz, damping = (
@@ -139,7 +139,7 @@ def test_a_step_that_has_not_settled_is_reported_to_change_or_has_a_bound_that_h
     assert (check.verdict is Verdict.WARNING) == is_changing
 
 
-def test_random_scatter_of_parts_is_no_slow_change_and_a_trend_is():
+def test_a_trend_is_a_slow_change_and_random_scatter_is_not():
     rng = np.random.default_rng(1)
     found = [
         slow_change(1 + 1e-3 * (rng.standard_normal(10) + 1j * rng.standard_normal(10))) for _ in range(400)
@@ -149,7 +149,7 @@ def test_random_scatter_of_parts_is_no_slow_change_and_a_trend_is():
     assert slow_change(1 - 1e-3 * np.exp(-np.linspace(0, 0.6, 10))) > 0
 
 
-def test_a_drift_of_the_sensor_does_not_swing_at_the_ends_of_a_step(tmp_path):
+def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
     """Response I 0.0886 +- 0.0006 was reported of a weak step whose truth is 0.0871."""
     hz = 416.15
     motion, time_s = synthetic.sine(2.0, hz, A0_M), synthetic.times(2.0)
@@ -163,7 +163,7 @@ def test_a_drift_of_the_sensor_does_not_swing_at_the_ends_of_a_step(tmp_path):
     assert result.analysis.response.response_i[0] == pytest.approx(1.0, abs=2e-3)
 
 
-def test_a_maximum_that_one_short_fault_makes_has_no_bound(dwell):
+def test_a_maximum_caused_by_one_short_fault_has_no_bound(dwell):
     """17.9 +- 2.5 was reported where 3 ms without light were read as motion, and 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))
     assert result.analysis.motion.verdict.kind is MotionKind.UNDECIDED

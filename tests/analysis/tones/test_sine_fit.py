@@ -20,7 +20,7 @@ def test_a_sine_is_found_exactly(frequency_hz, phase, count):
     assert np.angle(np.exp(1j * (fit.phase_rad - phase))) == pytest.approx(0, abs=1e-8)
 
 
-def test_the_stated_spreads_are_the_scatter():
+def test_the_stated_spreads_match_the_scatter():
     rng = np.random.default_rng(1)
     clean = np.cos(2 * np.pi * 260.3 * np.arange(4096) / RATE + 0.5)
     fits = [fit_sine(clean + 0.3 * rng.standard_normal(4096), RATE, near_hz=260) for _ in range(200)]
