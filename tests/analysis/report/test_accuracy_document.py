@@ -51,7 +51,7 @@ def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark, page_o
     assert page.count("| **quick** |") == page.count("; Radau ") == 2
 
 
-def test_the_page_has_the_shares_of_start_independent_scenes(benchmark, page_of):
+def test_the_page_has_the_shares_of_scenes_sensitive_to_the_start(benchmark, page_of):
     page = page_of(benchmark)
     (lottery,) = benchmark.lotteries
     rows = [line for line in page.splitlines() if line.startswith(f"| {lottery.lottery.name}")]

@@ -15,7 +15,7 @@ STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])
 
 
-def test_without_contact_it_is_the_matrix_exponential():
+def test_without_contact_the_solution_is_the_matrix_exponential():
     specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6, 0.3)
     omega = 2.0 * math.pi * drive.frequency_hz
     unit = np.linalg.inv(specimen.mass_matrix)
@@ -32,14 +32,14 @@ def test_without_contact_it_is_the_matrix_exponential():
 
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.5", "power:3+7", "power:47"])
-def test_the_engine_at_reference_agrees_with_it(contact):
+def test_the_engine_at_reference_accuracy_matches_the_independent_solution(contact):
     specimen, drive = gong2025(contact=contact), Harmonic(130.0, 20e-6, 0.3)
     state = independent_state(specimen, drive, 0.002, MOVING)
     engine = integrate(specimen, drive, 0.002, Accuracy.REFERENCE, MOVING).final_state
     assert state_error(engine, state) < 1e-8
 
 
-def test_a_start_within_a_stop_is_a_start_in_contact():
+def test_a_start_beyond_the_gap_is_in_contact():
     specimen = gong2025()
     pressed = np.array([0.0, 47e-6, 0.0, 0.0, 0.0, 0.0])
     engine = integrate(specimen, STILL, 0.01, Accuracy.REFERENCE, pressed).final_state

@@ -21,7 +21,7 @@ SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 @pytest.mark.parametrize(
     "motion", [m for m in MOTIONS if m.regime is not Regime.CHAOTIC], ids=lambda m: m.name
 )
-def test_every_level_keeps_its_promise(motion):
+def test_every_level_meets_its_stated_accuracy(motion):
     start = settled_state(motion)
     span_s = round(0.1 * motion.frequency_hz) / motion.frequency_hz
     truth = independent_state(motion.specimen, motion.drive, span_s, start)
@@ -30,7 +30,7 @@ def test_every_level_keeps_its_promise(motion):
         assert state_error(found, truth) <= level.promise
 
 
-def test_a_periodic_motion_buys_digits_and_chaos_buys_none():
+def test_higher_levels_improve_periodic_motion_and_not_chaos():
     periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error
@@ -51,6 +51,6 @@ def test_in_chaos_the_start_matters_more_than_the_level():
     assert "as good as any" in chaotic.advice
 
 
-def test_a_motion_that_is_not_what_it_is_called_is_refused():
+def test_a_motion_of_another_kind_than_declared_is_refused():
     with pytest.raises(ArithmeticError, match="is called periodic"):
         settled_state(Motion(Regime.PERIODIC, "hertz", 260.0, 5e-6))

@@ -15,7 +15,7 @@ PERIODS = 12
 
 
 @pytest.mark.thorough
-def test_a_small_distance_from_an_unstable_motion_grows_by_e_in_the_growth_time():
+def test_distance_from_an_unstable_motion_grows_by_e_in_the_growth_time():
     specimen = replace(gong2025(), contact=PowerLaw(100e-6, ((3, 0.1 * gong2025().stiffnesses[1] * 100e-6),)))
     found = next(shot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
     branch = found.branch
@@ -33,7 +33,7 @@ def test_a_small_distance_from_an_unstable_motion_grows_by_e_in_the_growth_time(
     assert grown_s == pytest.approx(told_s, rel=0.02)
 
 
-def test_what_does_not_grow_takes_for_ever_and_longer_motions_take_longer():
+def test_stable_motions_have_an_infinite_growth_time():
     times_s = growth_time_s([100.0, 100.0], [0.3, np.e])
     assert np.isinf(times_s[0])
     assert times_s[1] == pytest.approx(0.01)
@@ -41,6 +41,6 @@ def test_what_does_not_grow_takes_for_ever_and_longer_motions_take_longer():
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf])
-def test_a_loop_time_that_is_none_is_refused(wrong):
+def test_an_invalid_loop_time_is_refused(wrong):
     with pytest.raises(ValueError, match="positive and finite"):
         least_growth_time_s(wrong)

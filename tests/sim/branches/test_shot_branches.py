@@ -132,7 +132,7 @@ def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
 
 
 @pytest.mark.thorough
-def test_every_point_comes_back_within_its_error_whatever_its_stability(near_the_first_resonance):
+def test_every_point_repeats_within_its_error(near_the_first_resonance):
     specimen = gong2025()
     for found in near_the_first_resonance:
         branch = found.branch
@@ -159,7 +159,7 @@ def test_an_isolated_branch_of_period_three_is_found_from_random_states(near_the
 
 
 @pytest.mark.thorough
-def test_where_a_symmetry_breaks_the_other_branch_begins_and_ends(near_the_first_resonance):
+def test_the_asymmetric_branch_begins_and_ends_at_symmetry_breaking(near_the_first_resonance):
     mirrored = near_the_first_resonance[0]
     assert (mirrored.periods, mirrored.shape) == (1, OrbitShape.MIRRORED)
     (broken,) = (e for e in near_the_first_resonance if e.origin is BranchOrigin.SYMMETRY_BREAKING)
@@ -170,7 +170,7 @@ def test_where_a_symmetry_breaks_the_other_branch_begins_and_ends(near_the_first
     assert sorted(joins) == pytest.approx(sorted(own), abs=0.02)
 
 
-def test_a_grazing_point_is_where_the_linear_motion_reaches_the_gap():
+def test_at_a_grazing_point_the_linear_motion_reaches_the_gap():
     specimen = gong2025()
     free = gong2025(contact="linear")
     linear = steady_response(free, Harmonic(60.0, 1e-6), "reference", 20.0, 1.0)
@@ -181,7 +181,7 @@ def test_a_grazing_point_is_where_the_linear_motion_reaches_the_gap():
 
 
 @pytest.mark.slow
-def test_on_rigid_stops_a_branch_is_exact_and_where_it_is_lost_a_contact_grazes():
+def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
     specimen = gong2025(contact="rigid:0.8")
     found = list(shot_branches(specimen, FrequencyPath((20e-6,)), 110.0, 150.0, FEW))
     assert found
@@ -194,7 +194,7 @@ def test_on_rigid_stops_a_branch_is_exact_and_where_it_is_lost_a_contact_grazes(
             assert branch.events[-1].kind is BifurcationKind.GRAZING
 
 
-def test_under_a_recorded_level_each_point_is_its_own_motion_level():
+def test_each_point_uses_the_recorded_level_at_its_frequency():
     specimen = gong2025()
     path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))
     found = next(shot_branches(specimen, path, 126.0, 138.0, FEW))
@@ -209,6 +209,6 @@ def test_under_a_recorded_level_each_point_is_its_own_motion_level():
 @pytest.mark.parametrize(
     ("amplitudes", "frequencies"), [((), ()), ((1e-6, 2e-6), ()), ((1e-6, 2e-6), (2.0, 1.0)), ((0.0,), ())]
 )
-def test_a_level_that_is_none_is_refused(amplitudes, frequencies):
+def test_an_invalid_level_is_refused(amplitudes, frequencies):
     with pytest.raises(ValueError, match="not allowed"):
         FrequencyPath(amplitudes, frequencies)

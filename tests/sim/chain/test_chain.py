@@ -31,7 +31,7 @@ def test_a_link_pulls_on_the_outer_masses_of_its_own_cell_and_of_the_one_before(
     np.testing.assert_array_equal(stiffness, stiffness.T)
 
 
-def test_a_chain_survives_a_round_trip_through_its_serialised_form():
+def test_a_chain_round_trips_through_serialisation():
     adapter = TypeAdapter(Chain)
     chain = Chain((gong2025(), gong2025(contact="power:5", gap_m=30e-6)))
     assert adapter.validate_json(adapter.dump_json(chain)) == chain

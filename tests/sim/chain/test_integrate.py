@@ -85,7 +85,7 @@ def independent(chain, drive, duration_s, state):
     return np.concatenate([now[:size].reshape(-1, 3), now[size:].reshape(-1, 3)], axis=1)
 
 
-def test_cells_of_every_law_move_together_as_an_independent_integrator_states():
+def test_coupled_cells_of_every_law_match_an_independent_integrator():
     paper = gong2025()
     chain = Chain(
         (
@@ -104,7 +104,7 @@ def test_cells_of_every_law_move_together_as_an_independent_integrator_states():
     assert distance(ours.final_state, theirs) < 1e-7
 
 
-def test_sixty_four_cells_driven_hard_stay_finite_and_strike_in_order():
+def test_sixty_four_strongly_driven_cells_stay_finite():
     run = integrate_chain(chain_of(gong2025(), 64), Harmonic(220.0, 500e-6), 0.03, initial_state=lively(64))
     assert run.outcome is Outcome.REACHED_END
     assert np.all(np.isfinite(run.final_state))
@@ -120,7 +120,7 @@ def test_a_run_with_more_impacts_than_allowed_reports_it_and_keeps_what_it_has()
     assert 0.0 < run.end_time_s < 2.0
 
 
-def test_a_motion_too_large_for_any_statement_ends_as_not_finite():
+def test_an_overflowing_motion_ends_as_not_finite():
     fast = [[0.0, 0.0, 0.0, 1e160, -1e160, 1e160]] * 2
     run = integrate_chain(chain_of(gong2025(), 2), Harmonic(220.0, 1e-6), 0.1, initial_state=fast)
     assert run.outcome is Outcome.NOT_FINITE

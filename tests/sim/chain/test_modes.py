@@ -41,7 +41,7 @@ def test_the_modes_make_up_the_state_matrix_and_the_unit_matrix(chain):
     assert np.max(np.abs(again - system) / scale) < 1e-10
 
 
-def test_cells_whose_frequencies_coincide_still_have_a_full_set_of_modes():
+def test_coinciding_frequencies_have_a_full_set_of_modes():
     apart = replace(gong2025(), stiffnesses=(1e-9, *gong2025().stiffnesses[1:]), dampings=(0.0, 0.0, 0.0))
     chain = chain_of(apart, 6)
     modes = chain_modal_form(chain)
@@ -55,7 +55,7 @@ def test_critical_damping_is_refused_in_one_sentence():
         chain_modal_form(chain_of(gong2025(damping_time_s=2.0 / omega), 2))
 
 
-def test_one_cell_answers_its_base_as_the_specimen_does():
+def test_one_cell_has_the_transmissibility_of_the_specimen():
     frequencies = np.linspace(0.0, 700.0, 50)
     ours = chain_transmissibility(chain_of(gong2025(), 1), frequencies)
     np.testing.assert_allclose(
@@ -65,7 +65,7 @@ def test_one_cell_answers_its_base_as_the_specimen_does():
 
 @given(frequency=st.floats(5.0, 1500.0), cells=st.integers(1, 40), damping=st.floats(1e-6, 1e-4))
 @settings(max_examples=40, deadline=None)
-def test_a_finite_chain_answers_as_its_two_bloch_waves_do(frequency, cells, damping):
+def test_a_finite_chain_responds_as_two_bloch_waves(frequency, cells, damping):
     """The free end reflects: x_n = U cos((N - n + 1/2) mu) / cos((N + 1/2) mu), written in q = exp(i mu)."""
     specimen = gong2025(damping_time_s=damping)
     ours = chain_transmissibility(chain_of(specimen, cells), [frequency])[0, :, 0]
@@ -86,7 +86,7 @@ def test_in_a_gap_a_long_chain_decays_from_cell_to_cell_as_a_bloch_wave():
             np.testing.assert_allclose(x[1:20] / x[:19], decay, rtol=max(1e-8, 2.0 * decay**41))
 
 
-def test_outside_the_gaps_an_undamped_wave_keeps_its_size_and_its_phase_is_the_wave_number():
+def test_undamped_waves_in_bands_keep_their_amplitude():
     specimen, phases = gong2025(damping_time_s=0.0), np.linspace(0.1, 3.0, 12)
     for band in band_frequencies_hz(chain_of(specimen, 1), phases).T:
         factors = bloch_factor(chain_of(specimen, 1), band)

@@ -25,7 +25,7 @@ PERIODIC = Harmonic(130.0, 20e-6)
 @pytest.mark.parametrize(
     "contact", ["hertz", "linear", "power:5", "power:3+5+7", "linear_gap:2e5", "hunt_crossley:0.5"]
 )
-def test_one_cell_is_followed_as_the_specimen_is_in_chaos_too(contact):
+def test_one_cell_matches_the_specimen_also_in_chaos(contact):
     specimen, drive = gong2025(contact=contact), Harmonic(220.0, 40e-6)
     ours = chain_response(chain_of(specimen, 1), drive, duration_s=1.0, window_s=0.5)
     theirs = steady_response(specimen, drive, duration_s=1.0, window_s=0.5)
@@ -96,7 +96,7 @@ def test_without_contact_both_responses_are_the_transmissibility():
     np.testing.assert_allclose(response.lines_m, -1j * drive.amplitude_m * moved, rtol=1e-8)
 
 
-def test_a_run_that_does_not_reach_its_end_has_no_response():
+def test_an_incomplete_run_has_no_response():
     response = chain_response(
         chain_of(gong2025(), 2), Harmonic(220.0, 40e-6), duration_s=2.0, window_s=1.0, max_impact_rate_hz=1.0
     )
@@ -106,7 +106,7 @@ def test_a_run_that_does_not_reach_its_end_has_no_response():
 
 
 @pytest.mark.parametrize(("drive", "duration_s"), [(PERIODIC, 1e12), (Harmonic(1e10, 1e-6), 2.0)])
-def test_a_run_of_more_windows_than_anybody_waits_for_is_refused(drive, duration_s):
+def test_a_run_of_too_many_windows_is_refused(drive, duration_s):
     with pytest.raises(
         ValueError, match=r"^[\de+]+ s of 2 cells are not allowed: they take .* shorten the run"
     ):
@@ -129,7 +129,7 @@ def test_anything_that_cannot_be_observed_is_refused_in_one_sentence(drive, wind
 @pytest.mark.parametrize(
     ("contact", "cells", "drive"), [("linear", 4, Harmonic(3e5, 1.0)), ("power:47", 20, Harmonic(42.0, 0.1))]
 )
-def test_a_requested_time_holds_where_a_window_takes_longer(contact, cells, drive):
+def test_a_requested_time_is_met_even_if_a_window_takes_longer(contact, cells, drive):
     chain = chain_of(gong2025(gap_m=1e-6, contact=contact), cells)
     chain_response(chain, drive, duration_s=1.0 / drive.frequency_hz, window_s=1.0 / drive.frequency_hz)
     began_s = time.thread_time()
@@ -143,7 +143,7 @@ def test_a_requested_time_holds_where_a_window_takes_longer(contact, cells, driv
     assert np.all(np.isinf(found.errors))
 
 
-def test_a_time_in_which_no_drive_period_can_be_followed_is_refused():
+def test_a_time_too_short_for_a_drive_period_is_refused():
     chain = chain_of(gong2025(0.1, 10.0, "power:3"), 4)
     with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to follow"):
         chain_response_to(chain, Harmonic(0.21, 2.71e-7), None, 0.5)

@@ -21,7 +21,7 @@ def answer_to_an_impulse(chain, later):
 
 
 @pytest.mark.parametrize("damping_time_s", [0.0, 2e-5, 1e-4])
-def test_no_answer_within_a_window_exceeds_its_bound(damping_time_s):
+def test_responses_within_a_window_stay_below_their_bound(damping_time_s):
     chain = chain_of(gong2025(damping_time_s=damping_time_s), 4)
     window = 40e-6
     bounds = cross_answers(markov_between(chain), window)
@@ -34,7 +34,7 @@ def test_no_answer_within_a_window_exceeds_its_bound(damping_time_s):
                     assert relative[i, j] <= bounds[abs(i - j)] * (1.0 + 1e-6) + 1e-15
 
 
-def test_neighbours_answer_with_the_third_power_of_the_window_when_damped_and_the_sixth_when_not():
+def test_neighbour_coupling_grows_with_the_third_or_sixth_power_of_the_window():
     for damping_time_s, order in ((2e-5, 3.0), (0.0, 6.0)):
         between = markov_between(chain_of(gong2025(damping_time_s=damping_time_s), 2))
         coarse, fine = (cross_answers(between, window)[1] for window in (1e-6, 0.5e-6))
@@ -42,7 +42,7 @@ def test_neighbours_answer_with_the_third_power_of_the_window_when_damped_and_th
 
 
 @pytest.mark.parametrize("accuracy", list(Accuracy))
-def test_the_short_window_lets_even_neighbours_press_together_within_the_tolerance(accuracy):
+def test_the_short_window_keeps_simultaneous_contacts_within_tolerance(accuracy):
     chain = chain_of(gong2025(), 6)
     tables = chain_tables(chain, DRIVE, accuracy)
     allowed = CROSS_SHARE * accuracy.tolerance
@@ -53,7 +53,7 @@ def test_the_short_window_lets_even_neighbours_press_together_within_the_toleran
     assert np.all(np.diff(tables.windows) < 0.0)
 
 
-def test_the_paper_s_cells_never_wait_for_each_other_at_standard_accuracy():
+def test_cells_of_the_paper_are_independent_at_standard_accuracy():
     tables = chain_tables(chain_of(gong2025(), 8), DRIVE, Accuracy.STANDARD)
     assert tables.clash[0] == 0
     assert chain_tables(chain_of(gong2025(), 8), DRIVE, Accuracy.REFERENCE).clash[0] > 0

@@ -36,7 +36,7 @@ def followed(start, until, tolerance, drive=DRIVE):
     return run.state, seen
 
 
-def test_a_collision_that_nothing_presses_lasts_and_deepens_as_hertz_has_it():
+def test_a_free_collision_has_duration_and_depth_of_hertz():
     shapes, durations = collision_shapes()
     place = round(-SOFTEST / SPACING)
     lasts = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
@@ -48,7 +48,7 @@ def test_a_collision_that_nothing_presses_lasts_and_deepens_as_hertz_has_it():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("speed", [0.02, 0.05, 0.3, 1.0])
-def test_it_ends_as_the_steps_of_a_contact_do(speed, side):
+def test_a_whole_collision_ends_like_its_steps(speed, side):
     start = touching(speed, side, 2e-6)
     state, _ = followed(start, 1e-4, STANDARD)
     by_steps, _ = followed(start, 1e-4, 1e-11)
@@ -61,14 +61,14 @@ def test_mirrored_collisions_are_mirrored_to_the_last_bit():
 
 
 @pytest.mark.parametrize(("speed", "drive"), [(1e-6, DRIVE), (0.1, Harmonic(50_000.0, 1e-9))])
-def test_anything_that_is_not_known_beforehand_is_left_to_the_steps(speed, drive):
+def test_unpredictable_collisions_are_resolved_in_steps(speed, drive):
     start = touching(speed)
     state, _ = followed(start, 1e-4, STANDARD, drive)
     by_steps, _ = followed(start, 1e-4, 1e-11, drive)
     assert np.abs((state - by_steps) / SCALES).max() < STANDARD
 
 
-def test_a_collision_that_is_cut_in_its_midst_is_resolved_in_steps():
+def test_an_interrupted_collision_is_resolved_in_steps():
     start = touching(0.1)
     run = FollowedRun(gong2025(), DRIVE, STANDARD, start)
     for until_s in (1e-5, 2e-5, 1e-4):
@@ -91,7 +91,7 @@ def test_peaks_lines_samples_and_small_changes_match_the_steps(speed):
     np.testing.assert_allclose(seen.states / SCALES, told.states / SCALES, atol=3e-6)
 
 
-def test_x_that_turns_within_a_collision_is_seen_at_its_peak():
+def test_a_peak_of_x_within_a_collision_is_found():
     start = touching(0.1, 1.0, 20e-6)
     start[3] = 1e-3
     _, seen = followed(start, 1e-4, STANDARD)

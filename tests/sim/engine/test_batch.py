@@ -57,7 +57,7 @@ def off(found, states):
     return np.abs((found - states) / scale).max(axis=-1)
 
 
-def test_random_motions_in_a_batch_are_as_near_to_strict_steps_as_those_one_by_one():
+def test_batched_motions_are_as_accurate_as_single_ones():
     drives, starts = random_scenes(40, 2026)
     periods = [max(1, math.ceil(0.01 * drive.frequency_hz)) for drive in drives]
     beside, alone = [], []
@@ -77,7 +77,7 @@ def test_random_motions_in_a_batch_are_as_near_to_strict_steps_as_those_one_by_o
     assert np.median(np.array(beside) / np.maximum(alone, 1e-9)) < 10.0
 
 
-def test_a_motion_that_repeats_is_followed_to_the_same_states_for_ever():
+def test_a_periodic_motion_reaches_the_same_states_repeatedly():
     drive = Harmonic(130.0, 2e-5)
     settled = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
     (found,) = followed(SPECIMEN, [drive], [settled], [1000])
@@ -101,7 +101,7 @@ def test_a_motion_that_ends_in_contact_continues_from_there():
     assert off(on_stop.motion, exact.final_state) < 1e-3
 
 
-def test_a_motion_is_the_same_alone_among_others_and_in_another_order():
+def test_a_motion_does_not_depend_on_the_batch():
     drives, starts = random_scenes(20, 3)
     periods = [1 + 13 * k for k in range(20)]
     together = followed(SPECIMEN, drives, starts, periods)
@@ -134,7 +134,7 @@ def test_batches_follow_hertz_stops_and_lightly_damped_modes(specimen: Specimen,
     assert is_batchable(specimen, tolerance) is follows
 
 
-def test_stops_at_unequal_gaps_are_each_touched_where_they_are():
+def test_stops_with_unequal_gaps_are_touched_at_their_positions():
     specimen = gong2025(gap_m=(30e-6, 60e-6))
     drives, starts = [Harmonic(200.0 + k, 1e-5) for k in range(8)], [np.zeros(6)] * 8
     for drive, start, found in zip(drives, starts, followed(specimen, drives, starts, [6] * 8), strict=True):
@@ -143,7 +143,7 @@ def test_stops_at_unequal_gaps_are_each_touched_where_they_are():
         assert off(found.states[-1], alone[-1]) < 1e-4
 
 
-def test_a_specimen_that_no_batch_follows_is_refused_in_a_sentence():
+def test_a_specimen_unsuitable_for_batches_is_refused():
     with pytest.raises(ValueError, match="cannot be followed in a batch"):
         followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 

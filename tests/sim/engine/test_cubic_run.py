@@ -57,7 +57,7 @@ def test_without_contact_an_interval_is_exact(interval_s, contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_motion_does_not_depend_on_where_the_intervals_end(contact):
+def test_a_motion_does_not_depend_on_the_intervals(contact):
     specimen, speed, reached = gong2025(damping_time_s=3e-5, contact=contact), 0.3, []
     for intervals in (1, 7, 64):
         length = 2e-3 / intervals
@@ -69,7 +69,7 @@ def test_a_motion_does_not_depend_on_where_the_intervals_end(contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_run_cut_between_intervals_is_the_whole_one_to_the_last_bit(contact):
+def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 40e-6, 0.05, 2e-5)
     whole, record = carried(specimen, pieces, 2e-5)
     run, parts = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(100_000)
@@ -87,7 +87,7 @@ def test_standard_is_as_far_from_reference_as_it_promises(contact):
     assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
 
 
-def test_a_run_ends_at_the_impact_for_which_there_is_no_room():
+def test_a_run_ends_at_the_impact_beyond_its_storage():
     specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
     _, whole = carried(specimen, pieces, 2e-5)
     run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)
@@ -97,7 +97,7 @@ def test_a_run_ends_at_the_impact_for_which_there_is_no_room():
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_drive_that_is_not_a_number_is_reported_and_does_not_hang(contact):
+def test_a_nan_drive_is_reported_without_hanging(contact):
     pieces = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
     run = CubicRun(gong2025(contact=contact), 1e-5, np.zeros(6), Accuracy.STANDARD.tolerance)
     motions, impacts = run.follow(pieces, RunRecord(10))
@@ -105,7 +105,7 @@ def test_a_drive_that_is_not_a_number_is_reported_and_does_not_hang(contact):
     assert run.advance(pieces, RunRecord(10)) is not Outcome.REACHED_END
 
 
-def test_an_interval_without_length_and_ends_outside_of_one_are_refused():
+def test_empty_intervals_and_outside_ends_are_refused():
     with pytest.raises(ValueError, match=r"Interval 0\.0 s is not allowed"):
         CubicRun(gong2025(), 0.0, np.zeros(6), 1e-7)
     run = CubicRun(gong2025(), 1e-5, np.zeros(6), 1e-7)

@@ -39,7 +39,7 @@ def final_motions(engine):
             yield np.concatenate([run.motion, seen, np.ravel(run.changes)])
 
 
-def test_batches_have_the_same_digits_in_registers_of_every_width(build):
+def test_batches_give_equal_digits_for_every_register_width(build):
     families = [each for each in usable_families() if each != "x86_64"]  # which cannot fuse
     starts = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 6)) * np.repeat([1.5e-5, 0.05], 3)
     answers = []
@@ -55,7 +55,7 @@ def test_batches_have_the_same_digits_in_registers_of_every_width(build):
         assert np.array_equal(answer, answers[0])
 
 
-def test_every_family_that_runs_here_gives_the_same_digits(build):
+def test_every_processor_family_gives_equal_digits(build):
     engines = [Engine(build.compile_engine(family)) for family in usable_families()]
     for engine in engines:
         check_known_answer(engine)
@@ -78,13 +78,13 @@ def test_the_loaded_engine_is_built_from_the_sources_of_this_checkout(build):
     assert engine.path.stat().st_size < 3_000_000
 
 
-def test_an_engine_that_answers_wrongly_is_refused(monkeypatch):
+def test_an_engine_with_wrong_results_is_refused(monkeypatch):
     monkeypatch.setattr("vibench.sim.engine.run.KNOWN_DURATION_S", 0.0301)
     with pytest.raises(EngineError, match="fails its self-test"):
         check_known_answer(native_engine())
 
 
-def test_structures_are_read_from_what_the_compiler_read():
+def test_structures_match_the_compiled_header():
     types = parse_structures(
         ["Inner { double a, b; Phasor c[2]; }", "Outer { int64_t n; Inner d[3]; const Inner *e; }"]
     )
@@ -96,7 +96,7 @@ def test_structures_are_read_from_what_the_compiler_read():
         parse_structures(["Inner { double a-b; }"])
 
 
-def test_arrays_whose_sizes_disagree_are_refused_and_none_is_needed():
+def test_arrays_of_wrong_size_are_refused_and_may_be_omitted():
     engine = native_engine()
     arrays = {"samples": np.ones(9), "positions": np.ones(5), "table": np.ones((4, 64)), "values": np.ones(5)}
     for name, found in (("positions", np.ones(4)), ("table", np.ones(256 + 1)), ("samples", np.ones(9))):
@@ -125,7 +125,7 @@ def test_threads_share_tables_and_give_the_same_motion():
     assert all(np.array_equal(each, motions[0]) for each in motions)
 
 
-def test_a_scene_with_numbers_that_no_specimen_has_is_refused():
+def test_a_scene_with_impossible_values_is_refused():
     engine, specimen = native_engine(), gong2025()
     scene = scene_of(engine, specimen, Harmonic(130.0, 20e-6))
     scene["specimen"]["m0"] = np.nan
@@ -133,7 +133,7 @@ def test_a_scene_with_numbers_that_no_specimen_has_is_refused():
         engine.prepare(scene)
 
 
-def test_an_instant_that_is_no_number_is_refused():
+def test_a_nan_time_is_refused():
     run = NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 3e-7)
     with pytest.raises(ValueError, match="instant must be finite"):
         run.advance(np.nan, RunRecord(0))
@@ -152,7 +152,7 @@ def test_an_engine_older_than_its_sources_is_rebuilt_or_refused_with_the_command
         library_path()
 
 
-def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, monkeypatch):
+def test_an_installed_engine_needs_no_sources(tmp_path, monkeypatch):
     family = usable_families()[-1]
     ending = native_engine().path.suffix
     installed = tmp_path / f"engine-{family}-000000000000{ending}"
@@ -166,7 +166,7 @@ def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, mon
         library_path()
 
 
-def test_threads_that_ask_first_at_once_share_one_table_of_collisions():
+def test_concurrent_first_requests_share_one_collision_table():
     """Runs point into it: a second one was dropped while it was used, and numbers were wrong."""
     engine, threads = Engine(library_path()), 8
     start = threading.Barrier(threads)

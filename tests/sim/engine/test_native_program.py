@@ -43,14 +43,14 @@ def test_the_program_of_tests_passes_under_the_sanitizers(tmp_path):
     assert "all checks passed" in output_of(tmp_path / "program", *files)
 
 
-def test_a_broken_structure_is_answered_by_a_code():
+def test_a_broken_structure_returns_an_error_code():
     assert "-1:" in output_of(sys.executable, FUZZ, native_engine().path, "--count", 3000)
 
 
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_broken_structures_do_nothing_undefined(tmp_path):
+def test_broken_structures_cause_no_undefined_behaviour(tmp_path):
     library = tmp_path / "engine-sanitized.so"
     output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "api.cpp", "-o", library)
     runtime = output_of("g++", "-print-file-name=libasan.so").strip()

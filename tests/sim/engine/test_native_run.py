@@ -31,7 +31,7 @@ def test_standard_is_as_far_from_reference_as_it_promises(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_random_scenes_end_where_strict_steps_do(law):
+def test_random_scenes_match_strict_steps(law):
     draws = np.random.default_rng(45)
     for _ in range(12):
         gaps = tuple(float(gap) for gap in draws.uniform(15e-6, 80e-6, 2))
@@ -48,7 +48,7 @@ def test_random_scenes_end_where_strict_steps_do(law):
         assert distance(run.motion, strict.motion) < 1e-5
 
 
-def test_changes_that_grow_beyond_all_numbers_are_kept_as_logarithms():
+def test_overflowing_perturbations_are_stored_as_logarithms():
     run, record = NativeRun(gong2025(), Harmonic(260.0, 5e-6), np.zeros(6), 3e-7), RunRecord(100_000)
     run.carry(np.eye(6)[:1])
     assert run.advance(20.0, record) is Outcome.REACHED_END

@@ -48,7 +48,7 @@ def test_peaks_and_lines_match_the_samples(law, tolerance):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_anything_that_is_observed_changes_no_step(law):
+def test_observers_do_not_change_the_steps(law):
     drive = Harmonic(260.0, 5e-6)
     motions = []
     for watch in Watch:

@@ -87,6 +87,6 @@ def test_a_lost_run_has_no_exponent_and_states_why():
         ({"initial_state": np.zeros(5)}, "six finite numbers"),
     ],
 )
-def test_anything_that_makes_no_run_is_refused(options, message):
+def test_invalid_runs_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         lyapunov_exponent(gong2025(), CHAOS, **options)

@@ -25,7 +25,7 @@ def shrinking(specimen):
 @pytest.mark.thorough
 @pytest.mark.parametrize("drive", [CHAOS, Harmonic(260.0, 1e-6)])
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5", "power:47", "linear", "rigid:1"])
-def test_the_exponents_add_up_to_what_the_dampers_take(contact, drive):
+def test_the_sum_of_exponents_is_the_damping(contact, drive):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)
     found = lyapunov_spectrum(specimen, drive, Accuracy.REFERENCE, duration_s=1.0, settle_s=0.2)
     assert shrinking(specimen) == pytest.approx(-390.081, abs=1e-3)
@@ -34,12 +34,12 @@ def test_the_exponents_add_up_to_what_the_dampers_take(contact, drive):
 
 
 @pytest.mark.parametrize(("accuracy", "allowed"), [(Accuracy.QUICK, 1e-2), (Accuracy.STANDARD, 1e-4)])
-def test_each_level_of_accuracy_keeps_its_part_of_the_sum(accuracy, allowed):
+def test_each_accuracy_level_meets_its_error_of_the_sum(accuracy, allowed):
     found = lyapunov_spectrum(gong2025(), LARGE, accuracy, duration_s=2.0, settle_s=0.2)
     assert found.sum_per_s == pytest.approx(shrinking(gong2025()), rel=allowed)
 
 
-def test_a_lossy_contact_takes_more_than_the_dampers():
+def test_a_lossy_contact_lowers_the_sum_of_exponents():
     lossy = lyapunov_spectrum(gong2025(contact="hunt_crossley:0.5"), CHAOS, duration_s=4.0)
     assert lossy.sum_per_s < shrinking(gong2025()) - 5.0
 
@@ -57,7 +57,7 @@ def test_without_damping_the_exponents_come_in_pairs_of_opposite_sign(contact):
     )
 
 
-def test_the_first_of_six_is_the_largest_alone():
+def test_the_first_of_six_exponents_is_the_largest():
     six = lyapunov_spectrum(gong2025(), CHAOS)
     one = lyapunov_exponent(gong2025(), CHAOS)
     allowed = math.hypot(six.standard_errors_per_s[0], one.standard_error_per_s)
@@ -75,7 +75,7 @@ def test_without_impacts_the_exponents_are_the_decays_of_the_modes():
 
 
 @pytest.mark.parametrize(("drive", "left"), [(Harmonic(130.0, 20e-6), 4), (CHAOS, 5)])
-def test_a_stop_without_rebound_takes_two_directions_where_it_holds_m1_and_one_where_it_does_not(drive, left):
+def test_a_stop_without_rebound_removes_one_or_two_directions(drive, left):
     found = lyapunov_spectrum(gong2025(contact="rigid:0"), drive, duration_s=4.0, settle_s=1.0)
     assert found.outcome is Outcome.REACHED_END
     assert np.count_nonzero(np.isfinite(found.exponents_per_s)) == left
@@ -92,5 +92,5 @@ def test_a_stop_without_rebound_takes_two_directions_where_it_holds_m1_and_one_w
         ([2.0, -math.inf], 1.0),
     ],
 )
-def test_the_dimension_is_kaplan_and_yorkes(exponents, dimension):
+def test_the_dimension_is_that_of_kaplan_and_yorke(exponents, dimension):
     assert kaplan_yorke(np.array(exponents)) == pytest.approx(dimension, abs=1e-4)

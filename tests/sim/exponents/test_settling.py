@@ -59,7 +59,7 @@ def test_a_section_that_is_no_whole_number_of_periods_is_not_called_periodic():
     assert found.motion is FinalMotion.THROUGHOUT
 
 
-def test_an_exponent_that_falls_to_nothing_does_so_where_it_is_made_to():
+def test_the_time_at_which_an_exponent_vanishes_is_found():
     growth = noise(0.0)
     growth[:260] += 2.0
     found = settling(a_run(growth), np.ones(6))
@@ -68,19 +68,19 @@ def test_an_exponent_that_falls_to_nothing_does_so_where_it_is_made_to():
 
 
 @pytest.mark.parametrize("tail", [1.0, 3.0])
-def test_chaos_that_becomes_weaker_or_stronger_has_not_died_out(tail):
+def test_chaos_of_changing_strength_has_not_ended(tail):
     growth = noise(2.0)
     growth[200:] += tail - 2.0
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT
 
 
-def test_order_that_becomes_chaos_has_not_died_out():
+def test_periodic_motion_that_turns_chaotic_has_not_ended():
     growth = noise(2.0)
     growth[:200] -= 3.0
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT
 
 
-def test_no_change_is_seen_in_noise_about_nothing():
+def test_no_change_is_found_in_noise_around_zero():
     found = [settling(a_run(noise(0.0, seed)), np.ones(6)).motion for seed in range(40)]
     assert found.count(FinalMotion.SETTLED) == 0
 
@@ -89,7 +89,7 @@ def test_no_change_is_seen_in_noise_about_nothing():
     ("drive", "source"),
     [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)],
 )
-def test_the_specimens_chaos_that_dies_out_is_reported_with_its_time_and_its_exponent(drive, source):
+def test_transient_chaos_is_reported_with_time_and_exponent(drive, source):
     # Each start lives in chaos for a time of its own; what comes after is one and the same.
     spread = np.repeat([2e-5, 2e-2], 3)
     starts = [np.random.default_rng(seed).uniform(-1.0, 1.0, 6) * spread for seed in range(14)]

@@ -41,7 +41,7 @@ def make(tmp_path):
 
 
 @pytest.mark.parametrize("fill", POINTING)
-def test_a_file_that_gives_out_other_files_is_refused_unless_that_is_allowed(make, fill):
+def test_external_links_in_a_file_are_refused_unless_allowed(make, fill):
     path = make(fill)
     with pytest.raises(UnsafeHdf5, match=r"/x points into another file.*--allow-external"):
         open_hdf5(path)
@@ -83,12 +83,12 @@ def too_many_attributes(file):
         (too_many_attributes, "more than 1000 attributes"),
     ],
 )
-def test_sizes_that_cannot_be_are_refused_before_anything_is_read(make, fill, said):
+def test_impossible_sizes_are_refused_before_reading(make, fill, said):
     with pytest.raises(UnsafeHdf5, match=said):
         open_hdf5(make(fill))
 
 
-def test_a_type_of_numbers_that_nobody_has_is_refused(make):
+def test_an_unknown_number_type_is_refused(make):
     def odd(file):
         kind = h5py.h5t.IEEE_F64LE.copy()
         kind.set_ebias(20_000)
@@ -98,7 +98,7 @@ def test_a_type_of_numbers_that_nobody_has_is_refused(make):
         open_hdf5(make(odd))
 
 
-def test_a_file_that_was_cut_short_is_refused(make):
+def test_a_truncated_file_is_refused(make):
     path = make(lambda file: file.create_dataset("x", data=np.arange(10_000)))
     content = path.read_bytes()
     path.write_bytes(content[: len(content) - 2000])
@@ -106,7 +106,7 @@ def test_a_file_that_was_cut_short_is_refused(make):
         open_hdf5(path)
 
 
-def test_a_group_that_holds_itself_is_gone_through_once(make):
+def test_a_group_that_contains_itself_is_visited_once(make):
     def circle(file):
         file.create_group("a")
         file["a/again"] = file["a"]

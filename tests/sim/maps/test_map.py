@@ -67,7 +67,7 @@ def test_anything_that_cannot_be_mapped_is_reported_in_a_sentence(said, complain
         Map.model_validate(said)
 
 
-def test_values_of_a_range_lie_as_asked_and_between_their_edges():
+def test_values_of_a_range_are_at_the_requested_positions():
     for each in (FREQUENCIES, LEVELS):
         values, edges = np.array(each.values), np.array(each.edges)
         assert (values[0], values[-1]) == pytest.approx((each.start, each.stop), rel=1e-12)
@@ -77,7 +77,7 @@ def test_values_of_a_range_lie_as_asked_and_between_their_edges():
 
 
 @pytest.mark.parametrize(("points", "step"), [(15, 1), (17, 2), (40, 4), (129, 16), (600, 16)])
-def test_a_small_map_is_computed_rather_than_filled_in(points, step):
+def test_a_small_map_is_computed_completely(points, step):
     levels = LEVELS.model_copy(update={"points": 700})
     plan = Map(frequency_hz=FREQUENCIES.model_copy(update={"points": points}), amplitude_m=levels)
     assert plan.first_step == step
@@ -103,7 +103,7 @@ def test_every_quantity_reaches_the_scene():
     assert scene.start.state == (0.0, 0.0, 0.0, 0.0, 0.01, 0.0)
 
 
-def test_random_starts_differ_and_are_the_same_again():
+def test_random_starts_differ_and_are_reproducible():
     plan = Map(frequency_hz=FREQUENCIES, random_starts=3, seed=4)
     assert plan.start_labels == ("rest", "random 1", "random 2", "random 3")
     states = [plan.scene((k, 2)).start.state for k in range(4)]
@@ -112,7 +112,7 @@ def test_random_starts_differ_and_are_the_same_again():
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6), (60.0, 1e-6)])
-def test_a_settled_scene_is_the_motion_that_the_whole_answer_describes(frequency_hz, amplitude_m):
+def test_a_settled_scene_matches_its_full_answer(frequency_hz, amplitude_m):
     scene = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m).scene(
         (0, 1)
     )
@@ -164,7 +164,7 @@ def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():
     assert math.isfinite(several.most_useful_workers)
 
 
-def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_followed():
+def test_the_largest_cost_of_a_map_grows_with_its_drive_periods():
     plan = Map(frequency_hz=FREQUENCIES, amplitude_m=2e-5)
     usual, long = (estimate_map(plan.model_copy(update={"periods": each}), 1) for each in (3000, 300_000))
     assert usual.work_s <= usual.longest_work_s < 0.02 * long.longest_work_s
@@ -182,13 +182,13 @@ def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_
         ({"gap_m": Range(start=30e-6, stop=60e-6, points=3)}, False),
     ],
 )
-def test_points_of_one_specimen_that_wait_for_nobody_go_through_batches(said, lanes):
+def test_independent_points_of_one_specimen_are_computed_in_batches(said, lanes):
     plan = Map(frequency_hz=FREQUENCIES, **said)
     assert (map_solver(plan) == InBatches(Question.MOTION)) is lanes
     assert ("lanes" in estimate_map(plan, 1).sentence) is lanes
 
 
-def test_a_scene_settles_the_same_in_batches_whatever_is_settled_beside_it():
+def test_settling_in_a_batch_does_not_depend_on_other_scenes():
     plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
     scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
     together = [each.prediction for each in solve_scenes(scenes, Question.MOTION)]
@@ -270,7 +270,7 @@ def test_a_diagram_with_an_error_keeps_states_once_a_drive_period():
         ({"error": 2.0}, "less than or equal to 1"),
     ],
 )
-def test_what_a_target_of_a_map_decides_is_not_given_beside_it(given, said):
+def test_options_fixed_by_an_error_target_of_a_map_are_refused(given, said):
     with pytest.raises(ValidationError, match=f"(?i){said}"):
         Map(**{"frequency_hz": Range(start=120, stop=140, points=3), "error": 0.01, **given})
 

@@ -60,7 +60,7 @@ def test_every_cell_is_computed_or_filled_in_once():
     st.floats(9, 40),
     st.sampled_from([2, 4, 8]),
 )
-def test_anything_that_is_wider_than_the_lattice_is_filled_in_right(shape, centre, radius, coarse):
+def test_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
     known, plan = refined(codes, coarse)
     is_wrong = filled_codes(codes, known, plan) != codes
@@ -68,7 +68,7 @@ def test_anything_that_is_wider_than_the_lattice_is_filled_in_right(shape, centr
     assert is_wrong.sum() <= 4
 
 
-def test_a_line_thinner_than_the_lattice_is_followed_once_it_is_met():
+def test_a_thin_line_is_refined_once_it_is_found():
     codes = np.zeros((65, 65), dtype=np.int64)
     columns = np.arange(65)
     codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
@@ -77,7 +77,7 @@ def test_a_line_thinner_than_the_lattice_is_followed_once_it_is_met():
     assert known.mean() < 0.3
 
 
-def test_a_jump_of_the_response_is_found_though_the_kind_is_the_same():
+def test_a_response_jump_within_one_kind_is_found():
     codes = np.zeros((40, 40), dtype=np.int64)
     sizes = np.where(np.indices(codes.shape)[1] > 17, 1.0, 0.0)
     known, _ = refined(codes, 8, sizes=sizes)
@@ -85,7 +85,7 @@ def test_a_jump_of_the_response_is_found_though_the_kind_is_the_same():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_map_that_was_stopped_computes_the_same_cells(seed):
+def test_a_stopped_map_computes_the_same_cells(seed):
     codes = disc((45, 60), (20, 30), 11) + 2 * disc((45, 60), (35, 50), 6)
     rng = np.random.default_rng(seed)
     whole, plan = refined(codes)
@@ -95,7 +95,7 @@ def test_a_map_that_was_stopped_computes_the_same_cells(seed):
     assert np.array_equal(plan.audited_donors, other.audited_donors)
 
 
-def test_the_audit_finds_what_filling_in_got_wrong():
+def test_the_audit_finds_wrongly_filled_cells():
     # Single cells between the points of the lattice: nothing but chance finds them.
     rng = np.random.default_rng(5)
     codes = (rng.random((129, 129)) < 0.02).astype(np.int64)
@@ -110,7 +110,7 @@ def test_the_audit_finds_what_filling_in_got_wrong():
     assert (sum(audit.gained), sum(audit.lost)) == (audit.wrong, audit.wrong)
 
 
-def test_shares_of_a_map_that_was_filled_in_but_not_audited_are_as_wide_as_what_was_filled_in():
+def test_unaudited_filled_cells_widen_the_shares():
     unaudited = Audit(filled=30, audited=0, wrong=0, gained=(0.0, 0.0), lost=(0.0, 0.0))
     shares = unaudited.corrected((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
     assert [each.share for each in shares] == [0.9, 0.1]
@@ -123,7 +123,7 @@ def test_shares_of_a_map_that_was_filled_in_but_not_audited_are_as_wide_as_what_
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("rare", [0.02, 0.15])
-def test_shares_hold_though_what_is_rare_among_others_is_filled_in_too_seldom(rare):
+def test_share_intervals_hold_for_rare_kinds(rare):
     held, middles = 0, []
     for seed in range(20):
         rng = np.random.default_rng(seed)

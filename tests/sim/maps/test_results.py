@@ -21,7 +21,7 @@ def adaptive():
     return solve_map(PLAN)
 
 
-def test_an_adaptive_map_has_what_the_full_one_has_wherever_it_was_computed(adaptive):
+def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     full = solve_map(PLAN.model_copy(update={"refinement": "full"}))
     is_computed = adaptive.state == PointState.DONE
     assert 0 < adaptive.computed < full.computed == PLAN.grid.size
@@ -65,7 +65,7 @@ def test_several_starts_show_how_many_motions_there_are(several_starts):
     assert counts.max() > 1
 
 
-def test_shares_of_starts_that_every_cell_shares_are_no_surer_than_so_many_starts(several_starts):
+def test_shares_over_common_starts_have_the_uncertainty_of_the_starts(several_starts):
     for found in (several_starts.motions, several_starts.motions_at(0, 0)):
         assert sum(each.share.share for each in found) == pytest.approx(1.0)
         for each in found:
@@ -126,7 +126,7 @@ def test_noise_has_no_exponent():
 
 
 @pytest.mark.thorough
-def test_where_impacts_begin_is_refined_and_what_is_filled_in_wrong_is_in_the_audit():
+def test_the_onset_of_impacts_is_refined_and_audited():
     """Soft stops are touched without a jump of the response, which alone was looked at."""
     soft = {
         "hertz_stiffness": 1e6,

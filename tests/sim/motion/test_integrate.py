@@ -39,7 +39,7 @@ def test_phase_does_not_drift_over_a_million_periods():
     np.testing.assert_allclose(late, start, rtol=1e-11, atol=0)
 
 
-def test_without_damping_and_drive_the_energy_stays_through_a_thousand_impacts():
+def test_energy_is_conserved_through_a_thousand_impacts():
     specimen = gong2025(damping_time_s=0.0)
     state = np.array([2e-5, 0.0, -4e-5, 0.1, 0.05, -0.2])
     run = integrate(
@@ -50,7 +50,7 @@ def test_without_damping_and_drive_the_energy_stays_through_a_thousand_impacts()
     np.testing.assert_allclose(held, held[0], rtol=2e-10 * run.impacts.count)
 
 
-def test_in_a_periodic_motion_the_drive_does_the_work_that_the_dampers_take():
+def test_drive_work_equals_damping_work_in_a_periodic_motion():
     specimen, drive = paper(), PERIODIC
     settled = integrate(specimen, drive, 10.0, Accuracy.REFERENCE).final_state
     per_period = 20_000
@@ -87,7 +87,7 @@ def test_samples_lie_on_the_motion_in_flight_and_in_contact(contact):
         assert distance(there.final_state, run.states[index]) < 1e-8
 
 
-def test_a_sampled_sine_drives_like_the_sine_itself_with_order_four():
+def test_a_sampled_sine_converges_to_the_sine_with_order_four():
     specimen = paper()
     harmonic = integrate(specimen, PERIODIC, 0.25, Accuracy.REFERENCE)
     errors = []
@@ -112,7 +112,7 @@ def test_a_sweep_agrees_with_an_independent_integrator_within_its_stated_error()
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(60.0, 550.0), st.floats(1.5e-6, 10e-6))
-def test_no_impact_is_missed_that_a_fine_grid_of_samples_sees(frequency_hz, amplitude_m):
+def test_no_impact_on_a_fine_grid_is_missed(frequency_hz, amplitude_m):
     specimen = paper()
     run = integrate(specimen, Harmonic(frequency_hz, amplitude_m), 0.05, sample_rate_hz=1e6)
     pressed = np.abs(run.states[:, 1] - run.states[:, 2]) > specimen.gap_m

@@ -15,7 +15,7 @@ def shaken_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
 
 
 @pytest.mark.parametrize("amplitude_m", [0.0, 1e-7, 2e-6, 2e-5])
-def test_it_is_the_motion_that_integration_gives(amplitude_m):
+def test_following_samples_equals_integration(amplitude_m):
     drive = shaken_base(amplitude_m)
     followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
     duration_s = (len(drive.displacement_m) - 1) / RATE_HZ
@@ -36,7 +36,7 @@ def test_impacts_are_counted_in_the_interval_they_begin_in():
     assert np.flatnonzero(followed.impacts)[:10].tolist() == first.tolist()
 
 
-def test_continuing_from_a_state_is_the_same_as_not_stopping():
+def test_continuing_from_a_state_equals_the_whole_run():
     drive = shaken_base(2e-6, seconds=0.05)
     rest = Sampled(np.zeros(100), RATE_HZ)
     begun = follow_samples(gong2025(), drive)
@@ -45,7 +45,7 @@ def test_continuing_from_a_state_is_the_same_as_not_stopping():
     np.testing.assert_allclose(decayed.states, free.states, rtol=0, atol=1e-12)
 
 
-def test_a_motion_that_leaves_the_numbers_stops_where_it_did():
+def test_an_overflowing_motion_stops_at_its_last_sample():
     samples = np.zeros(1000)
     samples[500:] = 1e280
     followed = follow_samples(gong2025(), Sampled(samples, RATE_HZ))

@@ -11,7 +11,7 @@ from vibench.sim.operating_system import this as _state_folder
 from vibench.sim.operating_system.this import state_folder
 
 
-def test_the_variable_comes_before_everything(monkeypatch, tmp_path):
+def test_the_environment_variable_takes_precedence(monkeypatch, tmp_path):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     assert state_folder() == tmp_path
 
@@ -26,9 +26,7 @@ def test_the_variable_comes_before_everything(monkeypatch, tmp_path):
         ("win32", "", "home/AppData/Local/vibench"),
     ],
 )
-def test_each_system_keeps_state_where_it_keeps_such_things(
-    monkeypatch, tmp_path, platform, variable, expected
-):
+def test_each_system_uses_its_standard_state_folder(monkeypatch, tmp_path, platform, variable, expected):
     if platform == "win32":
         monkeypatch.setattr(_state_folder, "usual_state_folder", windows().usual_state_folder)
     elif not hasattr(os, "fork"):

@@ -61,7 +61,7 @@ class Sawtooth:
 
 
 @pytest.mark.parametrize("longest", [0.01, 0.1, 0.3])
-def test_a_circle_is_followed_once_round_with_its_folds_at_plus_and_minus_one(longest):
+def test_a_circle_is_followed_once_with_both_folds(longest):
     steps = ArcSteps(first=0.005, longest=longest, most_points=2000)
     points = list(trace(Circle(), np.array([-1.0, 0.0]), 1.0, (-2.0, 2.0), steps))
     assert points[-1].end is ArcEnd.CLOSED
@@ -72,7 +72,7 @@ def test_a_circle_is_followed_once_round_with_its_folds_at_plus_and_minus_one(lo
     assert folds == pytest.approx([1.0, -1.0], abs=1e-9)
 
 
-def test_both_folds_of_a_snap_are_located_and_the_end_lies_on_the_bound():
+def test_both_folds_of_a_snap_through_are_located():
     points = list(trace(Snap(), np.array([-1.5, -1.875]), 1.0, (-1.875, 1.0), ArcSteps()))
     folds = [p.point for p in points if p.is_fold]
     peak = 2.0 / (3.0 * math.sqrt(3.0))
@@ -99,13 +99,13 @@ def test_a_step_beyond_a_sharp_fold_does_not_land_on_another_branch(longest):
     assert [p.point[-1] for p in points if p.is_fold] == pytest.approx([1.0, -1.0], abs=1e-8)
 
 
-def test_equations_that_cease_to_exist_end_the_branch_with_a_reason():
+def test_undefined_equations_end_the_branch_with_a_reason():
     last = list(trace(Edge(), np.array([0.0, 0.0]), 1.0, (-1.0, 1.0), ArcSteps()))[-1]
     assert last.end is ArcEnd.STEP_TOO_SHORT
     assert last.point[-1] == pytest.approx(0.5, abs=1e-5)
 
 
-def test_kinks_beside_kinks_end_the_branch_soon():
+def test_repeated_kinks_end_the_branch_soon():
     points = list(trace(Sawtooth(), np.array([0.0, -0.1]), 1.0, (-1.0, 1.0), ArcSteps()))
     assert points[-1].end is ArcEnd.STEP_TOO_SHORT
     assert points[-1].point[-1] == pytest.approx(0.0, abs=1e-3)
@@ -113,6 +113,6 @@ def test_kinks_beside_kinks_end_the_branch_soon():
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_the_first_step_goes_where_it_is_told(direction):
+def test_the_first_step_has_the_requested_direction(direction):
     points = list(trace(Snap(), np.array([0.0, 0.0]), direction, (-0.1, 0.1), ArcSteps()))
     assert points[-1].point[-1] == pytest.approx(0.1 * direction)

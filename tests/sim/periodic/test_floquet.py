@@ -41,7 +41,7 @@ def test_without_a_spring_the_multipliers_match_the_modes():
     "spring",
     [PowerSpring(0.5, ((3, 0.4),)), GapSpring(30.0, 1.0, 0.6, 0.6), GapSpring(30.0, 1.5, 0.6, math.inf)],
 )
-def test_departures_evolve_as_an_independent_integrator_states(spring):
+def test_perturbations_match_an_independent_integrator(spring):
     structure = oscillator()
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
 
@@ -67,7 +67,7 @@ def test_the_period_is_the_half_period_squared_for_a_mirrored_motion():
     np.testing.assert_allclose(transition(structure, spring, motion), half @ half, rtol=1e-6)
 
 
-def test_departures_shrink_in_volume_by_the_damping_alone():
+def test_the_volume_of_perturbations_shrinks_by_damping_only():
     # Liouville: det = exp(-tr(M^-1 C) T), whatever the contact does.
     specimen = gong2025(damping_time_s=3e-5)
     motion = Motion(130.0, np.array([1, 3]), np.array([50e-6 + 0j, 5e-6j]))

@@ -78,7 +78,7 @@ def test_the_largest_displacement_matches_the_exact_orbit(exact_orbit):
     assert found.response_i[3] == pytest.approx(largest / drive.amplitude_m, rel=1e-5)
 
 
-def test_what_the_drive_gives_the_dampers_take(exact_orbit):
+def test_drive_power_equals_damping_power(exact_orbit):
     specimen, drive, _, _ = exact_orbit
     found = balanced(exact_orbit, 401)
     omega = 2.0 * math.pi * drive.frequency_hz
@@ -95,7 +95,7 @@ def test_what_the_drive_gives_the_dampers_take(exact_orbit):
     assert given == pytest.approx(taken, rel=5e-4)
 
 
-def test_too_few_harmonics_report_it(exact_orbit):
+def test_too_few_harmonics_are_reported(exact_orbit):
     few = balanced(exact_orbit, 21)
     assert few.outcome is BalanceEnd.NO_SOLUTION
     more = balanced(exact_orbit, 101)

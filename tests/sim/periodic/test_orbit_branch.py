@@ -28,13 +28,13 @@ def upward():
     return periodic_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
 
 
-def test_a_branch_ends_where_it_is_asked_to(upward):
+def test_a_branch_ends_at_the_requested_value(upward):
     assert upward.end is ArcEnd.REACHED_BOUND
     assert upward.frequencies_hz[[0, -1]] == pytest.approx([100.0, 112.0])
     assert upward.response_ii.shape == (len(upward.frequencies_hz), 4)
 
 
-def test_a_symmetric_motion_followed_as_any_other_does_not_end_at_its_own_mirror_image():
+def test_a_symmetric_branch_does_not_end_at_its_mirror_image():
     """What lies between it and its mirror image is rounding, whose sign says nothing."""
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     branch = periodic_branch(orbit, Parameter.FREQUENCY, 130.2)
@@ -52,7 +52,7 @@ def test_at_a_neimark_sacker_point_a_complex_pair_lies_on_the_unit_circle(upward
         assert np.abs(orbit.floquet_multipliers[on_circle].imag).min() > 0.1
 
 
-def test_a_small_push_dies_on_a_stable_point_and_grows_on_an_unstable_one(upward):
+def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward):
     for is_stable in (True, False):
         place = int(np.flatnonzero(upward.is_stable == is_stable)[-1])
         drive = Harmonic(float(upward.frequencies_hz[place]), 5e-6)
@@ -69,7 +69,7 @@ def test_a_small_push_dies_on_a_stable_point_and_grows_on_an_unstable_one(upward
         assert 0.01 * expected < growth < 100.0 * expected
 
 
-def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_response():
+def test_a_branch_leaves_the_stops_at_linear_grazing():
     # Under a weak drive at 60 Hz, raised until p meets the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
     orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)
@@ -83,7 +83,7 @@ def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_res
 
 
 @pytest.mark.thorough
-def test_an_isolated_branch_closes_though_another_lies_beside_its_fold():
+def test_an_isolated_branch_closes_beside_another_branch():
     """At 94.188 Hz, where it turns back, the motion of one period lies beside it along the same tangent."""
     start = [9.918125e-07, -1.045327e-05, -2.993997e-06, 7.055605e-03, 2.760657e-02, 1.403336e-02]
     orbit = periodic_orbit(gong2025(), Harmonic(96.0, 5e-6), OrbitShape.MIRRORED, 3, start)
@@ -93,7 +93,7 @@ def test_an_isolated_branch_closes_though_another_lies_beside_its_fold():
     assert sorted(folds) == pytest.approx([94.1881, 98.8147], abs=2e-4)
 
 
-def test_a_branch_to_where_it_is_goes_nowhere():
+def test_a_branch_to_its_start_has_one_point():
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     with pytest.raises(ValueError, match="two different ends"):
         periodic_branch(orbit, Parameter.FREQUENCY, 130.0)

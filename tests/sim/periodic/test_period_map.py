@@ -33,7 +33,7 @@ def test_the_derivative_matches_differences_of_the_map(contact, shape):
     assert np.abs(by_differences(mapping, state, DRIVE) - exact).max() < 1e-6 * np.abs(exact).max()
 
 
-def test_two_periods_have_the_product_of_the_derivatives_of_each():
+def test_the_derivative_over_two_periods_is_the_product():
     mapping = PeriodMap(gong2025())
     state = integrate(gong2025(), DRIVE, 20 / DRIVE.frequency_hz).final_state
     between = mapping.image(state, DRIVE)
@@ -43,7 +43,7 @@ def test_two_periods_have_the_product_of_the_derivatives_of_each():
 
 
 @pytest.mark.parametrize(("contact", "power"), [("hertz", 1.0), ("linear_gap", 0.5)])
-def test_past_grazing_the_derivative_leaves_the_free_one_with_the_power_of_the_law(contact, power):
+def test_past_grazing_the_derivative_changes_with_the_power_of_the_law(contact, power):
     # The contact lasts as the square root of its depth d; its stiffness is d^0.5 (Hertz) or constant.
     specimen = gong2025(contact=contact)
     motion = base_transmissibility(specimen, DRIVE.frequency_hz)[0]

@@ -24,7 +24,7 @@ def hardening():
         (PhaseReference.ABSOLUTE, (480.0, 520.0)),
     ],
 )
-def test_between_the_stops_it_is_the_quadrature_of_the_linear_motion(of, band_hz):
+def test_without_contact_phase_resonance_is_linear_quadrature(of, band_hz):
     specimen = gong2025()
     branch = phase_resonance_branch(specimen, band_hz, (1e-8, 1e-7), of)
     assert np.ptp(branch.frequencies_hz) < 1e-6
@@ -37,7 +37,7 @@ def test_between_the_stops_it_is_the_quadrature_of_the_linear_motion(of, band_hz
 
 
 @pytest.mark.thorough
-def test_along_a_hardening_mode_every_motion_repeats_and_is_a_quarter_of_a_period_behind():
+def test_a_hardening_mode_is_periodic_with_90_degrees_lag():
     specimen = hardening()
     branch = phase_resonance_branch(specimen, (92.0, 97.0), (4e-7, 5e-6))
     assert branch.frequencies_hz[-1] > branch.frequencies_hz[0] + 10.0
@@ -61,13 +61,13 @@ def test_along_a_hardening_mode_every_motion_repeats_and_is_a_quarter_of_a_perio
         ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
     ],
 )
-def test_anything_that_has_no_phase_resonance_to_begin_with_is_refused(band_hz, levels_m, said):
+def test_a_start_without_phase_resonance_is_refused(band_hz, levels_m, said):
     with pytest.raises(ValueError, match=said):
         phase_resonance_branch(gong2025(), band_hz, levels_m)
 
 
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
-def test_what_newton_does_not_find_is_refused_and_not_reported_as_a_motion(low_m):
+def test_a_failed_newton_iteration_is_refused(low_m):
     """Its last guess was a "motion" at 17 Hz in a band of 92 to 97."""
     with pytest.raises(ValueError, match="No motion with this phase is found"):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))
@@ -78,6 +78,6 @@ def test_a_band_that_holds_several_modes_is_refused_with_their_frequencies():
         phase_resonance_branch(gong2025(), (50.0, 600.0), (1e-8, 1e-7))
 
 
-def test_without_damping_there_is_none():
+def test_without_damping_there_is_no_phase_resonance():
     with pytest.raises(ValueError, match="without damping has no phase resonance"):
         phase_resonance_branch(gong2025(0.0), (92.0, 97.0), (1e-8, 1e-7))

@@ -11,7 +11,7 @@ DRIVE = Harmonic(130.0, 20e-6)
 SCALES = np.repeat([1e-4, 0.1], 3)
 
 
-def test_a_law_that_does_next_to_nothing_leaves_the_linear_motion():
+def test_a_negligible_law_gives_the_linear_motion():
     specimen = replace(gong2025(), contact=PowerLaw(46e-6, ((3, 1e-20),)))
     start = np.array([1e-5, -2e-5, 1.5e-5, 0.01, -0.02, 0.03])
     found = integrate(specimen, DRIVE, 0.1, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
@@ -19,7 +19,7 @@ def test_a_law_that_does_next_to_nothing_leaves_the_linear_motion():
     np.testing.assert_allclose(found.states / SCALES, linear.states / SCALES, atol=2e-11)
 
 
-def test_springs_far_softer_than_the_law_cost_no_digits():
+def test_very_soft_springs_do_not_reduce_accuracy():
     # m1 and m2 on next to nothing: the modes turn a million times more slowly than the law does.
     soft = replace(
         gong2025(damping_time_s=0.0), stiffnesses=(1e-6, 1e-6, 1e-6), contact=PowerLaw(46e-6, ((3, 5.0),))

@@ -197,7 +197,7 @@ def bound_motion(specimen, drive, state, begin_s, end_s):
     return (expm(system * (end_s - begin_s)) @ np.concatenate([state[[0, 2, 3, 5]], base]))[:4]
 
 
-def test_held_on_a_stop_the_pair_moves_as_one_body_does():
+def test_a_pair_held_on_a_stop_moves_as_one_body():
     specimen = rigid(0.0)
     run = integrate(specimen, STICKING, 0.1, sample_rate_hz=1e5)
     first, last = held_stretch(run, specimen.gap_m)
@@ -206,7 +206,7 @@ def test_held_on_a_stop_the_pair_moves_as_one_body_does():
     np.testing.assert_allclose(run.states[last][[0, 2, 3, 5]], expected, rtol=1e-9)
 
 
-def test_m1_is_let_go_where_the_stop_would_have_to_pull():
+def test_m1_is_released_when_the_contact_force_vanishes():
     specimen = rigid(0.0)
     run = integrate(specimen, STICKING, 0.1, sample_rate_hz=1e6)
     first, last = held_stretch(run, specimen.gap_m)
@@ -256,7 +256,7 @@ def test_ever_stiffer_contacts_approach_rigid_stops_at_the_rate_of_their_contact
 
 
 @pytest.mark.parametrize("loss", [0.02, 1.0])
-def test_a_stiff_lossy_contact_is_a_rigid_stop_of_the_restitution_it_has_at_that_speed(loss):
+def test_a_stiff_lossy_contact_matches_a_rigid_stop_with_its_restitution(loss):
     speed, faint = 0.3, (1e-2, 2e-2, 3e-2)
     specimen = Specimen((1.0, 2.1e-3, 2.0e-3), faint, (0.0, 0.0, 0.0), 45e-6, HuntCrossley(1e17, loss))
     # r - ln(1 + loss r) / loss changes by as much on the way out as on the way in (Newton's iteration).
@@ -314,7 +314,7 @@ def hard_impact_times(omega, restitution, duration):
 
 
 @pytest.mark.parametrize(("omega", "restitution"), [(2.8, 0.8), (5.6, 0.8), (2.8, 0.95), (4.0, 0.95)])
-def test_the_hard_impact_oscillator_strikes_when_its_closed_form_does(omega, restitution):
+def test_the_hard_impact_oscillator_matches_its_closed_form(omega, restitution):
     specimen, drive, start = hard_oscillator(omega, restitution)
     run = integrate(specimen, drive, 60.0, initial_state=start)
     expected = hard_impact_times(omega, restitution, 60.0)
@@ -323,7 +323,7 @@ def test_the_hard_impact_oscillator_strikes_when_its_closed_form_does(omega, res
     np.testing.assert_allclose(run.impacts.times_s, expected, atol=1e-6)
 
 
-def test_the_hard_impact_oscillator_strikes_as_often_as_is_known_of_its_chaos():
+def test_the_hard_impact_oscillator_has_the_known_impact_rate_in_chaos():
     specimen, drive, start = hard_oscillator(2.8, 0.8)
     run = integrate(specimen, drive, 20_000.0, initial_state=start)
     assert run.outcome is Outcome.REACHED_END
@@ -331,21 +331,21 @@ def test_the_hard_impact_oscillator_strikes_as_often_as_is_known_of_its_chaos():
     assert run.impacts.count / 20_000.0 == pytest.approx(0.4711, abs=0.002)
 
 
-def test_without_chatter_the_accuracy_requested_changes_nothing():
+def test_accuracy_has_no_effect_without_chatter():
     finals = [integrate(rigid(0.8), BOUNCING, 2.0, level).final_state for level in Accuracy]
     np.testing.assert_array_equal(finals[0], finals[2])
     np.testing.assert_array_equal(finals[1], finals[2])
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
-def test_with_chatter_each_accuracy_keeps_to_its_tolerance(restitution):
+def test_each_accuracy_meets_its_tolerance_with_chatter(restitution):
     finals = {level: integrate(rigid(restitution), STICKING, 0.03, level).final_state for level in Accuracy}
     for level in (Accuracy.QUICK, Accuracy.STANDARD):
         assert distance(finals[level], finals[Accuracy.REFERENCE]) < level.tolerance
 
 
 @pytest.mark.parametrize(("restitution", "drive"), [(0.8, BOUNCING), (0.5, STICKING), (0.0, STICKING)])
-def test_a_sampled_sine_drives_rigid_stops_like_the_sine_itself(restitution, drive):
+def test_a_sampled_sine_with_rigid_stops_equals_the_sine(restitution, drive):
     specimen, rate = rigid(restitution), 40_000.0
     sine = drive.amplitude_m * np.sin(2.0 * np.pi * drive.frequency_hz * np.arange(1300) / rate)
     sampled = integrate(specimen, Sampled(sine, rate), 0.03, Accuracy.REFERENCE, sample_rate_hz=1e4)
@@ -355,7 +355,7 @@ def test_a_sampled_sine_drives_rigid_stops_like_the_sine_itself(restitution, dri
     assert distance(sampled.final_state, harmonic.final_state) < 1e-6
 
 
-def test_a_sweep_that_chatters_and_sticks_is_its_own_samples():
+def test_a_chattering_sweep_equals_its_sampled_drive():
     specimen, sweep, rate = rigid(0.7), LinearSweep(180.0, 220.0, 0.05, 50e-6), 200_000.0
     base = sweep.amplitude_m * np.sin(2.0 * np.pi * sweep.turns(np.arange(10_001) / rate))
     swept = integrate(specimen, sweep, 0.04, Accuracy.REFERENCE, sample_rate_hz=1e5)
@@ -370,7 +370,7 @@ def test_a_sweep_that_chatters_and_sticks_is_its_own_samples():
 @example(first_s=0.020404096147730984, restitution=0.6).via(
     "a release whose speed is rounding of either sign"
 )
-def test_a_run_in_two_parts_ends_where_the_whole_does_even_cut_while_held(first_s, restitution):
+def test_a_split_run_equals_the_whole_even_if_held(first_s, restitution):
     specimen = rigid(restitution)
     for drive in (STICKING, LinearSweep(180.0, 220.0, 0.03, 50e-6)):
         whole = integrate(specimen, drive, 0.03, Accuracy.REFERENCE)

@@ -33,7 +33,7 @@ def ledger(tmp_path, monkeypatch):
     ],
     ids=["hertz", "hertz, automatic", "power:5", "linear", "with a tangent"],
 )
-def test_scenes_take_what_was_stated_within_the_factor_that_was_stated(ledger, contact, duration, observe):
+def test_scenes_cost_the_estimate_within_its_factor(ledger, contact, duration, observe):
     random = np.random.default_rng(3)
     scenes = [
         Scene(
@@ -59,7 +59,7 @@ def test_scenes_take_what_was_stated_within_the_factor_that_was_stated(ledger, c
     assert np.count_nonzero(held) >= SCENES - 3
 
 
-def test_a_plan_says_its_cost_how_far_off_it_may_be_and_whence_it_knows(ledger):
+def test_a_plan_states_cost_uncertainty_and_source(ledger):
     scene = Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(3.0, 1.0))
     assert "too few such runs" in plan_scene(scene).explain()
     for _ in range(FEWEST):
@@ -69,7 +69,7 @@ def test_a_plan_says_its_cost_how_far_off_it_may_be_and_whence_it_knows(ledger):
     )
 
 
-def test_what_a_larger_budget_takes_is_learnt_apart(ledger):
+def test_costs_of_larger_budgets_are_learnt_separately(ledger):
     usual, patient = (Scene(gong2025(), Harmonic(260.0, 5e-6), budget_s=budget_s) for budget_s in (1.0, 10.0))
     for _ in range(FEWEST):
         learn_cost(usual, 0.1)
@@ -80,7 +80,7 @@ def test_what_a_larger_budget_takes_is_learnt_apart(ledger):
     assert 0.1 < plan_scene(replace(patient, budget_s=3.0)).cost_s < 4.0
 
 
-def test_a_pilot_knows_what_a_plan_does_not():
+def test_a_pilot_corrects_the_planned_cost():
     """The same map over 50 to 600 Hz was planned as 1.8 s, and took 21."""
     calm, chaotic, timed = (
         lambda _, drive=drive, target=target: Scene(gong2025(), drive, target=target)
@@ -96,7 +96,7 @@ def test_a_pilot_knows_what_a_plan_does_not():
     assert time.monotonic() - begun_s < 3.0 * 2.0
 
 
-def test_the_pilot_of_scenes_that_are_not_allowed_costs_nothing():
+def test_invalid_scenes_need_no_pilot():
     def refused(_):
         raise ValueError("not allowed")
 

@@ -13,7 +13,7 @@ def ledger(tmp_path):
     return CostLedger(tmp_path / "costs" / "here.json")
 
 
-def test_where_nothing_was_run_a_plan_stands_as_it_is_and_states_how_little_is_known(ledger):
+def test_without_experience_a_plan_keeps_its_estimate_and_wide_factor(ledger):
     expected = ledger.expected(KIND, 2.0)
     assert (expected.time_s, expected.runs) == (2.0, 0)
     assert expected.factor >= 10.0
@@ -21,7 +21,7 @@ def test_where_nothing_was_run_a_plan_stands_as_it_is_and_states_how_little_is_k
 
 
 @pytest.mark.parametrize("scatter", [0.05, 0.4, 1.0])
-def test_the_stated_factor_holds_as_often_as_it_states(ledger, scatter):
+def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
     random = np.random.default_rng(7)
     held = []
     for run in range(600):
@@ -36,13 +36,13 @@ def test_the_stated_factor_holds_as_often_as_it_states(ledger, scatter):
     assert np.mean(held) < 0.985 or scatter < 0.2
 
 
-def test_a_machine_that_slows_down_is_followed(ledger):
+def test_estimates_follow_a_slower_machine(ledger):
     for taken_s in [1.0] * 100 + [3.0] * 100:
         ledger.learn(KIND, 1.0, taken_s)
     assert ledger.expected(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
 
 
-def test_a_new_kind_is_expected_as_the_nearest_that_is_known(ledger):
+def test_a_new_kind_uses_the_nearest_known_kind(ledger):
     for _ in range(FEWEST):
         ledger.learn("event driven/hertz/standard", 1.0, 0.5)
         ledger.learn("polynomial/power/standard", 1.0, 4.0)
@@ -50,7 +50,7 @@ def test_a_new_kind_is_expected_as_the_nearest_that_is_known(ledger):
     assert ledger.expected("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
 
 
-def test_the_next_process_knows_it_still(ledger, tmp_path):
+def test_experience_is_kept_for_the_next_process(ledger, tmp_path):
     for taken_s in (0.2, 0.3, 0.25):
         ledger.learn(KIND, 1.0, taken_s)
     ledger.save()
@@ -63,13 +63,13 @@ def test_the_next_process_knows_it_still(ledger, tmp_path):
     "text",
     ["", "{", "[]", '{"a": 1}', '{"a": {"runs": -3, "mean": 0.0, "variance": 1.0}}', '{"a": {"mean": NaN}}'],
 )
-def test_a_damaged_file_is_as_none(tmp_path, text):
+def test_a_damaged_file_is_ignored(tmp_path, text):
     path = tmp_path / "here.json"
     path.write_text(text)
     assert CostLedger(path).expected("a", 1.0).runs == 0
 
 
-def test_a_folder_that_cannot_be_written_to_costs_nothing_but_the_memory(tmp_path):
+def test_an_unwritable_folder_only_loses_experience(tmp_path):
     (tmp_path / "costs").write_text("a file in the way")
     ledger = CostLedger(tmp_path / "costs" / "here.json")
     for _ in range(FEWEST):
@@ -78,14 +78,14 @@ def test_a_folder_that_cannot_be_written_to_costs_nothing_but_the_memory(tmp_pat
     assert ledger.expected(KIND, 1.0).runs == FEWEST
 
 
-def test_times_that_no_clock_saw_teach_nothing(ledger):
+def test_invalid_times_are_not_learnt(ledger):
     for _ in range(FEWEST):
         ledger.learn(KIND, 1.0, 0.0)
         ledger.learn(KIND, 0.0, 1.0)
     assert ledger.expected(KIND, 1.0).runs == 0
 
 
-def test_a_kind_that_was_not_run_lately_follows_a_machine_that_has_slowed(ledger):
+def test_unused_kinds_follow_a_slower_machine(ledger):
     random = np.random.default_rng(8)
     kinds = [f"method {number}/law" for number in range(6)]
     for run in range(60):
@@ -95,7 +95,7 @@ def test_a_kind_that_was_not_run_lately_follows_a_machine_that_has_slowed(ledger
     assert 1.2 < ledger.expected(kinds[5], 1.0).time_s < 2.6
 
 
-def test_one_surprise_moves_a_plan_by_little(ledger):
+def test_one_outlier_changes_a_plan_little(ledger):
     for _ in range(10):
         ledger.learn(KIND, 1.0, 1.0)
     ledger.learn(KIND, 1.0, 100.0)

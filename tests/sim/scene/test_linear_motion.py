@@ -11,7 +11,7 @@ DRIVE = Harmonic(137.0, 3e-6, phase_rad=0.7)
 START = (2e-6, -1e-6, 3e-6, 1e-3, -2e-3, 5e-4)
 
 
-def test_it_is_the_motion_that_the_integration_finds_from_any_start():
+def test_the_closed_form_matches_integration_from_any_start():
     motion = linear_motion(gong2025(contact="linear"), DRIVE, START)
     run = integrate(gong2025(contact="linear"), DRIVE, 0.3, Accuracy.REFERENCE, START, sample_rate_hz=1000.0)
     for time_s, state in zip(run.time_s[::30], run.states[::30], strict=True):
@@ -24,14 +24,14 @@ def test_it_is_the_motion_that_the_integration_finds_from_any_start():
     phase_rad=st.floats(0.0, 6.0),
     start=st.tuples(*[st.floats(-1e-5, 1e-5)] * 3, *[st.floats(-1e-2, 1e-2)] * 3),
 )
-def test_p_never_leaves_its_bound(frequency_hz, phase_rad, start):
+def test_p_stays_within_its_bound(frequency_hz, phase_rad, start):
     motion = linear_motion(gong2025(), Harmonic(frequency_hz, 2e-6, phase_rad), start)
     times = np.linspace(0.0, 0.2, 400)
     p = np.array([motion.state(time_s)[1] - motion.state(time_s)[2] for time_s in times])
     assert np.abs(p).max() <= motion.largest_p_m * (1.0 + 1e-12)
 
 
-def test_the_bound_is_met_where_all_parts_come_together():
+def test_the_bound_is_reached_when_all_parts_add_up():
     """At rest with no drive to speak of, a push in one mode alone reaches its own bound at once."""
     free = linear_motion(gong2025(damping_time_s=0.0, contact="linear"), Harmonic(1.0, 1e-30), (0.0,) * 6)
     assert free.largest_p_m < 1e-25
@@ -42,7 +42,7 @@ def test_the_bound_is_met_where_all_parts_come_together():
     assert 0.97 * pushed.largest_p_m < np.abs((turn + free_p).real).max() <= pushed.largest_p_m
 
 
-def test_the_start_is_forgotten_when_it_says_so():
+def test_the_transient_has_decayed_at_the_stated_time():
     motion = linear_motion(gong2025(), DRIVE, START)
     when_s = motion.died_away_s(1e-6)
     later = np.linspace(when_s, when_s + 0.05, 500)
@@ -53,12 +53,12 @@ def test_the_start_is_forgotten_when_it_says_so():
     assert motion.share_left(0.5 * when_s) > 1e-5
 
 
-def test_without_damping_the_start_is_never_forgotten():
+def test_without_damping_the_transient_never_decays():
     motion = linear_motion(gong2025(damping_time_s=0.0), DRIVE, START)
     assert motion.died_away_s(1e-3) == math.inf
 
 
-def test_a_stop_counts_as_untouched_only_by_proof():
+def test_a_stop_is_untouched_only_if_proven():
     quiet, loud = Harmonic(200.0, 1e-6), Harmonic(200.0, 1e-4)
     for contact in ("hertz", "linear_gap", "rigid:0.8"):
         specimen = gong2025(contact=contact)
@@ -69,6 +69,6 @@ def test_a_stop_counts_as_untouched_only_by_proof():
     assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))
 
 
-def test_numbers_that_grow_beyond_all_bounds_are_refused_in_a_sentence():
+def test_overflowing_numbers_are_refused_in_a_sentence():
     with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
         linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

@@ -9,13 +9,13 @@ QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "rigid:0.8", "linear"])
 @pytest.mark.parametrize("duration", [FixedDuration(), AutomaticDuration()], ids=["fixed", "automatic"])
-def test_what_provably_never_touches_is_answered_in_closed_form(contact, duration):
+def test_provably_contact_free_motion_is_answered_in_closed_form(contact, duration):
     plan = plan_scene(Scene(gong2025(contact=contact), QUIET, duration=duration))
     assert plan.method is Method.CLOSED_FORM
     assert "closed form" in plan.explain()
 
 
-def test_a_gap_that_may_be_crossed_by_the_transient_alone_is_followed():
+def test_possible_contact_of_the_transient_is_integrated():
     specimen = gong2025()
     begins_fast = Given((0.0, 0.0, 0.0, 0.0, 0.5, 0.0))
     plan = plan_scene(Scene(specimen, QUIET, start=begins_fast))
@@ -23,7 +23,7 @@ def test_a_gap_that_may_be_crossed_by_the_transient_alone_is_followed():
     assert "A stop may be touched" in plan.explain()
 
 
-def test_a_start_that_is_not_forgotten_before_the_window_is_followed():
+def test_a_transient_within_the_window_is_integrated():
     short = plan_scene(Scene(gong2025(), QUIET, duration=FixedDuration(0.2, 0.1)))
     undamped = plan_scene(Scene(gong2025(damping_time_s=0.0), QUIET))
     for plan in (short, undamped):
@@ -31,7 +31,7 @@ def test_a_start_that_is_not_forgotten_before_the_window_is_followed():
         assert "not forgotten" in plan.explain()
 
 
-def test_a_force_at_every_p_is_followed_throughout():
+def test_a_force_at_every_p_is_always_integrated():
     assert plan_scene(Scene(gong2025(contact="power:7"), QUIET)).method is Method.POLYNOMIAL
 
 
@@ -43,7 +43,7 @@ def test_a_force_at_every_p_is_followed_throughout():
         (Observable.SCATTER, "for their scatter"),
     ],
 )
-def test_only_what_is_observed_is_carried_along(observable, said):
+def test_only_requested_quantities_are_computed(observable, said):
     plain = plan_scene(Scene(gong2025(), LOUD))
     asked = plan_scene(Scene(gong2025(), LOUD, observe=(Observable.RESPONSE, observable)))
     assert said not in plain.explain()
@@ -51,7 +51,7 @@ def test_only_what_is_observed_is_carried_along(observable, said):
     assert asked.planned_s >= plain.planned_s
 
 
-def test_a_hundred_times_the_drive_periods_cost_more_without_a_contact():
+def test_cost_without_contact_grows_with_the_drive_periods():
     def cost(frequency_hz):
         drive = Harmonic(frequency_hz, 1e-9)
         length = FixedDuration(2.0, 1.9)

@@ -63,7 +63,7 @@ def test_a_small_error_costs_a_periodic_motion_no_more_than_a_large_one():
     assert rough.duration_s == fine.duration_s
 
 
-def test_the_mean_of_forgotten_starts_reaches_one_per_cent():
+def test_a_mean_over_starts_reaches_one_percent():
     found = solve_scene(asked(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert found.memory is StartMemory.LOST
     assert found.target.is_met
@@ -74,7 +74,7 @@ def test_the_mean_of_forgotten_starts_reaches_one_per_cent():
     assert again.response_ii == found.response_ii
 
 
-def test_better_answers_follow_one_another_until_the_time_is_over():
+def test_answers_improve_until_the_time_is_over():
     answers = list(refine_scene(asked(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
     reports = [each.target for each in answers]
     assert len(answers) > 1
@@ -102,7 +102,7 @@ def test_a_motion_without_contact_is_answered_in_closed_form():
     assert found.target.is_met
 
 
-def test_an_error_below_rounding_is_stated_not_to_be_reached():
+def test_an_error_below_rounding_is_reported_as_unreachable():
     report = solve_scene(asked(error=1e-15)).target
     assert not report.is_met
     assert report.needed_s is None
@@ -131,7 +131,7 @@ def test_the_time_of_one_drive_period_is_the_shortest():
         ({"observe": (Observable.SPECTRUM,)}, "spectrum"),
     ],
 )
-def test_what_a_target_decides_is_not_given_beside_it(given, named):
+def test_options_fixed_by_an_error_target_are_refused(given, named):
     with pytest.raises(ValueError, match=named):
         replace(asked(error=0.1), **given)
 
@@ -148,7 +148,7 @@ def test_a_window_may_be_named_beside_a_target():
     assert found.window_s == pytest.approx(1.0)
 
 
-def test_the_error_of_a_mean_holds_in_nineteen_cases_of_twenty():
+def test_the_error_of_a_mean_holds_in_95_percent():
     random = np.random.default_rng(3)
     held = [
         abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values], None)[0] * values.mean()

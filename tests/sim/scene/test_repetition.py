@@ -23,7 +23,7 @@ def test_a_repeating_section_has_its_shortest_period(period):
     assert found == Repetition(period, 0.0)
 
 
-def test_a_decay_is_there_once_what_is_left_of_it_is_small():
+def test_a_decay_has_settled_when_its_remainder_is_small():
     steps = np.arange(COUNT)
     slow = 1.0 + 1e-3 * np.exp(-steps / (3.0 * FORGETTING))
     assert repetition(section_of(slow), OMEGA, FORGETTING, SHARP) is None
@@ -46,12 +46,12 @@ def test_a_torus_and_a_noise_do_not_repeat():
     assert repetition(section_of(noise), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_two_periods_that_hardly_differ_are_not_distinguished_from_one_that_settles():
+def test_nearly_equal_periods_are_not_separated_from_settling():
     nearly_one = np.resize([1.0, 1.0 + 5e-6], COUNT)
     assert repetition(section_of(nearly_one), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_too_short_a_section_says_nothing():
+def test_too_short_a_section_gives_no_verdict():
     assert repetition(section_of(np.ones(5)), OMEGA, FORGETTING, SHARP) is None
 
 
@@ -71,5 +71,5 @@ def test_the_growth_of_a_small_change_states_what_does_not_repeat(logarithms, ki
     assert kind_of(None, growth, fading_s=0.25) is kind
 
 
-def test_anything_that_repeats_is_periodic_however_a_change_grew():
+def test_a_repeating_section_is_periodic_for_any_growth():
     assert kind_of(Repetition(3, 0.0), Growth(np.array([50.0]), 1.0), 0.25) is MotionKind.PERIODIC

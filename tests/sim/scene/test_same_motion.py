@@ -52,7 +52,7 @@ def reached(kind, period=None, factor=1.0, scatter=None, grew=None):
         (reached(CHAOS, None, 1.0, 0.02), reached(CHAOS, None, 1.5, 0.02), False),
     ],
 )
-def test_two_starts_came_to_the_same_motion(one, other, same):
+def test_equal_motions_of_two_starts_are_recognised(one, other, same):
     assert is_same(one, other) is same
     assert len(motions_among([one, other])) == (1 if same else 2)
 
@@ -62,7 +62,7 @@ def test_a_motion_is_named_by_the_start_that_shows_it_best():
     assert kind_among(motion, FORGETTING_S) is TORUS
 
 
-def test_weak_chaos_that_some_starts_take_for_a_torus_is_named_by_most_of_them():
+def test_weak_chaos_is_classified_by_the_majority_of_starts():
     starts = [reached(TORUS, None, 1.0, 0.01), reached(OPEN, None, 1.01, 0.01)]
     starts += [reached(CHAOS, None, factor, 0.01) for factor in (0.99, 1.0, 1.01)]
     (motion,) = motions_among(starts)
@@ -70,7 +70,7 @@ def test_weak_chaos_that_some_starts_take_for_a_torus_is_named_by_most_of_them()
     assert len(motion) == 5
 
 
-def test_chaos_that_comes_in_bursts_is_no_torus_though_most_starts_were_watched_between_them():
+def test_intermittent_chaos_is_not_classified_as_a_torus():
     """Hertz, 83.697 Hz, 11.59 um, gaps 42.18 and 14.47 um: 5 of 15 starts were calm for 4 s, 1 chaotic."""
     calm = [reached(TORUS, None, factor, 0.01) for factor in (0.99, 1.0, 1.0, 1.01, 1.0)]
     burst = reached(CHAOS, None, 1.0, 0.01, grew=(0.0, 13.8, 14.4, -1.0))
@@ -101,7 +101,7 @@ def test_one_of_several_chaotic_motions_may_become_another(kinds, final):
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_two_starts_of_one_motion_are_as_uncertain_as_the_worse_of_them(order):
+def test_merged_starts_have_the_larger_uncertainty(order):
     calm, burst = reached(TORUS, None, 1.0, 0.001), reached(CHAOS, None, 1.0, 0.02)
     errors = {id(calm): 1e-6, id(burst): 0.04}
     assert _error([calm, burst][::order], lambda each: errors[id(each)]) == 0.04

@@ -4,7 +4,7 @@ import pytest
 from vibench.sim.scene.scatter import bootstrap_of_largest, window_scatter
 
 
-def test_it_is_the_bootstrap_of_the_largest_in_closed_form():
+def test_the_scatter_is_the_closed_form_bootstrap_of_the_maximum():
     random = np.random.default_rng(3)
     peaks, blocks = random.gumbel(5.0, 0.3, 40), 5
     drawn = random.choice(peaks, (200_000, blocks)).max(axis=1)
@@ -13,7 +13,7 @@ def test_it_is_the_bootstrap_of_the_largest_in_closed_form():
     assert deviation == pytest.approx(drawn.std(), rel=0.01)
 
 
-def test_it_finds_the_known_scatter_of_a_gumbel_extreme():
+def test_the_scatter_of_a_gumbel_maximum_is_found():
     """The largest of n Gumbel values is Gumbel of the same width, ln n widths further out."""
     random = np.random.default_rng(4)
     width, blocks, many = 0.2, 5, 4000
@@ -22,7 +22,7 @@ def test_it_finds_the_known_scatter_of_a_gumbel_extreme():
     assert found.relative == pytest.approx(truth, rel=0.05)
 
 
-def test_few_blocks_state_nothing():
+def test_too_few_blocks_give_no_scatter():
     assert window_scatter(np.random.default_rng(5).uniform(1.0, 2.0, 3), 3) is None
 
 

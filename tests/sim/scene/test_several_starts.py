@@ -46,13 +46,13 @@ def short_chaos():
     return solve_scene(SHORT_CHAOS)
 
 
-def test_a_start_that_decides_is_said_to_and_costs_no_other_starts():
+def test_a_start_dependent_motion_is_named_without_further_starts():
     found = solve_scene(scene("hertz", 130.0, 20e-6))
     assert (found.memory, found.ensemble, found.is_one_of_several) == (StartMemory.KEPT, None, False)
     assert solve_scene(scene("hertz", 200.0, 1e-6)).memory is StartMemory.KEPT
 
 
-def test_without_a_budget_nothing_is_looked_for_but_chaos_shows_itself():
+def test_without_a_budget_only_chaos_is_recognised():
     quiet = solve_scene(scene("hertz", 130.0, 20e-6, budget_s=0.0))
     chaos = solve_scene(scene("hertz", 260.0, 5e-6, budget_s=0.0))
     assert (quiet.memory, quiet.ensemble) == (StartMemory.UNKNOWN, None)
@@ -60,7 +60,7 @@ def test_without_a_budget_nothing_is_looked_for_but_chaos_shows_itself():
     assert chaos.motion is MotionKind.CHAOTIC_SO_FAR
 
 
-def test_a_lottery_is_answered_with_the_motions_that_were_drawn_and_their_shares(lottery):
+def test_several_attractors_are_reported_with_their_shares(lottery):
     assert lottery.memory is StartMemory.LOST
     assert lottery.is_one_of_several
     ensemble = lottery.ensemble
@@ -73,7 +73,7 @@ def test_a_lottery_is_answered_with_the_motions_that_were_drawn_and_their_shares
     assert asked.response_i == pytest.approx(lottery.response_i, rel=0.3)
 
 
-def test_each_motion_of_a_lottery_is_one_that_a_start_really_comes_to(lottery):
+def test_each_reported_attractor_is_reached_by_a_start(lottery):
     """Another draw of pushes, each followed for long, comes to nothing that was not named or allowed for."""
     ensemble = lottery.ensemble
     known = [motion.response_i for motion in ensemble.motions]
@@ -87,7 +87,7 @@ def test_each_motion_of_a_lottery_is_one_that_a_start_really_comes_to(lottery):
     assert strange <= 1
 
 
-def test_chaos_that_dies_out_is_followed_to_the_motion_behind_it(short_chaos):
+def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     """5.22 after twelve seconds; in the end, 4.47."""
     assert (short_chaos.motion, short_chaos.period) == (MotionKind.PERIODIC, 1)
     assert short_chaos.response_i == pytest.approx(4.47, abs=0.01)
@@ -101,7 +101,7 @@ def test_chaos_that_dies_out_is_followed_to_the_motion_behind_it(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
-def test_starts_that_are_chaotic_so_far_may_come_to_a_motion_that_was_not_found():
+def test_still_chaotic_starts_may_reach_an_unknown_motion():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
     ).ensemble
@@ -110,7 +110,7 @@ def test_starts_that_are_chaotic_so_far_may_come_to_a_motion_that_was_not_found(
     assert found.unseen_share > pending / found.starts
 
 
-def test_chaos_that_lasts_has_a_least_lifetime():
+def test_lasting_chaos_has_a_lower_bound_of_lifetime():
     found = solve_scene(scene("hertz", 260.0, 5e-6))
     assert found.motion is MotionKind.CHAOTIC
     assert found.ensemble.escape.escapes == 0
@@ -123,7 +123,7 @@ def test_chaos_that_lasts_has_a_least_lifetime():
     assert not found.is_one_of_several
 
 
-def test_a_run_of_given_length_has_its_ensemble_too():
+def test_a_run_of_fixed_length_has_an_ensemble():
     found = solve_scene(scene("hertz", 240.5, 5e-6, damping_time_s=3e-5, duration=FixedDuration(12.0, 2.0)))
     assert (found.memory, found.duration_s) == (StartMemory.LOST, 12.0)
     assert found.ensemble.escape.escapes > 0
@@ -141,11 +141,11 @@ def test_the_scatter_over_starts_matches_their_responses():
     assert chaos.scatter == chaos.ensemble.scatter
 
 
-def test_the_same_scene_has_the_same_ensemble_again(short_chaos):
+def test_the_ensemble_of_a_scene_is_reproducible(short_chaos):
     assert solve_scene(SHORT_CHAOS).to_dict() == short_chaos.to_dict()
 
 
-def test_a_larger_budget_follows_more(short_chaos):
+def test_a_larger_budget_follows_more_starts(short_chaos):
     small = solve_scene(replace(SHORT_CHAOS, budget_s=0.02))
     assert small.ensemble is None or small.ensemble.followed_s < short_chaos.ensemble.followed_s
     with pytest.raises(ValueError, match=r"Budget -1\.0 s is not allowed: it must be zero or positive"):
@@ -159,7 +159,7 @@ def test_an_answer_for_json_states_every_motion(lottery):
     assert said["motions"][said["asked"]]["motion"] == str(lottery.motion)
 
 
-def test_more_starts_and_another_draw_can_be_requested():
+def test_number_and_draw_of_starts_can_be_chosen():
     """The same motions, in shares that the other draw's intervals hold."""
     fast = scene("linear_gap", 562.8, 20e-6)
     many = solve_ensemble(fast, starts=24, seed=5)
@@ -173,7 +173,7 @@ def test_more_starts_and_another_draw_can_be_requested():
 
 
 @pytest.mark.slow
-def test_many_starts_that_are_still_settling_do_not_make_chaos_last():
+def test_many_settling_starts_do_not_count_as_lasting_chaos():
     """Nearly undamped: each takes over 100 s, so that all together soon count more than chaos needs to."""
     settling = Scene(
         gong2025(1.27e-7, 27.83e-6, "power:3"), Harmonic(380.64, 9.778e-6), duration=AutomaticDuration()

@@ -8,7 +8,7 @@ from vibench.sim.scene.shares import Count, escape_rate, shares_of, wilson_share
 
 
 @pytest.mark.parametrize(("count", "trials"), [(0, 16), (1, 16), (5, 16), (16, 16), (37, 64)])
-def test_the_interval_of_a_share_is_wilsons(count, trials):
+def test_the_interval_of_a_share_is_that_of_wilson(count, trials):
     found = wilson_share(count, trials)
     known = binomtest(count, trials).proportion_ci(0.95, method="wilson")
     assert found.share == count / trials
@@ -26,14 +26,14 @@ def test_the_intervals_of_all_shares_together_hold_about_19_times_in_20(shares):
     assert held / len(drawn) > 0.93
 
 
-def test_anything_that_is_not_final_may_come_to_any_outcome():
+def test_unfinished_starts_may_reach_any_outcome():
     settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
     alone = wilson_share(6, 16)
     assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)
     assert (pending.share, pending.low, pending.high) == (10 / 16, 0.0, wilson_share(10, 16).high)
 
 
-def test_a_rate_of_escape_is_held_by_its_interval_where_lifetimes_are_cut_off():
+def test_escape_rate_intervals_hold_for_censored_lifetimes():
     """Exponential lifetimes of 20 s, each followed for 15 s at most."""
     random, held = np.random.default_rng(12), 0
     for _ in range(2000):
@@ -43,14 +43,14 @@ def test_a_rate_of_escape_is_held_by_its_interval_where_lifetimes_are_cut_off():
     assert 0.93 < held / 2000 < 0.99
 
 
-def test_chaos_that_nothing_escapes_has_a_least_lifetime_and_no_greatest():
+def test_chaos_without_escape_has_only_a_lower_bound_of_lifetime():
     found = escape_rate(0, 300.0)
     assert found.lifetime_above_s == pytest.approx(300.0 / np.log(20.0))
     assert found.lifetime_below_s == np.inf
     assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
 
 
-def test_of_several_outcomes_that_are_not_final_each_may_take_the_others():
+def test_each_unfinished_outcome_may_turn_into_another():
     one, other = shares_of([Count(4, is_final=False), Count(4, is_final=False)])
     assert (one.low, one.high) == (other.low, other.high) == (0.0, 1.0)
     settled, *open_ones = shares_of([Count(8, is_final=True), *2 * [Count(4, is_final=False)]])

@@ -65,7 +65,7 @@ def test_a_fixed_duration_answers_as_the_plain_run_does(contact, frequency_hz, a
 
 @pytest.mark.parametrize("accuracy", [Accuracy.QUICK, Accuracy.STANDARD])
 @pytest.mark.parametrize(("contact", "frequency_hz", "amplitude_m"), PERIODIC)
-def test_anything_that_repeats_is_no_further_from_the_reference_than_it_states(
+def test_periodic_motions_match_the_reference_within_their_error(
     contact, frequency_hz, amplitude_m, accuracy
 ):
     scene = scene_of(contact, frequency_hz, amplitude_m, duration=AutomaticDuration(), accuracy=accuracy)
@@ -91,7 +91,7 @@ def followed_s(monkeypatch):
     return lengths
 
 
-def test_whole_cycles_of_a_motion_that_repeats_are_passed_over(followed_s):
+def test_whole_cycles_of_a_periodic_motion_are_skipped(followed_s):
     specimen, drive = gong2025(), Harmonic(130.0, 20e-6)
     found = solve_scene(Scene(specimen, drive, duration=FixedDuration(30.0, 5.0)))
     assert sum(followed_s) < 22.0
@@ -102,12 +102,12 @@ def test_whole_cycles_of_a_motion_that_repeats_are_passed_over(followed_s):
     assert found.duration_s == pytest.approx(30.0)
 
 
-def test_nothing_of_chaos_is_passed_over(followed_s):
+def test_no_part_of_chaos_is_skipped(followed_s):
     solve_scene(Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(30.0, 5.0)))
     assert sum(followed_s) >= 30.0
 
 
-def test_a_small_change_is_carried_at_the_ends_of_lasting_chaos_and_all_through_what_is_not_sure(monkeypatch):
+def test_perturbations_are_followed_where_chaos_is_uncertain(monkeypatch):
     carried, follow = [], FollowedRun.follow
 
     def noted(run, *options, **more):
@@ -126,7 +126,7 @@ def test_a_small_change_is_carried_at_the_ends_of_lasting_chaos_and_all_through_
     assert all(has for start_s, has in carried[:12] if start_s >= 9.0 - 1e-9)
 
 
-def test_responses_of_other_runs_of_the_same_chaos_lie_within_the_error_that_is_stated():
+def test_other_runs_of_the_same_chaos_are_within_the_stated_error():
     """19 in 20 should, and were the measured 9 in 10 true, 8 of 20 outside were one chance in 2400."""
     duration = FixedDuration(12.0, 4.0)
     found = solve_scene(replace(CHAOS, duration=duration))
@@ -146,7 +146,7 @@ def test_a_torus_is_distinguished_from_chaos():
 
 
 @pytest.mark.thorough
-def test_chaos_that_ends_in_a_torus_is_not_called_chaotic():
+def test_chaos_ending_in_a_torus_is_not_chaotic():
     specimen = replace(gong2025(2.2e-5), lower_gap_m=38e-6, gap_m=52e-6)
     found = solve_scene(
         Scene(
@@ -193,7 +193,7 @@ def test_the_exponent_matches_the_motion_reached():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
-def test_a_motion_that_escapes_has_an_outcome_and_no_numbers():
+def test_a_diverging_motion_has_an_outcome_without_numbers():
     """A start so far out that the force is more than numbers can hold."""
     begins_far = Given((0.0, 1e300, -1e300, 0.0, 0.0, 0.0))
     scene = scene_of("power:7", 130.0, 20e-6, start=begins_far, duration=FixedDuration(0.1, 0.05))
@@ -213,14 +213,14 @@ def heavy_on_light():
 
 
 @pytest.mark.thorough
-def test_what_turns_from_displacement_to_velocity_has_not_grown():
+def test_exchange_of_displacement_and_velocity_is_no_growth():
     slow = Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)
     assert found.memory is StartMemory.KEPT
     assert found.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_other_starts(monkeypatch):
+def test_a_scene_of_too_many_steps_ends_with_a_sentence(monkeypatch):
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 10_000_000)
     found = solve_scene(Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
     assert found.outcome is Outcome.TOO_LONG
@@ -229,7 +229,7 @@ def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_ot
     assert found.ensemble is None
 
 
-def test_small_changes_count_in_the_steps_of_a_run(monkeypatch):
+def test_perturbations_count_in_the_steps_of_a_run(monkeypatch):
     """A step with small changes takes four times as long, and images of a period had no limit together."""
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 100_000)
     plain, tangent, mapped = (
@@ -249,7 +249,7 @@ def test_small_changes_count_in_the_steps_of_a_run(monkeypatch):
     ("contact", "damping_time_s", "frequency_hz", "periods"),
     [("linear", 1e-6, 400.0, 3000), ("linear", 2e-6, 600.0, 3000), ("hertz", 2e-5, 380.0, 300)],
 )
-def test_a_motion_that_still_fades_is_undecided(contact, damping_time_s, frequency_hz, periods):
+def test_a_fading_motion_is_undecided(contact, damping_time_s, frequency_hz, periods):
     """Neither repeating nor growing, it was called quasi-periodic, with a response half too large."""
     specimen = gong2025(contact=contact, damping_time_s=damping_time_s)
     length = AutomaticDuration(window_s=200 / frequency_hz, longest_s=periods / frequency_hz)
@@ -284,7 +284,7 @@ def test_a_window_of_too_many_drive_periods_is_refused():
         solve_scene(fast)
 
 
-def test_a_small_change_may_vanish():
+def test_a_perturbation_may_vanish():
     """It shrinks below the smallest number in a gap of 1e-300 m: "math domain error" was the answer."""
     tiny = Scene(
         gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)
@@ -293,7 +293,7 @@ def test_a_small_change_may_vanish():
 
 
 @pytest.mark.parametrize("duration", [AutomaticDuration(longest_s=20.0), FixedDuration()])
-def test_a_slow_drift_is_followed_and_undecided_while_it_lasts(duration):
+def test_a_slow_drift_is_undecided_while_it_lasts(duration):
     drift = Scene(gong2025(damping_time_s=3e-5), Harmonic(119.88743, 20e-6), duration=duration)
     answer = solve_scene(drift)
     assert answer.motion is MotionKind.UNDECIDED
@@ -307,7 +307,7 @@ def test_a_motion_of_undamped_modes_and_the_drive_is_quasi_periodic():
     assert answer.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_a_motion_that_comes_back_but_would_leave_is_not_called_periodic():
+def test_an_unstable_repeating_motion_is_not_periodic():
     specimen, drive = gong2025(2.39e-5), Harmonic(121.99, 46.75e-6)
     near = (-1.33e-6, -8.49e-6, -2.97e-6, 0.0572, 0.0793, 0.0805)
     orbit = periodic_orbit(specimen, drive, start=near)

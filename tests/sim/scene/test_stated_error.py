@@ -27,7 +27,7 @@ def scene_of(contact, frequency_hz, amplitude_m, damping_time_s=2e-5, **options)
 
 @pytest.mark.parametrize("accuracy", [Accuracy.QUICK, Accuracy.STANDARD])
 @pytest.mark.parametrize("contact", ["power:7", "power:47", "power:201", "linear_gap", "hertz"])
-def test_the_responses_of_a_transient_are_off_by_no_more_than_is_stated(contact, accuracy):
+def test_errors_of_transient_responses_are_within_the_stated_bound(contact, accuracy):
     found, truth = (
         solve_scene(scene_of(contact, 130.0, 20e-6, accuracy=level, duration=FROM_REST))
         for level in (accuracy, Accuracy.REFERENCE)
@@ -38,14 +38,14 @@ def test_the_responses_of_a_transient_are_off_by_no_more_than_is_stated(contact,
     assert found.error_estimate == errors(found).max()
 
 
-def test_a_transient_without_contact_is_exact_and_reports_it():
+def test_a_transient_without_contact_is_exact():
     found = solve_scene(scene_of("hertz", 100.0, 1e-30, duration=FixedDuration(3.0, 1.0)))
     assert found.motion is MotionKind.UNDECIDED
     assert np.all(errors(found) < 1e-10)
 
 
 @pytest.mark.parametrize("window_s", [0.5, 0.51])
-def test_lines_of_a_motion_of_several_periods_are_taken_over_whole_multiples_of_them(window_s):
+def test_lines_are_taken_over_whole_multiples_of_the_period(window_s):
     found, longer = (
         solve_scene(scene_of("power:7", 278.6, 3e-6, duration=FixedDuration(8.0, length_s)))
         for length_s in (window_s, 2.0)
@@ -58,7 +58,7 @@ def test_lines_of_a_motion_of_several_periods_are_taken_over_whole_multiples_of_
     assert errors(found)[1] < 1e-6
 
 
-def test_lines_of_a_motion_that_settles_in_its_window_are_the_same_question_at_every_level():
+def test_lines_use_the_same_window_at_every_level():
     """Quick sees it repeat after five periods, reference does not yet; over other lengths 4e-3 leaks in."""
     specimen = gong2025(1.2805892626268502e-05, 1.9123796753034876e-05, "power:3")
     drive, length = Harmonic(247.36193250882872, 1.0156553904452063e-06), FixedDuration(0.8114, 0.4708)
@@ -70,7 +70,7 @@ def test_lines_of_a_motion_that_settles_in_its_window_are_the_same_question_at_e
         assert np.all(off <= errors(found) + errors(reference))
 
 
-def test_anything_that_wanders_without_damping_differs_between_starts_by_no_more_than_is_stated():
+def test_undamped_motions_differ_between_starts_within_the_stated_error():
     """Of 4 responses of 6 other starts, 19 in 20 should lie within; fewer than 16 are one chance in 10^4."""
     scene = scene_of("hunt_crossley:1", 64.4, 20e-6, 0.0, duration=FixedDuration(3.0, 1.0))
     found = solve_scene(scene)
@@ -88,7 +88,7 @@ def test_anything_that_wanders_without_damping_differs_between_starts_by_no_more
     assert np.count_nonzero(inside) >= 16
 
 
-def test_lines_of_two_windows_differ_by_no_more_than_is_stated_in_19_cases_of_20():
+def test_lines_of_two_windows_agree_within_the_stated_error():
     random, inside = np.random.default_rng(7), 0
     for _ in range(1000):
         one, another = (5.0 + 0.4 * (random.normal(size=10) + 1j * random.normal(size=10)) for _ in range(2))
@@ -102,7 +102,7 @@ def test_lines_of_two_windows_differ_by_no_more_than_is_stated_in_19_cases_of_20
     ("contact", "amplitude_m", "frequency_hz", "duration_s"),
     [("rigid:1", 10e-6, 100.0, 0.4), ("linear_gap", 10e-6, 100.0, 0.35), ("rigid:0.5", 20e-6, 240.0, 0.4)],
 )
-def test_roundings_that_grow_are_in_the_error_of_a_law_that_is_flown_exactly(
+def test_growing_rounding_errors_are_in_the_stated_error_of_exact_laws(
     contact, amplitude_m, frequency_hz, duration_s
 ):
     """All lengths times a number: the same scene. Exact laws, compared with themselves, said 1e-11."""
@@ -117,7 +117,7 @@ def test_roundings_that_grow_are_in_the_error_of_a_law_that_is_flown_exactly(
     assert np.all(np.abs(answers[:, None] - answers) <= stated[:, None] + stated)
 
 
-def test_what_steps_change_before_starts_come_apart_is_stated_too():
+def test_step_errors_before_divergence_are_in_the_stated_error():
     # The largest p comes early, where no two starts differ yet, and is off by 1.6e-5 at quick.
     start = Given((-3.011e-05, -5.022e-05, 4.918e-05, -0.03867, 0.003417, -0.01607))
     drive, length = Harmonic(300.749, 1.661e-05, 4.993954), FixedDuration(0.3, 0.3)

@@ -112,7 +112,7 @@ def test_the_specimen_notches_the_base_where_it_resonates(linear_motion):
     assert np.min(np.abs(acceleration)) < 0.97 * alone[LINES_HZ == 266]
 
 
-def test_without_a_specimen_to_speak_of_the_table_answers_as_coil_and_suspension_alone():
+def test_a_negligible_specimen_leaves_the_bare_table():
     dust = gong2025(contact="linear")
     dust = type(dust)(
         masses=tuple(1e-6 * m for m in dust.masses),
@@ -201,7 +201,7 @@ def test_a_small_drive_never_touches_the_rubber_stops():
     assert table.structure["limited_steps"] == 0
 
 
-def test_a_motion_that_is_not_finite_is_an_error_that_states_where():
+def test_a_non_finite_motion_is_an_error_with_its_time():
     table = shaken()
     drive = np.zeros(100)
     drive[40] = np.nan
@@ -215,7 +215,7 @@ def test_the_state_at_the_ends_of_steps_is_kept_only_when_requested():
     assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
 
 
-def test_two_stretches_are_one_stretch():
+def test_two_consecutive_parts_equal_the_whole():
     drive = tones(0.7, [260.0])
     whole, parts = shaken(), shaken()
     expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
@@ -235,7 +235,7 @@ def test_the_voltage_recorded_at_the_coil_moves_the_table_as_the_amplifier_did()
     assert driven.structure["limited_steps"] == 0
 
 
-def test_a_stretch_in_one_call_moves_and_counts_as_its_blocks_do():
+def test_one_call_equals_its_blocks():
     drive, block = tones(0.7, [266.0])[:9500], 1000
     whole, stepwise = shaken(), shaken()
     motion = whole.move(drive, block=block)
@@ -248,7 +248,7 @@ def test_a_stretch_in_one_call_moves_and_counts_as_its_blocks_do():
     assert np.array_equal(motion.m0_velocity, np.concatenate(parts))
 
 
-def test_a_specimen_that_starts_away_from_rest_pushes_the_table_that_nothing_drives():
+def test_a_displaced_specimen_moves_the_undriven_table():
     start = (2e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0)
     motion = shaken(start=start).move(np.zeros(1000), end_rows=1000)
     assert motion.ends[0, 3:6] == pytest.approx(start[:3], rel=0.01)
@@ -271,12 +271,12 @@ def test_a_specimen_that_starts_away_from_rest_pushes_the_table_that_nothing_dri
         (SHAKER, {"stroke_m": np.nan}),
     ],
 )
-def test_numbers_that_no_amplifier_or_shaker_has_are_refused(part, wrong):
+def test_impossible_amplifier_and_shaker_values_are_refused(part, wrong):
     with pytest.raises(ValueError, match="is not allowed"):
         replace(part, **wrong)
 
 
 @pytest.mark.parametrize("step_s", [0.0, -1.0, np.inf, np.nan])
-def test_a_step_that_is_no_length_of_time_is_refused(step_s):
+def test_an_invalid_time_step_is_refused(step_s):
     with pytest.raises(ValueError, match="Interval"):
         LoadedShaker(AMPLIFIER, SHAKER, gong2025(), step_s)

@@ -8,13 +8,13 @@ from vibench.sim import Harmonic, Specimen, base_response, base_transmissibility
 FREQUENCY_HZ = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
 
 
-def test_free_is_the_transmissibility():
+def test_free_response_is_the_transmissibility():
     answer, truth = base_response(gong2025(), FREQUENCY_HZ), base_transmissibility(gong2025(), FREQUENCY_HZ)
     np.testing.assert_array_equal(answer.free_x, truth[:, 0])
     np.testing.assert_array_equal(answer.free_p, truth[:, 3])
 
 
-def test_stuck_is_the_answer_of_two_masses_in_one():
+def test_stuck_response_is_that_of_the_joined_masses():
     """A spring a million times stiffer between m1 and m2 leaves p nowhere to go."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses
@@ -27,7 +27,7 @@ def test_stuck_is_the_answer_of_two_masses_in_one():
 
 
 @pytest.mark.parametrize("stiffer", [0.5, 3.0])
-def test_the_lever_tells_x_from_any_p(stiffer):
+def test_the_lever_gives_x_for_any_p(stiffer):
     """Another spring between m1 and m2 moves p somewhere else; x follows by the lever."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses

@@ -36,7 +36,7 @@ def test_the_sum_of_three_powers_lies_between_its_lowest_and_its_highest(p):
     assert sum_ <= max(third, seventh) * (1 + 1e-12)
 
 
-def test_a_high_power_neither_overflows_at_its_reference_nor_pushes_far_below_it():
+def test_a_high_power_law_is_finite_and_negligible_below_its_reference():
     spring = spring_of(gong2025(contact="power:201"))
     near, far = spring.force(np.array([46e-6, 1e-9]), np.zeros(2))
     assert near == pytest.approx(HERTZ.stiffness * 1e-9, rel=1e-2)
@@ -86,7 +86,7 @@ def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
 @pytest.mark.parametrize(
     "name", ["hertz", "linear", "linear_gap", "hunt_crossley:0.5", "rigid:0.7", "power:3+5+7"]
 )
-def test_a_law_survives_a_file(name):
+def test_a_law_round_trips_through_a_file(name):
     law = gong2025(contact=name).contact
     adapter = TypeAdapter(ContactLaw)
     assert adapter.validate_json(adapter.dump_json(law)) == law
@@ -97,5 +97,5 @@ def test_a_power_law_without_terms_is_refused():
         PowerLaw(46e-6, ())
 
 
-def test_every_law_of_the_union_has_a_row_under_its_kind_and_the_other_way_round():
+def test_the_union_and_the_registry_contain_the_same_laws():
     assert {law.__dataclass_fields__["kind"].default for law in get_args(ContactLaw)} == set(CONTACT_LAWS)

@@ -10,7 +10,7 @@ from vibench.sim.specimen.modes import modal_form, state_matrix
 DAMPINGS = st.floats(0.0, 1e-2)
 
 
-def test_at_zero_frequency_everything_follows_the_base():
+def test_at_zero_frequency_all_masses_follow_the_base():
     np.testing.assert_allclose(base_transmissibility(gong2025(), 0.0), [[1.0, 1.0, 1.0, 0.0]], atol=1e-14)
 
 
@@ -92,7 +92,7 @@ def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_states(heavier):
 
 
 @pytest.mark.parametrize("damping_time_s", [0.3, 30.0])
-def test_modes_far_above_critical_damping_are_distinguished(damping_time_s):
+def test_strongly_overdamped_modes_are_separated(damping_time_s):
     """Proportional damping: the rates s of each mode solve s^2 + omega^2 (1 + damping_time s) = 0."""
     specimen = gong2025(damping_time_s=damping_time_s)
     root = np.sqrt(np.asarray(specimen.masses))
@@ -103,7 +103,7 @@ def test_modes_far_above_critical_damping_are_distinguished(damping_time_s):
     )
 
 
-def test_a_slow_mode_beside_fast_dampings_is_distinguished():
+def test_a_slow_mode_is_separated_from_fast_decays():
     specimen = dataclasses.replace(gong2025(), dampings=(1e4, 0.3, 3e6))
     rates = modal_form(specimen).rates
     system, _ = state_matrix(specimen)

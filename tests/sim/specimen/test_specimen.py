@@ -33,7 +33,7 @@ def test_the_si_reading_of_the_papers_damping_is_overdamped_in_every_mode():
     np.testing.assert_allclose(gong2025(damping_time_s=1e-2).damping_ratios, [2.97, 8.36, 15.7], rtol=3e-3)
 
 
-def test_a_specimen_survives_json():
+def test_a_specimen_round_trips_through_json():
     kept = TypeAdapter(Specimen)
     for specimen in (gong2025(), gong2025(contact="linear")):
         assert kept.validate_json(kept.dump_json(specimen)) == specimen

@@ -64,7 +64,7 @@ def test_a_response_through_the_file_is_the_papers_to_the_last_digit():
 
 
 @pytest.mark.parametrize("name", sorted(shipped_specimens()))
-def test_every_shipped_specimen_can_be_moved(name):
+def test_every_shipped_specimen_can_be_simulated(name):
     response = steady_response(
         load_specimen(name).specimen(), Harmonic(130.0, 20e-6), duration_s=0.1, window_s=0.05
     )
@@ -113,13 +113,13 @@ def test_a_file_may_start_from_another_beside_it(tmp_path):
     assert specimen.gaps_m == (30e-6, math.inf)
 
 
-def test_the_line_about_a_specimen_does_not_describe_a_changed_one(tmp_path):
+def test_a_changed_specimen_loses_its_description(tmp_path):
     changed = load_specimen(written(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
     assert "45 um" in load_specimen("gong2025").about
     assert changed.about == ""
 
 
-def test_a_description_comes_back_from_its_own_text(tmp_path):
+def test_a_description_round_trips_through_its_text(tmp_path):
     described = load_specimen(written(tmp_path, WHOLE))
     assert SpecimenDescription.model_validate_json(described.model_dump_json()) == described
     assert SpecimenTable.model_validate(described.model_dump(mode="json")).specimen() == described.specimen()
@@ -156,7 +156,7 @@ def test_a_description_comes_back_from_its_own_text(tmp_path):
         ),
     ],
 )
-def test_a_broken_file_gets_one_sentence_with_its_name(tmp_path, change, said):
+def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
     path = written(tmp_path, WHOLE.replace(*change))
     with pytest.raises(UnknownSpecimenError, match=said) as refusal:
         load_specimen(path)
@@ -176,7 +176,7 @@ def test_a_table_without_a_folder_opens_no_file(tmp_path):
         SpecimenTable.model_validate({"model": str(written(tmp_path, WHOLE))})
 
 
-def test_a_random_specimen_survives_its_file(tmp_path):
+def test_a_random_specimen_round_trips_through_its_file(tmp_path):
     rng = np.random.default_rng(7)
     for number in range(20):
         text = (
@@ -210,9 +210,7 @@ def test_a_random_specimen_survives_its_file(tmp_path):
         ),
     ],
 )
-def test_a_truth_value_or_a_text_is_no_number_in_a_file_or_in_one_that_it_starts_from(
-    tmp_path, given, instead
-):
+def test_booleans_and_texts_are_not_accepted_as_numbers(tmp_path, given, instead):
     file = written(tmp_path, WHOLE.replace(given, instead))
     written(tmp_path, f'model = "{file.name}"\nname = "heir"\n', "heir.toml")
     for each in (file, tmp_path / "heir.toml"):
@@ -231,7 +229,7 @@ DAMPERS = "dampings_ns_per_m = [0.474821, 0.0165809, 0.240926]"
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_mass_that_changes_its_spring_is_warned_of(tmp_path, index):
+def test_a_mass_that_changes_a_spring_constant_gives_a_warning(tmp_path, index):
     masses = [5.8e-3, 2.1e-3, 2.0e-3]
     masses[index] *= 1.5
     own = f'name = "mine"\nmodel = "gong2025"\nmasses_kg = {masses}\n'
@@ -248,7 +246,7 @@ def test_a_mass_that_changes_its_spring_is_warned_of(tmp_path, index):
     assert kept.dampings == pytest.approx(gong2025().dampings, rel=1e-5)
 
 
-def test_springs_that_change_their_damping_are_warned_of(tmp_path):
+def test_springs_that_change_damping_give_a_warning(tmp_path):
     own = 'name = "mine"\nmodel = "gong2025"\nsingle_frequencies_hz = [322.0, 120.0, 390.6]\n'
     with pytest.warns(SpecimenWarning, match=r"dampings changed .* damping_time_s = 2e-05 to confirm"):
         load_specimen(written(tmp_path, own))
@@ -257,7 +255,7 @@ def test_springs_that_change_their_damping_are_warned_of(tmp_path):
     load_specimen(written(tmp_path, own + "damping_time_s = 2e-5"))
 
 
-def test_a_change_that_is_confirmed_or_follows_from_nothing_is_not_warned_of(tmp_path):
+def test_confirmed_and_independent_changes_give_no_warning(tmp_path):
     head = 'name = "mine"\nmodel = "gong2025"\n'
     for own in (
         "gap_m = 30e-6",

@@ -99,9 +99,7 @@ def truth(longer):
 
 
 @pytest.mark.thorough
-def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
-    cluster, longer, truth, tmp_path, require_equal
-):
+def test_a_killed_worker_changes_no_result(cluster, longer, truth, tmp_path, require_equal):
     _, address, workers = cluster
     kept_at_kill = []
 
@@ -118,7 +116,7 @@ def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
 
 
 @pytest.mark.slow
-def test_a_cluster_that_dies_is_reported_and_what_was_kept_continues_elsewhere(
+def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
     cluster, longer, truth, tmp_path, require_equal
 ):
     running, address, _ = cluster
@@ -175,7 +173,7 @@ def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
         ClusterExecutor(address)
 
 
-def test_an_address_where_nobody_answers_and_a_cluster_without_workers_are_one_sentence_each(tmp_path):
+def test_unreachable_and_empty_clusters_give_one_sentence(tmp_path):
     with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         ClusterExecutor("tcp://127.0.0.1:9", patience_s=0.5)
     with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'nonsense:what'"):

@@ -9,7 +9,7 @@ def line_of(planned_s):
     return Costs(Grid((len(planned_s),), (True,)), np.array(planned_s))
 
 
-def test_a_point_is_thought_to_take_what_its_neighbours_took():
+def test_the_cost_of_a_point_is_estimated_from_its_neighbours():
     costs = line_of([1.0] * 5)
     assert list(costs.learn(0, 3.0)) == [1]
     assert costs.estimate_s(1) == 3.0
