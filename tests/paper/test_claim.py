@@ -95,7 +95,7 @@ def test_one_number_out_of_bounds_is_enough_to_fail():
     assert judge({2e-5: (201.5, 437.0)}, *wanted, tried=()).verdict is Verdict.FAILS
 
 
-def test_a_number_that_could_not_be_measured_meets_nothing():
+def test_an_unmeasured_number_meets_no_expectation():
     anything = Expectation("peak", "Hz", -math.inf, math.inf)
     assert judge({2e-5: (math.nan,)}, anything, tried=()).verdict is Verdict.FAILS
 
@@ -108,7 +108,7 @@ def test_bounds_belong_to_what_is_wanted(low, width, value):
     assert wanted.is_met_by((value,)) == (low <= value <= low + width)
 
 
-def test_bounds_that_hold_nothing_are_refused():
+def test_empty_bounds_are_refused():
     with pytest.raises(InvalidRequest, match="lower bound first"):
         Expectation("peak", "Hz", 2.0, 1.0)
 

@@ -116,6 +116,6 @@ def test_what_the_logarithm_is_taken_of_is_an_option(solved):
 
 
 @pytest.mark.parametrize(("name", "value"), [("gap_m", 0.0), ("damping_time_s", -1.0), ("gap_m", np.nan)])
-def test_options_that_cannot_be_are_refused(name, value):
+def test_impossible_options_are_refused(name, value):
     with pytest.raises(InvalidRequest, match="not allowed"):
         FigureOptions(**{name: value})

@@ -52,7 +52,7 @@ def test_ode45_errs_as_its_tolerances_let_it():
     assert errors[2] < 1e-6
 
 
-def test_motions_that_are_followed_together_are_those_followed_alone():
+def test_motions_computed_together_equal_single_ones():
     starts = np.array([MOVING, 2.0 * MOVING, -MOVING])
     for method in (ode45(), runge_kutta(2e-6)):
         together = textbook_states(gong2025(), DRIVE, method, 5e-4, starts)
@@ -89,21 +89,21 @@ def test_chaos_under_a_tight_tolerance_matches_the_exact_motion():
     assert usual.mean() > 1.3 * exact
 
 
-def test_a_motion_that_runs_away_is_lost_and_no_number():
+def test_a_diverging_motion_has_no_number():
     drives = [Harmonic(260.0, 5e-6), Harmonic(260.0, 1e-7)]
     found = textbook_exponents(gong2025(), drives, runge_kutta(1e-3), 0.5, 0.1)
     assert math.isnan(found[0])
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-def test_a_step_or_a_tolerance_that_is_none_is_refused(value):
+def test_an_invalid_step_or_tolerance_is_refused(value):
     with pytest.raises(ValueError, match="positive and finite"):
         runge_kutta(value)
     with pytest.raises(ValueError, match="positive and finite"):
         ode45(absolute=value)
 
 
-def test_no_motion_has_no_exponent():
+def test_rest_has_no_exponent():
     """As where nothing collides: the page of the paper's claims follows only motions that do."""
     assert textbook_exponents(gong2025(), [], ode45()).shape == (0,)
     assert textbook_exponents(gong2025(), [], runge_kutta(1e-3)).shape == (0,)

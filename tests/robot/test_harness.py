@@ -26,7 +26,7 @@ def robot(qtbot):
     return made
 
 
-def test_a_number_of_other_inputs_is_found_unless_it_looks_like_one(robot):
+def test_outdated_numbers_are_found(robot):
     robot.label.setEnabled(False)
     robot.look()
     assert robot.findings == []
@@ -39,7 +39,7 @@ def test_a_number_of_other_inputs_is_found_unless_it_looks_like_one(robot):
     assert "type_value" in found
 
 
-def test_what_another_process_has_not_foreseen_is_found(robot, tmp_path):
+def test_unexpected_errors_of_another_process_are_found(robot, tmp_path):
     with (tmp_path / "stderr").open("w+") as told, (tmp_path / "stderr").open() as robot.errors:
         subprocess.run([sys.executable, "-c", "print(0)"], stderr=told, stdout=told, check=True)
         robot.read_errors()

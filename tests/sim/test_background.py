@@ -94,7 +94,7 @@ def test_a_stream_that_does_not_end_when_dropped_is_ended(pool):
     assert answers != heard
 
 
-def test_anything_that_takes_too_long_is_given_up_and_a_stream_may_take_as_long_as_it_likes(pool):
+def test_jobs_have_a_time_limit_and_streams_do_not(pool):
     errors, heard = [], []
     pool.ask(time.sleep, errors.append, errors.append, 3600.0)
     polled(pool, lambda: errors)
@@ -124,7 +124,7 @@ def odd(_number):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("function", [lambda_of, odd])
-def test_an_answer_that_cannot_cross_is_an_error_and_the_next_job_is_done(pool, function):
+def test_an_unpicklable_answer_is_an_error_and_the_next_job_runs(pool, function):
     errors, answers = [], []
     pool.ask(function, answers.append, errors.append, 0)
     polled(pool, lambda: errors)
@@ -138,7 +138,7 @@ def leave(_number):
     os._exit(1)
 
 
-def test_what_a_callback_does_to_its_pool_is_done(pool):
+def test_a_callback_may_change_its_pool(pool):
     errors = []
     pool.ask(leave, errors.append, lambda error: (errors.append(error), pool.close()), 0)
     polled(pool, lambda: errors)

@@ -63,7 +63,7 @@ def motion(specimen, drive, duration_s):
         (LinearSweep(0.01, 50e3, 0.05, 1e-5), 0.05),
     ],
 )
-def test_any_drive_is_followed_to_its_end(contact, drive, duration_s):
+def test_every_drive_is_integrated_to_its_end(contact, drive, duration_s):
     run = motion(paper(contact), drive, duration_s)
     p = np.abs(run.states[:, 1] - run.states[:, 2])
     # Not even ten millimetres press a stop in by more than a hundred micrometres.
@@ -72,7 +72,7 @@ def test_any_drive_is_followed_to_its_end(contact, drive, duration_s):
 
 @pytest.mark.parametrize("contact", LAWS)
 @pytest.mark.parametrize("frequency_hz", [0.01, 130.0, 50e3])
-def test_a_drive_of_a_picometre_is_answered_by_the_transmissibility(contact, frequency_hz):
+def test_a_drive_of_one_picometre_gives_the_transmissibility(contact, frequency_hz):
     specimen, drive = paper(contact), Harmonic(frequency_hz, 1e-12)
     window_s = max(0.1, 1.0 / frequency_hz)
     start = steady_start(specimen, drive)
@@ -85,7 +85,7 @@ def test_a_drive_of_a_picometre_is_answered_by_the_transmissibility(contact, fre
 
 
 @pytest.mark.parametrize("contact", STOPS)
-def test_a_gap_of_a_metre_is_no_stop_at_all(contact):
+def test_a_gap_of_one_metre_is_never_closed(contact):
     far, none = (integrate(one, DRIVE, 1.0) for one in (paper(contact, gap_m=1.0), paper("linear")))
     assert far.impacts.count == 0
     np.testing.assert_allclose(far.final_state, none.final_state, rtol=1e-12, atol=1e-18)
@@ -242,7 +242,7 @@ def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
     ("contact", "size"),
     [*((contact, size) for contact in STOPS for size in (1e20, 1e100, 1e200, 1e300)), ("power:47", 1e200)],
 )
-def test_numbers_beyond_all_digits_end_with_an_outcome(contact, size):
+def test_overflowing_numbers_end_with_an_outcome(contact, size):
     samples = np.sin(np.arange(200) * 0.01) * size
     runs = [
         integrate(paper(contact), Harmonic(130.0, min(size, 1e100)), 0.001),
@@ -313,6 +313,6 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("ask", "sentence"), REFUSED)
-def test_anything_that_has_no_answer_is_refused_in_one_sentence(ask, sentence):
+def test_impossible_scenes_are_refused_in_one_sentence(ask, sentence):
     with pytest.raises(ValueError, match=sentence):
         ask()

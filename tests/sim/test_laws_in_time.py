@@ -50,7 +50,7 @@ class EveryTerm:
     stops = Stops(linear_stiffness=2e6, contact_stiffness=4.9e9, loss=0.3)
 
 
-def test_a_law_that_yields_is_followed_by_every_solver_from_its_numbers_alone():
+def test_every_solver_integrates_a_softening_law():
     specimen = replace(paper("hertz"), contact=EveryTerm())
     ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE)
     assert ours.impacts.count > 2
@@ -109,7 +109,7 @@ def test_a_free_power_oscillator_has_the_period_of_its_closed_form(exponent):
 
 
 @pytest.mark.parametrize("contact", ["power:3", "power:47"])
-def test_a_displaced_specimen_that_nothing_drives_is_let_go_alike_by_every_engine(contact):
+def test_every_engine_gives_the_same_free_motion(contact):
     specimen, start = paper(contact), [0.0, 20e-6, -30e-6, 0.0, 0.0, 0.0]
     harmonic = integrate(specimen, STILL, 0.01, Accuracy.REFERENCE, start)
     sampled = integrate(specimen, Sampled(np.zeros(600), 51_200.0), 0.01, Accuracy.REFERENCE, start)

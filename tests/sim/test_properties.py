@@ -55,7 +55,7 @@ def noise(seed, rate=20_000.0, duration_s=0.03):
     is_upper=st.booleans(),
     drive=st.sampled_from([Harmonic(40.0, 2e-3), Harmonic(170.0, 50e-6), Harmonic(430.0, 1e-4)]),
 )
-def test_a_stop_that_nothing_reaches_may_as_well_be_none(contact, place, gap_m, is_upper, drive):
+def test_an_unreached_stop_has_no_effect(contact, place, gap_m, is_upper, drive):
     """Without a stop above, the one below was passed through while p moved upwards."""
     far, none = ((gap, gap_m) if is_upper else (gap_m, gap) for gap in (1.0, math.inf))
     start = np.array([*place, 0.0, 0.0, 0.0])
@@ -109,7 +109,7 @@ def longer(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-4.0, 4.0))
-def test_a_longer_specimen_driven_farther_moves_alike(contact, log_scale):
+def test_motion_scales_with_length(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
     long = end(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
     assert np.all(np.abs(long - end(specimen)) < LIMITS)
@@ -138,7 +138,7 @@ def slower(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-3.0, 3.0))
-def test_a_slower_specimen_driven_more_slowly_moves_alike(contact, log_scale):
+def test_motion_scales_with_time(contact, log_scale):
     scale, specimen = 10.0**log_scale, paper(contact)
     slow = end(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
     slow[3:] *= scale
@@ -169,7 +169,7 @@ def heavier(specimen, scale):
 
 @settings(max_examples=25, deadline=None)
 @given(contact=laws, log_scale=st.floats(-6.0, 6.0))
-def test_a_heavier_and_stiffer_specimen_moves_alike(contact, log_scale):
+def test_motion_scales_with_mass_and_stiffness(contact, log_scale):
     specimen = paper(contact)
     assert np.all(np.abs(end(heavier(specimen, 10.0**log_scale)) - end(specimen)) < LIMITS)
 

@@ -182,7 +182,7 @@ def test_a_branch_is_started_from_rest_and_its_base_is_a_sine_of_the_level(rig, 
 
 
 @pytest.mark.thorough
-def test_small_changes_tell_a_points_stability_and_leave_it_where_it_was(rig, tmp_path):
+def test_small_perturbations_show_stability_and_keep_the_point(rig, tmp_path):
     hard = hardening(rig)
     path = tmp_path / "perturbed.h5"
     points, notes = followed(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
@@ -206,7 +206,7 @@ def test_small_changes_tell_a_points_stability_and_leave_it_where_it_was(rig, tm
     assert max(envelope_deviation(each, period) for each in (base, m0)) == pytest.approx(0.02, rel=0.6)
 
 
-def test_a_motion_that_is_another_one_afterwards_is_not_determined():
+def test_a_motion_that_changed_has_no_stability_verdict():
     look = LoopLook(np.array([3e-6 + 0j]), np.array([9e-6 + 0j]), np.array([1e-9]), np.array([1e-9]))
     moved = replace(look, m0_m=1.02 * look.m0_m)
     surely = OpenLoopMultiplier(1.2, 0.01)
@@ -258,7 +258,7 @@ def test_a_branch_among_stops_is_refused_from_where_the_loop_with_its_contacts_h
     require_held(fast_loop(stops), plan.model_copy(update={"low_hz": 96.85}))
 
 
-def test_a_branch_of_which_the_model_knows_no_beginning_or_no_force_is_refused():
+def test_a_branch_without_start_or_force_in_the_model_is_refused():
     stops, plan = among_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
     with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):
         require_held(fast_loop(stops), plan)

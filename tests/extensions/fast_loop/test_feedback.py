@@ -109,7 +109,7 @@ def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
 
 
 @pytest.mark.thorough
-def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
+def test_the_designed_gains_cost_less_than_none_or_twice_as_much():
     """All that is weighed, by simulation under its noises."""
     weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
@@ -136,7 +136,7 @@ def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
         assert cost(replace(best, output=factor * best.output, direct=factor * best.direct)) > least
 
 
-def test_a_late_law_loses_motions_that_need_none_and_that_is_reported():
+def test_a_delayed_law_that_destabilises_motions_is_reported():
     late = plant(2e-3)
     hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))
     found = branch()
@@ -157,7 +157,7 @@ def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
     assert largest[2] > 1.1
 
 
-def test_anything_that_is_played_moves_the_base_as_the_transfer_states():
+def test_the_played_signal_moves_the_base_by_the_transfer_function():
     model = plant(specimen=LINEAR)
     law = design_law(model)
     step, volt = model.step

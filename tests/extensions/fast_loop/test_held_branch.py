@@ -25,7 +25,7 @@ def told(number, stability, multiplier):
 POINTS = [point(number, hertz) for number, hertz in enumerate(HERTZ)]
 
 
-def test_each_point_has_what_was_told_of_it_however_notes_are_ordered():
+def test_each_point_has_its_notes_in_any_order():
     # The third was asked in vain, and the last not at all: the run ended.
     notes = [told(1, Stability.STABLE, 0.96), told(0, Stability.UNSTABLE, 1.1), told(2, Stability.OPEN, None)]
     found = held_branch([*POINTS, *notes])
@@ -37,7 +37,7 @@ def test_each_point_has_what_was_told_of_it_however_notes_are_ordered():
     assert any(each.startswith(wanted) for each in said), said
 
 
-def test_a_branch_that_nobody_asked_says_nothing_of_stability():
+def test_a_branch_without_perturbations_has_no_stability():
     assert held_branch(POINTS).stability == ("",) * 4
     assert not any("Without feedback" in each for each in branch_sentences(POINTS))
     assert held_branch([]).multiplier.size == 0

@@ -89,7 +89,7 @@ def pd(kp, kd, tau_s, step_s):
     )
 
 
-def test_a_frame_is_the_one_of_the_documents(installed):
+def test_frames_match_the_protocol_documents(installed):
     from helic_link import frame
 
     assert frame(1, 1, b"\0\0").hex(" ") == "48 4c 01 01 02 00 00 00 89 0c"
@@ -174,7 +174,7 @@ def test_a_stream_that_ends_is_reported_and_silenced(played):
 
 
 @pytest.mark.thorough
-def test_what_the_board_refuses_ends_in_silence_with_its_word(played):
+def test_a_refusal_of_the_board_ends_silent_with_its_message(played):
     board, bench = played
     board.refuses = {"forcing_coeffs": BUSY}
     bench.controller.play(SERIES.model_copy(update={"reference_v": ((0.2, 0.0),)}))

@@ -94,7 +94,7 @@ def wired():
 SERIES = ((0.5, 0.0), (0.1, -0.2), (0.0, 0.05))
 
 
-def test_the_coefficients_that_come_back_are_those_that_were_played_whatever_the_frequency(wired):
+def test_returned_coefficients_match_the_played_ones(wired):
     frequency_hz = 97.313
     wired.tell("play", program=LoopProgram(frequency_hz=frequency_hz, reference_v=SERIES, glide_s=0.05))
     wired.run(0.4)
@@ -110,7 +110,7 @@ def test_the_coefficients_that_come_back_are_those_that_were_played_whatever_the
     assert complex(*block.m0[0]) == pytest.approx(0.25, abs=1e-4)
 
 
-def test_a_law_answers_what_is_sampled_and_remembers(wired):
+def test_a_law_acts_on_samples_and_its_state(wired):
     feedback = LoopFeedback(step=((0.5,),), inlet=((0.0, 1.0),), output=(2.0,), direct=(0.0, -1.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.0, 0.0),), feedback=feedback)
     wired.tell("play", program=program)
@@ -120,7 +120,7 @@ def test_a_law_answers_what_is_sampled_and_remembers(wired):
     assert wired.played[3:] == pytest.approx([2 * each - 0.25 for each in memory])
 
 
-def test_going_over_to_another_program_is_no_jump(wired):
+def test_changing_the_program_causes_no_jump(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=90, reference_v=((1.0, 0.0),), glide_s=0.1))
     wired.run(0.2)
     wired.tell("play", program=LoopProgram(frequency_hz=120, reference_v=((0.2, 0.4),), glide_s=0.1))
@@ -129,7 +129,7 @@ def test_going_over_to_another_program_is_no_jump(wired):
     assert wired.report().state is LoopState.PLAYING
 
 
-def test_it_falls_silent_when_its_host_says_nothing_and_states_why(wired):
+def test_the_controller_falls_silent_without_its_host_and_gives_the_reason(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     wired.run(0.4)
     wired.report()
@@ -142,7 +142,7 @@ def test_it_falls_silent_when_its_host_says_nothing_and_states_why(wired):
     assert "said nothing for 0.5 s" in told.reason
 
 
-def test_a_law_that_runs_away_ends_by_itself():
+def test_an_unstable_law_is_ended_by_the_controller():
     wired = Wired(gain=1.0)
     feedback = LoopFeedback(step=((0.0,),), inlet=((0.0, 0.0),), output=(0.0,), direct=(1.3, 0.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.1, 0.0),), feedback=feedback)
@@ -153,7 +153,7 @@ def test_a_law_that_runs_away_ends_by_itself():
     assert "at its limit of 2 V" in wired.report().reason
 
 
-def test_anything_that_is_no_request_is_refused_in_a_sentence_and_changes_nothing(wired):
+def test_invalid_requests_are_refused_in_a_sentence(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     for line in (b"{}", b"nonsense", b'{"ask": "play"}', b'{"ask": "play", "program": {"frequency_hz": -1}}'):
         told = json.loads(wired.controller.execute(line).data)

@@ -24,7 +24,7 @@ def test_a_range_has_one_value_more_than_whole_steps_whatever_is_rounded(start, 
 
 
 @pytest.mark.parametrize("numbers", [(2.0, 1.0, 0.1), (1.0, 2.0, 0.0), (1.0, 2.0, -1.0), (1.0, np.inf, 1.0)])
-def test_a_range_that_goes_nowhere_is_refused(numbers):
+def test_an_empty_range_is_refused(numbers):
     with pytest.raises(ValueError, match="start must not lie above stop, and the step must be positive"):
         frequency_range(*numbers)
 
@@ -39,7 +39,7 @@ def test_ranges_and_numbers_mix_and_overlaps_count_once():
     assert expand_ranges(given) == [1.0, 2.0, 2.25, 2.5, 3]
 
 
-def test_anything_that_is_no_range_is_left_to_its_validator():
+def test_values_other_than_ranges_are_passed_to_their_validator():
     assert expand_ranges("all") == "all"
     assert expand_ranges({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
     assert expand_ranges([1.0, "two"]) == [1.0, "two"]

@@ -10,7 +10,7 @@ axes = st.lists(st.tuples(st.integers(1, 4), st.booleans()), min_size=1, max_siz
 
 @settings(deadline=None, max_examples=30)
 @given(axes)
-def test_a_place_is_numpys_unravelled_index(axes):
+def test_grid_positions_match_numpy_unravel_index(axes):
     shape, ordered = zip(*axes, strict=True)
     grid = Grid(shape, ordered)
     assert grid.size == math.prod(shape)

@@ -46,7 +46,7 @@ def answers(curve):
         ({"gaps_m": [30e-6, 45e-6], "frequencies_hz": [100.0, 130.0, 160.0, 190.0]}, False),
     ],
 )
-def test_batches_are_taken_where_a_specimen_is_followed_for_long_and_no_point_waits(changed, in_lanes):
+def test_batches_are_used_for_long_independent_points(changed, in_lanes):
     plan = Study(**{**CURVE, "duration_s": 20.0, "window_s": 1.0} | changed)
     assert (study_solver(plan) == InBatches()) is in_lanes
 
@@ -55,7 +55,7 @@ def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, 
     require_equal(solve_study(curve, workers=3), answers)
 
 
-def test_a_point_of_a_curve_states_what_it_states_alone(curve, answers):
+def test_a_point_of_a_curve_equals_a_single_point(curve, answers):
     for place in (4, 11, 19):
         alone = solve_in_lanes(curve.scene((0, 0, 0, 0, 0, place), Rest()))
         frequency_hz = curve.frequencies_hz[place]
@@ -66,7 +66,7 @@ def test_a_point_of_a_curve_states_what_it_states_alone(curve, answers):
         )
 
 
-def test_where_the_start_is_kept_batches_answer_what_one_motion_alone_does_within_what_both_state():
+def test_batched_and_single_motions_agree_within_their_errors():
     scenes = [
         Scene(
             gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(20.0, 1.0), budget_s=0.05
@@ -99,7 +99,7 @@ def test_scenes_that_batches_do_not_support_are_solved_without_them():
     assert found[1].method is Method.CLOSED_FORM
 
 
-def test_a_long_lead_is_thinned_and_its_start_still_known_to_be_kept():
+def test_a_thinned_long_lead_in_keeps_its_start():
     # 13,000 drive periods, of which 4,096 states are held: another start is compared with these.
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT
@@ -107,14 +107,14 @@ def test_a_long_lead_is_thinned_and_its_start_still_known_to_be_kept():
 
 
 @pytest.mark.parametrize(("phase_rad", "length"), [(0.5 * np.pi, (20.0, 1.0)), (1.57, (20.0, 1.0))])
-def test_a_start_is_kept_though_the_motion_is_in_contact_once_a_period(phase_rad, length):
+def test_a_start_is_kept_with_one_contact_per_period(phase_rad, length):
     drive = Harmonic(130.0, 20e-6, phase_rad)
     scene = Scene(gong2025(), drive, duration=FixedDuration(*length), budget_s=0.02)
     assert solve_scene(scene).memory is StartMemory.KEPT
     assert solve_in_lanes(scene).memory is StartMemory.KEPT
 
 
-def test_on_its_way_to_the_attractor_a_motion_is_followed_by_itself():
+def test_transients_are_computed_singly():
     # m1 rattles: more than a hundred impacts a period, whose errors add up until they are forgotten.
     state = (-4.911e-05, -5.537e-05, 9.979e-06, -0.02334, 0.01178, 0.03798)
     drive, length = Harmonic(105.98, 3.15e-07), FixedDuration(2.5, 1.0)
@@ -124,7 +124,7 @@ def test_on_its_way_to_the_attractor_a_motion_is_followed_by_itself():
     assert solve_in_lanes(longer).memory is solve_scene(longer).memory is StartMemory.KEPT
 
 
-def test_scenes_that_hold_many_states_go_together_in_smaller_groups_and_answer_the_same(monkeypatch):
+def test_scenes_with_many_states_use_smaller_batches_with_equal_results(monkeypatch):
     scenes = [
         Scene(gong2025(), Harmonic(hz, 20e-6), duration=FixedDuration(6.0, 0.5), budget_s=0.02)
         for hz in (130.0, 150.0, 260.0)
@@ -134,12 +134,12 @@ def test_scenes_that_hold_many_states_go_together_in_smaller_groups_and_answer_t
     assert [repr(each.prediction) for each in solve_scenes(scenes)] == together
 
 
-def test_work_that_nobody_can_compute_is_planned_as_none():
+def test_impossible_work_is_planned_as_zero():
     study = Study(**CURVE, damping_times_s=[0.0, 1e300])
     assert np.isfinite(planned_work_s(study))
 
 
-def test_anything_that_has_reached_its_attractor_goes_through_batches():
+def test_settled_motions_are_computed_in_batches():
     # Chaos is another draw there, which is how one sees it.
     scene = Scene(gong2025(), Harmonic(260.3, 20e-6), duration=FixedDuration(6.0, 0.5), budget_s=0.0)
     assert solve_in_lanes(scene).final_state != solve_scene(scene).final_state

@@ -22,7 +22,7 @@ def test_the_longest_point_begins_first():
     assert [scheduler.take(0.1, 1) for _ in range(4)] == [(1,), (2,), (0,), ()]
 
 
-def test_short_points_go_together_until_they_are_worth_the_trip():
+def test_short_points_are_grouped_into_larger_jobs():
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 10) == (0, 1, 2)
     assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
 
@@ -46,7 +46,7 @@ def test_a_follower_of_what_was_done_before_may_begin_at_once():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_anything_that_is_learnt_of_a_neighbour_changes_the_order():
+def test_measured_neighbours_change_the_order():
     scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
     assert scheduler.take(0.1, 1) == (3,)
     scheduler.finish(3)
@@ -56,7 +56,7 @@ def test_anything_that_is_learnt_of_a_neighbour_changes_the_order():
     assert scheduler.take(0.1, 1) == (2,)
 
 
-def test_what_came_to_grief_among_others_is_handed_out_by_itself():
+def test_a_point_that_failed_in_a_group_is_repeated_alone():
     scheduler = scheduler_of([1.0, 1.0, 1.0])
     assert scheduler.take(10.0, 10) == (0, 1, 2)
     scheduler.put_back_alone(1)

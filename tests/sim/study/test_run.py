@@ -147,7 +147,7 @@ class SolverWithACrack:
         return solve_scene(scene)
 
 
-def test_an_error_in_one_scene_is_that_points_answer_and_loses_no_other(small, truth):
+def test_an_error_in_one_scene_affects_only_its_point(small, truth):
     store = MemoryStore(small)
     executor = ThreadExecutor(2, SolverWithACrack(200.0))
     assert run_study(small, executor, store) is StudyEnd.COMPLETE

@@ -24,7 +24,7 @@ OTHERS = {
 }
 
 
-def test_whatever_differs_in_two_scenes_their_identities_differ():
+def test_different_scenes_have_different_identities():
     identities = {name: scene_identity(scene) for name, scene in OTHERS.items()} | {"": scene_identity(SCENE)}
     assert len(set(identities.values())) == len(identities)
 
@@ -34,12 +34,12 @@ def test_equal_scenes_have_one_identity_however_they_were_made():
     assert scene_identity(again) == scene_identity(SCENE)
 
 
-def test_a_name_changes_no_identity():
+def test_a_name_does_not_change_the_identity():
     one, other = (replace(SCENE, start=Given(STATE, name)) for name in ("kick", "push"))
     assert scene_identity(one) == scene_identity(other)
 
 
-def test_a_scene_that_continues_another_is_known_by_it_and_not_by_the_state_that_was_reached():
+def test_a_continued_scene_is_identified_by_its_predecessor():
     one = replace(SCENE, start=Given(STATE), drive=Harmonic(260.0, 5e-6, 0.5))
     other = replace(SCENE, start=Given((0.0,) * 6), drive=Harmonic(260.0, 5e-6, 0.7))
     before = scene_identity(OTHERS["frequency"])

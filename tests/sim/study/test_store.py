@@ -63,7 +63,7 @@ def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_sce
     assert fields == kept | of_the_study | of_any_length | of_the_call
 
 
-def test_anything_that_comes_out_of_the_file_is_what_went_in(small, tmp_path, require_equal):
+def test_a_study_file_round_trips(small, tmp_path, require_equal):
     in_memory = solve_study(small)
     in_file = solve_study(small, tmp_path / "a.h5")
     require_equal(in_file, in_memory)
@@ -73,7 +73,7 @@ def test_anything_that_comes_out_of_the_file_is_what_went_in(small, tmp_path, re
     assert json.loads(json.dumps(again, allow_nan=False)) == again
 
 
-def test_a_prediction_read_back_is_the_one_that_was_computed(small, tmp_path):
+def test_a_stored_prediction_equals_the_computed_one(small, tmp_path):
     solve_study(small, tmp_path / "a.h5")
     found = next(iter(open_study(tmp_path / "a.h5").predictions()))
     made = solve_scene(small.scene((0,) * 6, REST))
@@ -208,7 +208,7 @@ def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small,
     FileStore(path, small).close()
 
 
-def test_anyone_who_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_path):
+def test_a_short_read_of_a_study_does_not_end_it(small, tmp_path):
     """A reader holds HDF5's lock while it looks: a study that began just then was refused its own file."""
     path = tmp_path / "a.h5"
     make_file(path, small)
@@ -288,7 +288,7 @@ def images_after_power_cuts(empty, log, luck):
 
 
 @pytest.mark.thorough
-def test_whatever_moment_the_power_goes_a_point_that_counts_has_all_its_cells(small, tmp_path):
+def test_counted_points_are_complete_after_a_power_cut(small, tmp_path):
 
     path, image_path = tmp_path / "a.h5", tmp_path / "image.h5"
     make_file(path, small)

@@ -10,7 +10,7 @@ from vibench.sim.study._study import GivenStart
 LEAST = {"frequencies_hz": [100.0, 200.0], "amplitudes_m": [1e-6]}
 
 
-def test_a_study_comes_back_from_json_as_it_was():
+def test_a_study_round_trips_through_json():
     study = Study(
         **LEAST,
         models=("hertz", "power:3@0.2+7@0.8"),
@@ -27,7 +27,7 @@ def test_the_specimen_is_the_papers_when_nothing_else_is_stated():
     assert (study.models, study.damping_times_s, study.gaps_m) == (("hertz",), (2e-5,), (45e-6,))
 
 
-def test_what_a_study_does_not_vary_is_as_its_specimen_has_it():
+def test_unvaried_values_of_a_study_come_from_its_specimen():
     own = {"model": "asymmetric", "dampings_ns_per_m": [0.5, 0.01, 0.3], "contact": "rigid:0.7"}
     study = Study(**LEAST, specimen=own)
     scene = study.scene((0,) * 6, Rest())

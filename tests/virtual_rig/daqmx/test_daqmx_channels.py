@@ -101,7 +101,7 @@ def test_channels_other_than_volts_are_refused_by_name(task, add):
         add(task.ai_channels)
 
 
-def test_volts_alone_are_the_unit(task):
+def test_volt_is_the_only_unit(task):
     with pytest.raises(DaqError, match="VOLTS") as caught:
         task.ai_channels.add_ai_voltage_chan(
             MODULE, units=VoltageUnits.FROM_CUSTOM_SCALE, custom_scale_name="vibrometer"

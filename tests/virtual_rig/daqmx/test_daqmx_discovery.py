@@ -48,7 +48,7 @@ def test_the_usb_4431_has_one_output(system):
     assert system.devices["Dev1/ao0"].ao_voltage_rngs == [-3.5, 3.5], "by the name of what is on it"
 
 
-def test_what_a_device_does_not_have_is_refused_by_name_and_not_made_up(system):
+def test_missing_device_features_are_refused_by_name(system):
     with pytest.raises(DaqError, match=r"(?s)analogue output.*cDAQ1Mod1") as caught:
         _ = system.devices["cDAQ1Mod1"].ao_voltage_rngs
     assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED

@@ -36,7 +36,7 @@ def refused(call):
     return caught.value.error_code
 
 
-def test_anything_that_was_read_stands_in_the_file_with_units_interval_and_begin(task, tmp_path):
+def test_the_log_file_contains_samples_units_interval_and_start(task, tmp_path):
     logging(task, tmp_path / "read.tdms")
     task.start()
     before = datetime.now(UTC)

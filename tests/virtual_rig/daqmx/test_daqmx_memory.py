@@ -48,7 +48,7 @@ class NoTiming:
     value = 0
 
 
-def test_samples_that_nobody_reads_are_lost_at_last_where_none_are_lost_usually(daq, task, monkeypatch):
+def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
     monkeypatch.setattr(_acquisition, "MOST_SAMPLES", 50_000)
     task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()
@@ -59,7 +59,7 @@ def test_samples_that_nobody_reads_are_lost_at_last_where_none_are_lost_usually(
 
 
 @pytest.mark.parametrize("pace", [None, WallPace(speed=5.0)])
-def test_a_world_that_cannot_go_on_is_reported_to_anyone_who_reads_and_anyone_who_asks_later(connect, pace):
+def test_a_failed_world_is_reported_to_every_reader(connect, pace):
     daq = connect(pace)
 
     def stand_still(*_):

@@ -101,7 +101,7 @@ def test_at_the_walls_pace_it_waits_for_somebody_to_raise_the_line(connect):
     assert np.std(volts) > 1.0
 
 
-def test_anything_that_cannot_be_waited_for_is_refused(daq, task):
+def test_unsupported_reference_triggers_are_refused(daq, task):
     reference = task.triggers.reference_trigger
     for kept in (1, SAMPLES - 1, SAMPLES + 5):
         reference.cfg_dig_edge_ref_trig("PFI1", kept)

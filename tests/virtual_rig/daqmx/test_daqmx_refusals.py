@@ -112,7 +112,7 @@ def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
     assert daq.world.played["Dev1/ao0"][0].start_s == 0.25
 
 
-def test_a_read_past_the_end_brings_what_there_is_and_reports_it(daq):
+def test_a_read_past_the_end_returns_the_rest_with_an_error(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
     task.timing.cfg_samp_clk_timing(1000, samps_per_chan=30)
@@ -217,7 +217,7 @@ def test_a_number_that_is_no_member_of_its_enum_is_refused_by_name(daq, task, na
     assert "Requested Value: 77" in refused.value.details()
 
 
-def test_waveforms_that_are_none_are_refused(daq):
+def test_invalid_waveforms_are_refused(daq):
     output = daq.task("play")
     output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
     request = nidaqmx_pb2.WriteAnalogWaveformsRequest(task=Session(name="play"))

@@ -50,7 +50,7 @@ def test_another_service_can_share_the_port(connect):
     daq.task()
 
 
-def test_a_message_of_many_megabytes_passes(daq):
+def test_messages_of_many_megabytes_are_accepted(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1:2")
     task.timing.cfg_samp_clk_timing(100e3, sample_mode=AcquisitionType.CONTINUOUS)

@@ -40,7 +40,7 @@ def wait_for(daq, samples, task):
         assert rig.changed.wait_for(lambda: rig._acquisitions[0].acquired >= samples, 10.0)
 
 
-def test_samples_exist_when_their_time_has_come_and_not_before(connect, clock):
+def test_samples_exist_only_after_their_time(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.start()
@@ -53,7 +53,7 @@ def test_samples_exist_when_their_time_has_come_and_not_before(connect, clock):
     assert task.in_stream.total_samp_per_chan_acquired == 250
 
 
-def test_a_timeout_hands_over_what_has_come(connect, clock):
+def test_a_timeout_returns_the_samples_so_far(connect, clock):
     daq = connect(WallPace(clock=clock))
     task = continuous(daq)
     task.start()

@@ -37,7 +37,7 @@ def test_loopback_needs_no_token_and_every_other_address_does():
     assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")
 
 
-def test_a_stranger_is_turned_away_from_converter_and_cable(served):
+def test_a_client_without_token_is_refused_by_converter_and_cable(served):
     _, address = served
     with (
         grpc.insecure_channel(address) as channel,
@@ -58,7 +58,7 @@ def test_a_bench_with_the_token_is_let_in(served, monkeypatch):
     remote.close()
 
 
-def test_a_wrong_token_is_no_token(served, monkeypatch):
+def test_a_wrong_token_is_refused(served, monkeypatch):
     virtual, address = served
     monkeypatch.setenv(TOKEN_VARIABLE, virtual.token[:-1])
     with pytest.raises(InstrumentLost, match="UNAUTHENTICATED"):

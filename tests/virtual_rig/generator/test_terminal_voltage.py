@@ -90,7 +90,7 @@ def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
     assert rig.render(4) == pytest.approx([1, 1, 0.25 * 1 + 0.75 * 3, 3])
 
 
-def test_anything_that_is_already_rendered_is_never_changed_afterwards():
+def test_rendered_samples_never_change():
     rig = Rig()
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")

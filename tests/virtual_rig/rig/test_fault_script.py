@@ -78,7 +78,7 @@ class TestTheScript:
             (fault("overrun", -1), r"at_s = -1"),
         ],
     )
-    def test_a_fault_that_nobody_can_play_is_refused_by_name(self, tmp_path, text, said):
+    def test_an_unknown_fault_is_refused_by_name(self, tmp_path, text, said):
         path = tmp_path / "faults.toml"
         path.write_text(text, encoding="utf-8")
         with pytest.raises(ConfigurationError, match=rf"faults\.toml.*{said}"):
@@ -154,7 +154,7 @@ class TestEffects:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)
 
-    def test_a_fault_ends_in_time_for_a_program_that_does_nothing_but_try_again(self, scripted):
+    def test_a_fault_ends_during_continuous_retries(self, scripted):
         with open_bench(scripted(fault("overrun", 0.1, for_s=2.0))) as bench:
             failures = 0
             for _ in range(10):
@@ -167,7 +167,7 @@ class TestEffects:
         # The first at once, half a second each after it, and nothing else lets the time of this rig pass.
         assert failures == 5
 
-    def test_a_full_disk_is_emptied_in_time_for_who_tries_again(self, scripted):
+    def test_a_full_disk_is_emptied_during_retries(self, scripted):
         with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
             power.let_pass(0.2)
             refusals = 0
@@ -200,7 +200,7 @@ class TestEffects:
             kept.reopen()
             kept.bench.generator.set_amplitude(0.1)
 
-    def test_a_clock_that_jumps_turns_the_phase_by_as_much(self, scripted):
+    def test_a_clock_jump_shifts_the_phase_accordingly(self, scripted):
         with open_bench(scripted(fault("jump_clock", 1.0, by_s=0.0025))) as bench:
             bench.generator.load_sine(100.0, 1.0)
             bench.generator.start()
@@ -230,5 +230,5 @@ class TestEffects:
         assert heard == [True] * 3 + [False] * 3 + [True] * 4
 
 
-def test_an_empty_script_is_a_quiet_night():
+def test_an_empty_script_causes_no_faults():
     assert FaultScript().faults == ()

@@ -31,7 +31,7 @@ def test_a_resonance_sits_where_it_belongs_close_to_the_nyquist_frequency():
     assert frequency_hz[np.argmax(np.abs(response(running, frequency_hz)))] == pytest.approx(30e3, abs=50)
 
 
-def test_what_runs_is_what_the_response_states():
+def test_the_running_filter_matches_its_stated_response():
     running, frequency_hz = running_filter(resonant(8e3, 0.3), STEP_S), 3000.0
     phase = 2 * np.pi * frequency_hz * STEP_S * np.arange(4000)
     result = np.concatenate([running.run(np.sin(part)) for part in np.split(phase, [1, 7, 3000])])
