@@ -195,5 +195,5 @@ def loaded_by(program):
         ),
     ],
 )
-def test_importing_a_public_api_loads_no_driver_and_nothing_that_a_name_does_not_need(program, heavy):
+def test_importing_a_public_api_loads_only_what_its_names_need(program, heavy):
     assert heavy.isdisjoint(loaded_by(program))

@@ -70,7 +70,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_anything_that_was_taken_away_is_really_needed_elsewhere():
+def test_posix_only_functions_exist_on_this_system():
     # Were the names misspelt, or gone from Python, nothing would be tested.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
     assert int(ran("-c", program).stdout) > 25

@@ -259,7 +259,7 @@ def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
     assert sorted(lacking - PURE_HERE - set(UNIT_NOT_KNOWN)) == []
 
 
-def test_anyone_who_holds_a_part_in_some_unit_states_in_which():
+def test_every_stored_quantity_names_its_unit():
     """What is held by a type variable, as `response` of an analysis, says its units by itself."""
     found = reached()
     silent = [
@@ -273,7 +273,7 @@ def test_anyone_who_holds_a_part_in_some_unit_states_in_which():
     assert silent == []
 
 
-def test_a_unit_is_told_of_nothing_that_is_not_there():
+def test_units_refer_to_existing_fields_only():
     wrong = [
         f"{kind.__name__}.{name}"
         for kind, hints in reached().items()
@@ -320,7 +320,7 @@ def test_a_unit_is_told_of_nothing_that_is_not_there():
         ("stepped", {"response_drive_amplitude_m": "m"}),
     ],
 )
-def test_what_a_recording_reported_has_its_units(request, kind, units):
+def test_reported_values_of_a_recording_have_units(request, kind, units):
     made = request.getfixturevalue(f"{kind}_file")
     with open_recording(made() if callable(made) else made) as recording:
         data = analysis.analyse(recording).to_xarray()
@@ -375,7 +375,7 @@ def measured(mean_m=2.0):
     return Measured(Spread(np.float64(mean_m), np.nan), np.array([95.0, 266.0]), None, pathlib.Path("here"))
 
 
-def test_a_document_has_the_keys_of_its_class_in_their_order_and_null_where_nothing_is_known():
+def test_a_document_has_all_keys_of_its_class_in_order_with_null_for_unknown():
     document = measured().to_dict()
     assert list(document) == ["mean_m", "sd_m", "lowest_hz", "missing_m", "folder"]
     assert json.dumps(document, allow_nan=False) == (
@@ -383,7 +383,7 @@ def test_a_document_has_the_keys_of_its_class_in_their_order_and_null_where_noth
     )
 
 
-def test_rows_of_several_parts_lie_below_each_other_and_miss_nothing():
+def test_rows_of_several_parts_are_concatenated():
     found = rows([measured(), measured(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
     np.testing.assert_array_equal(found["frequency_hz"], [95.0, 266.0, 95.0, 266.0])
     np.testing.assert_array_equal(found["mean_m"], [2.0, 3.0])

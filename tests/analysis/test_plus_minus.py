@@ -36,7 +36,7 @@ def test_a_value_ends_where_its_uncertainty_does(value, half_width, text):
     st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3),
     st.floats(1e-9, 1e5),
 )
-def test_nothing_is_lost_but_what_the_uncertainty_hides(value, half_width):
+def test_rounding_to_the_uncertainty_loses_only_insignificant_digits(value, half_width):
     read, bound = (
         float(each) for each in re.fullmatch(r"(\S+) ± (\S+)", plus_minus(value, half_width)).groups()
     )

@@ -132,7 +132,7 @@ def test_an_exponent_is_reported_with_its_error():
         ),
     ],
 )
-def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+def test_invalid_options_are_refused_in_one_sentence(arguments, said):
     result = run(*arguments)
     assert result.exit_code != 0
     assert said in str(result.exception)

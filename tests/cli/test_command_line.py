@@ -189,7 +189,7 @@ def test_invalid_simulated_faults_are_refused_before_opening(vibench_here, tmp_p
     [("analyse", "file.h5"), ("figure", "2"), ("map", "map"), ("reproduce",), ("tradeoff",)],
     ids=lambda words: words[0],
 )
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path, words):
+def test_an_impossible_folder_is_refused_before_computation(vibench_here, tmp_path, words):
     (tmp_path / "file.h5").write_text("no folder", encoding="utf-8")
     result = vibench_here(*words, "--out", tmp_path / "file.h5" / "figures", cwd=tmp_path)
     assert result.returncode == 1
@@ -266,7 +266,7 @@ def test_an_option_without_effect_is_refused(vibench_here, tmp_path, words, said
     assert result.stdout == ""
 
 
-def test_a_page_that_is_a_folder_is_refused_before_anything_is_computed(vibench_here, tmp_path):
+def test_a_page_path_that_is_a_folder_is_refused_before_computation(vibench_here, tmp_path):
     (tmp_path / "pages").mkdir()
     result = vibench_here("reproduce", "--out", "new", "--markdown", "pages", cwd=tmp_path)
     assert result.returncode == 1

@@ -180,7 +180,7 @@ def test_zero_is_quoted_as_typed(command):
         ),
     ],
 )
-def test_anything_that_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+def test_invalid_options_are_refused_in_one_sentence(arguments, said):
     assert said in refused(*arguments)
 
 

@@ -95,7 +95,7 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, recorded, folde
         (("import", "run.h5", "--mapping", "map.toml"), "run.h5 exists, and nothing is ever overwritten"),
     ],
 )
-def test_anything_that_cannot_be_is_refused_and_leaves_nothing(run, recorded, arguments, said):
+def test_invalid_exchanges_are_refused_without_leftovers(run, recorded, arguments, said):
     recorded.with_name("map.toml").write_text("sample_rate_hz = 1000.0\n" + MAPPING)
     assert said in str(run(*arguments).exception)
     assert sorted(each.name for each in recorded.parent.iterdir()) == ["map.toml", "run.h5"]

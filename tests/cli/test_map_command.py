@@ -39,7 +39,7 @@ def plan(folder, text):
     return path
 
 
-def test_an_estimate_makes_nothing(vibench_here, tmp_path):
+def test_an_estimate_writes_no_file(vibench_here, tmp_path):
     found = vibench_here("map", plan(tmp_path, MAP), "--out", "a", "--estimate", "--json", cwd=tmp_path)
     assert found.returncode == 0, found.stderr
     told = json.loads(found.stdout)

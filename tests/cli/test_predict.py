@@ -129,7 +129,7 @@ def test_a_failed_point_is_reported_beside_the_answers_of_others(vibench_here, t
         (("--amplitude", "nan", "--frequency", 100), "--amplitude"),
     ],
 )
-def test_anything_that_cannot_be_predicted_is_stated_in_one_sentence(vibench_here, tmp_path, arguments, said):
+def test_invalid_predictions_are_refused_in_one_sentence(vibench_here, tmp_path, arguments, said):
     ran = vibench_here("predict", *arguments, "--json", cwd=tmp_path)
     assert ran.returncode != 0
     assert ran.stdout == ""

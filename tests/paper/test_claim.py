@@ -101,7 +101,7 @@ def test_an_unmeasured_number_meets_no_expectation():
 
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
-def test_bounds_belong_to_what_is_wanted(low, width, value):
+def test_bounds_include_their_ends(low, width, value):
     wanted = made(no_studies, Expectation("anything", "", low, low + width))
     assert wanted.is_met_by((low,))
     assert wanted.is_met_by((low + width,))

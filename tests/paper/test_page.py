@@ -73,7 +73,7 @@ def test_of_the_options_tried_the_page_has_only_those_that_uphold_a_claim(found)
     assert "exponent: 60 1/s" not in page
 
 
-def test_anything_that_differs_from_the_paper_is_stated_first_with_the_option_that_upholds_it(found):
+def test_differences_from_the_paper_come_first_with_the_option_that_agrees(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
     assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary

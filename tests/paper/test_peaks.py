@@ -26,7 +26,7 @@ def test_peaks_of_little_damping_are_the_natural_frequencies():
     np.testing.assert_allclose(bound_peaks(specimen, 5.0, 605.0), specimen.bound_frequencies_hz, atol=0.02)
 
 
-def test_a_ripple_is_no_peak_and_a_hole_is_stepped_over():
+def test_ripples_are_not_peaks_and_missing_points_are_skipped():
     rough = resonances(200.0, 435.0) * (1.0 + 0.1 * np.sin(GRID))
     np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
     rough[3] = np.nan

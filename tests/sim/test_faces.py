@@ -93,7 +93,7 @@ def test_where_an_enum_is_requested_its_word_is_accepted_and_another_refused_wit
         call(**{parameter: "nonsense"})
 
 
-def test_anything_that_is_observed_may_be_named_by_words():
+def test_observables_may_be_named_by_words():
     named = sim.Scene(SPECIMEN, DRIVE, observe=("response", "lyapunov"), accuracy="quick")
     assert named.observe == (sim.Observable.RESPONSE, sim.Observable.LYAPUNOV)
     assert named.accuracy is sim.Accuracy.QUICK
@@ -115,7 +115,7 @@ def test_a_checker_of_types_knows_every_word_of_an_enum():
             assert literals == list(kind), case.id
 
 
-def test_a_trajectory_holds_what_the_design_promises():
+def test_a_trajectory_has_the_documented_fields():
     run = sim.integrate(SPECIMEN, DRIVE, 0.1, accuracy="standard", sample_rate_hz=1e3)
     assert run.states.shape == (len(run.time_s), 6) == (101, 6)
     assert run.final_state == pytest.approx(run.states[-1])

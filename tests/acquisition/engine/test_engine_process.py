@@ -195,7 +195,7 @@ class TestACheckIsStopped:
 
 
 class TestRefusals:
-    def test_what_the_state_does_not_allow_is_refused_with_a_sentence(self, client, tmp_path):
+    def test_requests_not_allowed_in_a_state_are_refused_with_a_sentence(self, client, tmp_path):
         with pytest.raises(EngineError, match=r"is closed and cannot start now; it can when it is armed"):
             client.start()
         with pytest.raises(EngineError, match="cannot mark now"):

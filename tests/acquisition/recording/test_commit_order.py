@@ -214,7 +214,7 @@ def test_the_power_cut_model_detects_wrong_write_order(traced):
     assert lies > 0
 
 
-def test_nothing_but_data_is_written_after_the_start(traced):
+def test_only_data_are_written_after_the_start(traced):
     places, empty, trace, _ = traced
     first_place = min(places.n_valid, places.state, places.reason)
     assert min(each[0] for each in trace if each is not None) >= first_place

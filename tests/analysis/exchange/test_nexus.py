@@ -47,7 +47,7 @@ def faults(group, path="/"):
             yield from faults(child, f"{path}{name}/")
 
 
-def test_a_file_is_what_the_definitions_require(nexus):
+def test_a_nexus_file_follows_the_definitions(nexus):
     with h5py.File(nexus) as file:
         assert list(faults(file)) == []
 

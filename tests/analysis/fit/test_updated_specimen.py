@@ -94,7 +94,7 @@ def test_true_parameters_lie_within_intervals_that_exclude_the_description(updat
     assert 0.3 < updated.reduced_chi_square < 3
 
 
-def test_the_report_states_what_was_fitted_and_what_the_bench_states(measured, updated):
+def test_the_report_shows_fitted_and_described_values(measured, updated):
     said = list(findings(replace(measured, model_said=updated.sentences)))
     assert said[: len(updated.sentences)] == list(updated.sentences)
     assert [

@@ -89,7 +89,7 @@ def test_a_file_without_an_overview_looks_the_same(recording, tmp_path):
 
 
 @pytest.mark.parametrize(("start", "stop", "columns"), [(5, 5, 10), (0, 100, 0), (SAMPLES, SAMPLES + 5, 10)])
-def test_a_picture_of_nothing_is_refused(recording, start, stop, columns):
+def test_an_empty_picture_is_refused(recording, start, stop, columns):
     with pytest.raises(InvalidRequest, match="were requested"):
         overview_of(recording).picture(CHANNELS, start, stop, columns)
 

@@ -65,7 +65,7 @@ class Recorded:
 
 
 @pytest.mark.parametrize("lost", [(), (8000,), (57_500,), (8000, 57_500)], ids=str)
-def test_samples_that_were_lost_beside_a_sweep_spoil_none_of_it(lost):
+def test_lost_samples_beside_a_sweep_do_not_affect_it(lost):
     time, phase = sweep(8.0, 140, 360)
     speed = np.gradient(phase, time)
     data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
@@ -112,7 +112,7 @@ def test_a_sweep_with_dropouts_everywhere_is_refused():
         measured_sweep(recorded, plan)
 
 
-def test_the_first_and_last_intervals_know_what_was_before_and_after_them():
+def test_the_first_and_last_intervals_use_samples_outside_the_sweep():
     """A sine in displacement of one amplitude, recorded for longer than its sweep."""
     time, phase = sweep(6.0)
     rows = np.stack((np.cos(phase), -np.cos(phase) * np.gradient(phase, time) ** 2, np.zeros(time.size)))
@@ -144,14 +144,14 @@ def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blo
     np.testing.assert_allclose(y[inner], x[::factor][inner], atol=3e-5)
 
 
-def test_anything_that_would_alias_is_removed():
+def test_aliasing_components_are_removed():
     decimator = Decimator(1, 4)
     x = np.cos(2 * np.pi * 0.18 * np.arange(20_000))[np.newaxis]
     y = np.concatenate((decimator.add(x), decimator.finish()), axis=1)[0]
     assert np.max(np.abs(y[50:-50])) < 3e-5
 
 
-def test_ten_ppm_between_the_clocks_is_250_degrees_on_a_nominal_sweep_and_nothing_on_the_recorded_one():
+def test_recorded_sweep_phase_is_unaffected_by_a_clock_difference():
     rate = 2048.0
     _, recorded = sweep(200, clock_ppm=10, rate_hz=rate)
     _, nominal = sweep(200, rate_hz=rate)

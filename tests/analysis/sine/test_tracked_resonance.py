@@ -44,7 +44,7 @@ def test_levels_are_in_the_order_of_the_base_and_m0_moves_by_the_response_times_
     assert (found[0].mode_hz, found[1].mode_hz) == (100.5, None)
 
 
-def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
+def test_a_level_with_a_lost_resonance_is_excluded_from_the_backbone():
     notes = [
         note(0, 1.0, 100.0),
         lost(1, 3.0),
@@ -56,7 +56,7 @@ def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
     assert tracked_resonances([lost(0, 1.0)]) == ()
 
 
-def test_a_level_that_was_not_met_states_in_how_many_periods_and_what_was_there_instead():
+def test_an_unmet_level_reports_its_periods_and_actual_level():
     missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met", periods=150)
     moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
     met = note(2, 0.4, 98.6, periods=120)

@@ -40,7 +40,7 @@ def test_a_long_record_makes_no_larger_picture_and_blocks_do_not_matter():
     np.testing.assert_allclose(parts.time_s, whole.time_s)
 
 
-def test_anything_that_has_no_meaning_is_refused():
+def test_meaningless_requests_are_refused():
     with pytest.raises(NotEnoughData, match="segment"):
         picture(np.zeros(100))
     with pytest.raises(InvalidRequest, match="half"):

@@ -83,7 +83,7 @@ def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
 
 
 @pytest.mark.thorough
-def test_a_budget_is_what_propagation_of_distributions_gives(samples, weak):
+def test_a_budget_matches_propagation_of_distributions(samples, weak):
     """JCGM 101:2008: all inputs drawn from their distributions, through the whole analysis."""
     rng = np.random.default_rng(12)
 
@@ -113,7 +113,7 @@ def test_a_budget_is_what_propagation_of_distributions_gives(samples, weak):
         assert budget.share(Cause.CHANCE) == 0.0
 
 
-def test_anything_that_is_not_stated_is_stated_and_is_not_zero(weak):
+def test_unstated_uncertainties_are_listed_and_not_zero(weak):
     amplitude, _, second = budgets_of(weak)
     assert second.not_stated == (
         Cause.VIBROMETER,
@@ -216,7 +216,7 @@ def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, 
             Contribution(Cause.NOISE, sd, "a bias, by mistake")
 
 
-def test_a_colliding_sweep_has_chance_and_states_what_only_draws_tell(sweep_file):
+def test_a_colliding_sweep_reports_scatter_known_only_from_draws(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
     (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))

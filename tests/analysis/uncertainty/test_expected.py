@@ -68,7 +68,7 @@ def test_four_times_the_time_halves_the_scatter_and_no_calibration():
 
 
 @pytest.mark.parametrize("role", ["m0_velocity", "base_acceleration"])
-def test_a_rig_that_cannot_see_a_motion_promises_nothing_of_it(role):
+def test_an_unmeasurable_motion_has_no_expected_uncertainty(role):
     daq = RIG.daq.model_copy(update={"channels": tuple(c for c in RIG.daq.channels if c.role != role)})
     rig = RIG.model_copy(update={"daq": daq})
     sine = Dwell(amplitude_vpp=0.2, frequency_hz=130.0, duration_s=2.0)
@@ -76,7 +76,7 @@ def test_a_rig_that_cannot_see_a_motion_promises_nothing_of_it(role):
         assert expected_uncertainty(Measurement(name="blind", excitation=excitation), rig) == ()
 
 
-def test_noise_that_collides_promises_nothing():
+def test_colliding_noise_has_no_expected_uncertainty():
     plan = Measurement(name="strong", excitation=NOISE.model_copy(update={"amplitude_vpp": 3.0}))
     for each in expected_uncertainty(plan, RIG):
         assert each.after(10.0) is None
@@ -104,7 +104,7 @@ def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alon
     assert 1e-6 < second.after(5.0) < 1e-3
 
 
-def test_a_rig_that_states_no_noise_is_reported_and_a_sweep_promises_nothing():
+def test_a_rig_without_noise_figures_is_reported():
     silent = RIG.model_copy(update={"virtual": None})
     (first, *_) = expected_uncertainty(Measurement(name="weak", excitation=NOISE), silent)
     assert "the sensors' noise is not stated" in first.sentence
@@ -112,12 +112,12 @@ def test_a_rig_that_states_no_noise_is_reported_and_a_sweep_promises_nothing():
     assert expected_uncertainty(Measurement(name="up", excitation=sweep), RIG) == ()
 
 
-def test_a_dwell_of_hours_a_period_promises_nothing():
+def test_a_dwell_with_hours_per_period_has_no_expected_uncertainty():
     slow = Dwell(amplitude_vpp=1.5, frequency_hz=1e-4, settle_s=0.1, duration_s=1)
     assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()
 
 
-def test_a_motion_that_cannot_be_computed_promises_nothing(monkeypatch):
+def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
     def lost(*_, **__):
         raise MotionFailed("it is not finite")
 
@@ -153,7 +153,7 @@ def test_a_dwell_whose_base_is_held_is_reported_at_the_voltage_that_holds_it():
         assert first.scatter is second.scatter is None or first.scatter == pytest.approx(second.scatter)
 
 
-def test_where_the_beginning_decides_the_motion_nothing_is_promised():
+def test_a_start_dependent_motion_has_no_expected_uncertainty():
     """Begun gently m1 stays between the stops; thrown against them it stays at them."""
     first, second = expected_uncertainty(dwell(430, 2.0), RIG)
     for each in (first, second):

@@ -48,12 +48,12 @@ def test_steps_are_predicted_step_by_step():
     assert expected_recorded_s(plan(steps, Until(response_ii=0.01)), RIG) == pytest.approx(6.0)
 
 
-def test_anything_that_cannot_be_known_beforehand_is_not_predicted():
+def test_unpredictable_results_have_no_expected_uncertainty():
     assert expected_recorded_s(plan(QUIET, Until(response_i=0.01)), RIG) is None
     assert expected_recorded_s(plan(QUIET, None), RIG) is None
 
 
-def test_time_is_distributed_by_what_each_measurement_needs():
+def test_time_is_distributed_by_need():
     first = plan(NOISE, Until(resonance_hz=noise_wish(50.0)), "first")
     second = plan(NOISE, Until(resonance_hz=noise_wish(100.0)), "second")
     campaign = Campaign(name="c", measurements=(first, second, plan(QUIET, None, "fixed")))

@@ -25,7 +25,7 @@ def test_the_known_periodic_state_is_found(shape):
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(100.0, 5e-6), (130.0, 20e-6)])
-def test_the_multipliers_of_an_orbit_multiply_to_what_damping_leaves(frequency_hz, amplitude_m):
+def test_the_product_of_multipliers_is_given_by_damping(frequency_hz, amplitude_m):
     # Liouville's theorem: the contact, which has no loss, cannot change the volume.
     orbit = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m), OrbitShape.MIRRORED)
     product = np.prod(orbit.floquet_multipliers)

@@ -66,7 +66,7 @@ def test_too_short_a_section_gives_no_verdict():
     ],
     ids=["steady growth", "growth that ended", "neither", "still settling", "not looked at"],
 )
-def test_the_growth_of_a_small_change_states_what_does_not_repeat(logarithms, kind):
+def test_growth_of_perturbations_identifies_aperiodic_motion(logarithms, kind):
     growth = Growth(np.array(logarithms), 0.5 * len(logarithms))
     assert kind_of(None, growth, fading_s=0.25) is kind
 

@@ -41,7 +41,7 @@ def test_a_follower_waits_until_its_predecessor_is_finished():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_a_follower_of_what_was_done_before_may_begin_at_once():
+def test_a_follower_of_a_finished_point_may_begin_at_once():
     scheduler = scheduler_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
     assert scheduler.take(10.0, 10) == (1,)
 

@@ -186,7 +186,7 @@ def test_identities_match_the_scenes(small, tmp_path):
         ({"duration_s": 0.3, "window_s": 0.2}, "duration_s is 0.2 there and 0.3 here, window_s is 0.1"),
     ],
 )
-def test_another_study_is_refused_by_what_differs_and_changes_nothing(small, tmp_path, change, said):
+def test_another_study_is_refused_with_the_differences(small, tmp_path, change, said):
     path = tmp_path / "a.h5"
     make_file(path, small)
     before = path.read_bytes()

@@ -85,7 +85,7 @@ def test_differences_name_what_differs():
         ("frequencys", [1.0], "frequencys"),
     ],
 )
-def test_anything_that_is_not_allowed_is_named(key, value, said):
+def test_invalid_study_values_are_named(key, value, said):
     with pytest.raises(ValidationError, match=said):
         Study.model_validate({**LEAST, key: value})
 

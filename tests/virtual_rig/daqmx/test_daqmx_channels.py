@@ -75,7 +75,7 @@ def test_the_smallest_range_that_fits_is_taken(task):
     ("limits", "allowed"),
     [((-10, 10), "5 on cDAQ1Mod1/ai1"), ((1, 1), "below AI_Max"), ((2, -2), "below AI_Max")],
 )
-def test_limits_no_range_holds_are_refused_with_what_is_allowed(task, limits, allowed):
+def test_limits_beyond_every_range_are_refused_with_the_allowed_ones(task, limits, allowed):
     task.ai_channels.add_ai_voltage_chan(MODULE, min_val=limits[0], max_val=limits[1])
     with pytest.raises(DaqError, match=allowed) as caught:
         verify(task)
@@ -153,7 +153,7 @@ def test_a_later_channel_of_a_list_may_leave_out_its_device(task):
     assert task.channel_names == ["Dev1/ai0", "Dev1/ai2"]
 
 
-def test_channels_are_called_what_the_program_calls_them(task):
+def test_channels_have_the_names_given_by_the_program(task):
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", name_to_assign_to_channel="base")
     assert task.channel_names == ["base0", "base1"]
     channel = task.ai_channels["base1"]

@@ -51,7 +51,7 @@ def test_the_log_file_contains_samples_units_interval_and_start(task, tmp_path):
         assert abs((began - before).total_seconds()) < 60
 
 
-def test_a_file_is_replaced_and_what_no_program_requests_is_refused(task, tmp_path):
+def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
     path = tmp_path / "some.tdms"
     for samples in (100, 64):
         logging(task, path)

@@ -72,7 +72,7 @@ def test_two_runs_are_equal_bit_for_bit(connect):
     assert np.array_equal(*runs)
 
 
-def test_scans_and_channels_are_laid_out_as_asked(task, daq):
+def test_samples_have_the_requested_layout(task, daq):
     by_channel, by_scan = np.empty((3, 10)), np.empty((10, 3))
     interpreter = task._interpreter
     interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_CHANNEL.value, by_channel)

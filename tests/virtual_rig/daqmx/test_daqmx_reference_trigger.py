@@ -80,7 +80,7 @@ def test_an_edge_that_never_comes_leaves_the_task_to_be_stopped(daq, task):
     assert caught == [DAQmxErrors.RUNTIME_ABORTED_ROUTING]
 
 
-def test_at_the_walls_pace_it_waits_for_somebody_to_raise_the_line(connect):
+def test_in_real_time_a_reference_trigger_waits_for_its_line(connect):
     daq = connect(WallPace(speed=20.0))
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")

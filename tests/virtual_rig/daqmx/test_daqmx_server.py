@@ -103,6 +103,6 @@ def test_the_default_address_is_this_computer_only(daq):
 
 
 @pytest.mark.parametrize("address", ["nonsense", "127.0.0.1:99999", "127.0.0.1:-5", ":80", "127.0.0.1:"])
-def test_anything_that_is_no_address_is_refused_before_anything_listens(connect, address):
+def test_invalid_addresses_are_refused_before_listening(connect, address):
     with pytest.raises(ConfigurationError, match="give HOST:PORT"):
         connect(address=address)

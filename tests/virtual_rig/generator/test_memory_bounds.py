@@ -43,7 +43,7 @@ def test_waveforms_of_ever_new_names_end_when_the_memory_is_full():
     assert asked(generator, b"DATA:ATTR:POIN? W9") == b"4.0E+05\n"
 
 
-def test_the_longest_waveform_that_it_tells_to_hold_arrives_through_usb():
+def test_the_longest_supported_waveform_arrives_through_usb():
     generator = Keysight33500B(lambda: 0.0)
     instrument = UsbTmcInstrument(generator)
     codes = np.zeros(1_048_576, dtype=">i2").tobytes()

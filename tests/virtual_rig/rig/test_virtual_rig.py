@@ -208,7 +208,7 @@ def test_an_address_in_use_starts_nothing():
         assert serials_on_the_bus() == ["C060606"]
 
 
-def test_the_drivers_scale_states_the_step_that_the_samples_really_have(switch_on):
+def test_the_scale_of_the_driver_matches_the_step_of_the_samples(switch_on):
     program = switch_on()
     program.play(260, 1.0)
     task = program.task()

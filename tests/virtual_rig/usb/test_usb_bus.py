@@ -116,7 +116,7 @@ def test_a_reply_beyond_the_timeout_is_a_visa_timeout_and_then_arrives(plugged):
     assert plugged.instrument.read().strip() == "1"
 
 
-def test_reading_what_was_not_asked_is_a_visa_timeout_with_minus_420(plugged):
+def test_reading_without_a_query_is_a_visa_timeout_with_minus_420(plugged):
     with pytest.raises(VisaIOError):
         plugged.instrument.read()
     assert plugged.instrument.query("SYST:ERR?").startswith("-420,")

@@ -41,7 +41,7 @@ def proxy(rig):
     device.close()
 
 
-def test_the_proxy_states_about_itself_what_the_device_states(rig, proxy):
+def test_the_proxy_has_the_descriptors_of_the_device(rig, proxy):
     assert proxy.identification == rig.cable.identification
 
 

@@ -156,7 +156,7 @@ def test_a_trigger_message_stalls():
         host.device.bulk_out(host.header(128, 0, 0))
 
 
-def test_nothing_passes_a_pulled_cable_and_the_instrument_plays_on():
+def test_a_pulled_cable_blocks_messages_and_the_output_continues():
     host = Host()
     host.write(b"OUTP ON")
     host.device.pull_cable()

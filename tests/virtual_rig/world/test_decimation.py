@@ -51,7 +51,7 @@ def test_aliases_are_suppressed_by_more_than_80_db(ratio, cycles_per_sample):
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_a_constant_stays_what_it_is(ratio):
+def test_a_constant_is_unchanged(ratio):
     history = history_steps(ratio, 0.0)
     samples = decimator(ratio, 0, 0.3).convert(np.full(history + 1000, 2.5), -history, 0, int(1000 / ratio))
     assert samples == pytest.approx(2.5, rel=1e-13)

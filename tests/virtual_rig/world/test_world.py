@@ -97,7 +97,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_states(frequency
 
 @settings(deadline=None, max_examples=10)
 @given(st.lists(st.integers(1, 1500), min_size=2, max_size=12))
-def test_two_worlds_agree_bit_for_bit_whatever_blocks_they_are_read_in(sizes):
+def test_two_worlds_agree_bit_for_bit_for_any_block_size(sizes):
     rig = RIG.model_copy(
         update={"virtual": RIG.virtual.model_copy(update={"vibrometer_dropouts_per_s": 50.0})}
     )
@@ -156,7 +156,7 @@ def test_conversions_at_different_rates_show_the_same_voltage_at_the_same_time()
         assert measured * RIG.daq.channels[DRIVE].attenuation == pytest.approx(1.0, rel=3e-4)
 
 
-def test_a_conversion_that_begins_later_looks_back_on_what_was_there():
+def test_a_later_conversion_sees_the_earlier_signal():
     world = World(QUIET, Tone(260.0, 1.0))
     world.advance(0.5)
     volts = world.sample(INPUTS[:1], 51_200.0).read(100)[0]
@@ -200,7 +200,7 @@ def test_an_output_that_is_not_wired_moves_nothing():
     assert np.all(world.sample(INPUTS, 51_200.0).read(1000) == 0)
 
 
-def test_truth_shows_what_no_instrument_does_and_is_off_by_default():
+def test_truth_shows_unmeasured_motion_and_is_off_by_default():
     world = World(QUIET, Tone(260.0, 3.0))
     world.advance(0.1)
     assert world.truth().shape == (0, len(MOTION_COLUMNS))
@@ -283,7 +283,7 @@ class Broken:
         return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)
 
 
-def test_a_motion_that_is_lost_is_reported_and_the_world_stands_still():
+def test_a_failed_simulation_is_reported_and_stops_the_world():
     world = World(RIG, Broken())
     conversion = world.sample(INPUTS, 51200.0)
     assert np.all(np.isfinite(conversion.read(20000)))
