@@ -21,16 +21,18 @@ _UNITS = {
         **dict.fromkeys(("m/s2", "m s-2", "ms-2"), 1.0),
         **dict.fromkeys(("g", "gn"), _STANDARD_GRAVITY),
         "mm/s2": 1e-3,
+        "cm/s2": 1e-2,
         "in/s2": 0.0254,
     },
     "m s-1": {
         **dict.fromkeys(("m/s", "m s-1"), 1.0),
         **dict.fromkeys(("mm/s", "mm s-1"), 1e-3),
         "um/s": 1e-6,
+        "cm/s": 1e-2,
         "in/s": 0.0254,
     },
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
-    "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
 """Units of data sheets in SI units, by the unit of the recorded quantity."""
 _EXAMPLES = {

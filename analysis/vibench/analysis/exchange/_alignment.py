@@ -27,8 +27,9 @@ _RATE = re.compile(
     re.IGNORECASE,
 )
 _INTERVAL = re.compile(
-    r"(?:(?:sampl\w*?|scan)[ _]?(?:interval|period|time)|interval|(?:d|delta)[ _]?[tx]|[tx][ _]?(?:d|delta)"
-    rf"|time[ _]?(?:step|delta)|(?:(?:time|wf|x)[ _]?)?(?:increment|spacing)){_UNIT}",
+    r"(?:(?:sampl\w*?|scan)[ _]?(?:interval|period|time)|interval|t_?s(?:amp\w*)?|(?:d|delta)[ _]?[tx]"
+    r"|[tx][ _]?(?:d|delta)|time[ _]?(?:step|delta)|(?:(?:time|wf|x)[ _]?)?(?:increment|spacing))"
+    rf"{_UNIT}",
     re.IGNORECASE,
 )
 _START = re.compile(
@@ -167,6 +168,11 @@ class TimeAxis:
     """Unit; empty if the file states none, None for sample numbers."""
     is_named: bool = False
     """Whether the channel is called time."""
+
+    @property
+    def moments(self) -> tuple[object, ...]:
+        """Return what differs between times of channels that are not simultaneous."""
+        return round(self.start / self.interval, 2), self.runs
 
     def of(self, channel: SourceChannel) -> SourceChannel:
         """Return a channel with these times, which must agree with its stated rate.

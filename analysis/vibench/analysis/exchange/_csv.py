@@ -6,17 +6,18 @@ Read columns of text, separated by commas, semicolons, tabs or blanks, into memo
 import codecs
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import date
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
-from ._alignment import UNITS, stated_rate_hz
+from ..signals.arrays import Reals
+from ._alignment import UNITS, stated_rate_hz, told_start_s
+from ._clock_times import ClockTimes
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SourceChannel, TableSource
 
@@ -43,24 +44,31 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 LONGEST_HEAD = 200
 """Longest heading in lines."""
-DELIMITERS = (";", "\t", ",", None)
+DELIMITERS = (";", "\t", "|", ",", None)
 """Separators in the order of trying; None means blanks. With another separator, a comma is decimal."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
-    r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2))?"
+    r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2)|[Ss]econds?|[Vv]olts?|[dmyhsDMYHS.:/ f-]{8,})?"
 )
-"""One cell of a row of units."""
+"""One cell of a row of units, or of the forms of dates and times."""
+TITLE = re.compile(r"\W*(?:(?:y[ _])?units?(?:[ _]labels?)?|einheit(?:en)?|names?|channels?)\W*", re.I)
+"""First cell of a row of the heading that says what the others are."""
 NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
 STATEMENT = re.compile(
     r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
 )
 """A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
 
-CLOCK = re.compile(
-    r"(?<![\w:])(?:(\d{4})-(\d\d)-(\d\d)[T ])?(\d\d?):(\d\d):(\d\d(?:[.,]\d+)?)(?:Z|[+-]\d\d:\d\d)?(?![\w:])"
+SENTENCE = re.compile(
+    r"(?:sampled|recorded|acquired) (?:at|with) ([\d.]+) ?(k?hz)|([\d.]+) ?(k?s)(?:a|amples?)?(?:/| per )s",
+    re.I,
 )
-"""A time of day, with a date or without: ``2026-03-01T12:00:00.0002``."""
+"""A rate within other words: ``"recorded at 5120 Hz"``, ``"51.2 kS/s"``."""
+FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
+"""The letter before an exponent in double precision."""
+GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+"""A number whose decimals may be a group of thousands."""
 
 
 @dataclass(frozen=True)
@@ -71,25 +79,29 @@ class _Layout:
     columns: int
     empty: int
     """Empty cells after the last number of each line, as spreadsheets write them."""
+    has_text: bool
+    """Whether cells are dates, times or numbers in Fortran's notation."""
 
     @property
     def width(self) -> int:
         """Number of cells of a line."""
         return self.columns + self.empty
 
-    def cells(self, line: str) -> list[str]:
-        """Split a line."""
-        found = _cells(line, self.delimiter)
+    def cells(self, line: str, clock: ClockTimes | None = None) -> list[str]:
+        """Split a line; times become seconds."""
+        found = _cells(line, self.delimiter, clock or ClockTimes())
         while len(found) > self.columns and len(found) > 1 and not found[-1].strip():
             found.pop()
         return found
 
-    def plain(self, line: str) -> str:
-        """Return a line with blanks and decimal points; empty if all cells are."""
-        line = _clock_in_seconds(line)
-        if '"' not in line and not self.empty and line.strip(BLANK + (self.delimiter or "")):
+    def plain(self, line: str, clock: ClockTimes) -> str:
+        """Return a line with blanks and decimal points; empty for comments, and if all cells are."""
+        if line.startswith(("#", "%")):
+            return ""
+        is_plain = '"' not in line and not self.empty and not self.has_text
+        if is_plain and line.strip(BLANK + (self.delimiter or "")):
             return line if self.delimiter == "," else line.replace(",", ".")
-        cells = [each.strip().replace(",", ".") for each in self.cells(line)]
+        cells = [_number(each) for each in self.cells(line, clock)]
         return (self.delimiter or " ").join(cells) if any(cells) else ""
 
 
@@ -105,22 +117,52 @@ def open_csv(path: Path) -> Iterator[TableSource]:
     encoding = _encoding(path)
     head, first, layout = _beginning(path, encoding)
     with path.open(encoding=encoding, errors="replace") as file:
-        lines = (layout.plain(line) for line in islice(file, first, None))
+        clock = ClockTimes()
+        lines = (layout.plain(line, clock) for line in islice(file, first, None))
         try:
             table = np.loadtxt(lines, delimiter=layout.delimiter, ndmin=2, comments=None)
         except ValueError as error:
             file.seek(0)
             raise ValueError(_what_is_wrong(file, first, layout) or str(error)) from error
-    labels, units = _headings(head, layout)
-    rate, trouble = stated_rate_hz(_statements(head))
+        for place in np.flatnonzero([_may_be_grouped(each) for each in table.T]):
+            file.seek(0)
+            rows = (layout.cells(line) for line in islice(file, first, None))
+            _require_decimals(int(place), [row[place].strip() for row in rows if len(row) > place])
+    columns = zip(*_headings(head, layout), _facts(head, layout), table.T, strict=True)
     yield TableSource(
         {
-            SourceChannel(
-                str(number), len(table), label, rate, unit, time_trouble=trouble
-            ): np.ascontiguousarray(column)
-            for number, (label, unit, column) in enumerate(zip(labels, units, table.T, strict=True), start=1)
+            _channel(str(number), len(table), label, unit, *facts): np.ascontiguousarray(column)
+            for number, (label, unit, facts, column) in enumerate(columns, start=1)
         }
     )
+
+
+Facts = Sequence[tuple[str, float]]
+
+
+def _channel(name: str, samples: int, label: str, unit: str, own: Facts, shared: Facts) -> SourceChannel:
+    rate_hz, trouble = stated_rate_hz((*own, *shared))
+    start_s = told_start_s(own)
+    return SourceChannel(name, samples, label, rate_hz, unit, start_s=start_s, time_trouble=trouble)
+
+
+def _may_be_grouped(column: Reals) -> bool:
+    """Whether numbers of at most three decimals lie among whole numbers, and none below 1."""
+    size = np.abs(column[np.isfinite(column)])
+    rest = size[size != np.rint(size)]
+    has_three = np.allclose(1e3 * rest, np.rint(1e3 * rest), 1e-12, 0.0)
+    return 0 < rest.size < size.size and bool(rest.min() > 1) and has_three
+
+
+def _require_decimals(place: int, cells: Sequence[str]) -> None:
+    """Raise ValueError if separators of a column seem to be those of thousands."""
+    marked = [each for each in cells if "." in each or "," in each]
+    whole = next((each for each in cells if each.lstrip("+-0").isdigit()), "")
+    if whole and all(GROUPED.fullmatch(each) for each in marked):
+        raise ValueError(
+            f"column {place + 1} holds {whole!r} and {marked[0]!r}, whose separator seems to be one of "
+            "thousands; write numbers without these"
+        )
 
 
 def _encoding(path: Path) -> str:
@@ -139,7 +181,7 @@ def _encoding(path: Path) -> str:
 def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
     """Describe the first line that does not fit the table; empty if all fit."""
     for number, line in enumerate(file, start=1):
-        if number <= first or not layout.plain(line).strip():
+        if number <= first or not layout.plain(line, ClockTimes()).strip():
             continue
         cells = layout.cells(line)
         if len(cells) != layout.columns:
@@ -176,52 +218,42 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
 def _layout(line: str) -> _Layout | None:
     """Return the format of a line of numbers; None if it is none."""
     for delimiter in DELIMITERS:
-        cells = _cells(line, delimiter)
+        cells = _cells(line, delimiter, ClockTimes())
         filled = len(cells)
         while filled and not cells[filled - 1].strip():
             filled -= 1
         if (delimiter is None or delimiter in line) and filled and _are_numbers(cells[:filled]):
-            return _Layout(delimiter, filled, len(cells) - filled)
+            has_text = not _are_numbers(_cells(line, delimiter)[:filled], str)
+            return _Layout(delimiter, filled, len(cells) - filled, has_text)
     return None
 
 
-def _clock_in_seconds(line: str) -> str:
-    """Write times of day as seconds; a table of samples has no other text between its numbers."""
-    return CLOCK.sub(_seconds, line) if ":" in line else line
-
-
-def _seconds(clock: re.Match[str]) -> str:
-    year, month, day, hour, minute, second = clock.groups()
-    # A thousand days leave a double 15 ns.
-    days = date(int(year), int(month), int(day)).toordinal() % 1000 if year else 0
-    minutes = (days * 24 + int(hour)) * 60 + int(minute)
-    return f"{minutes * 60 + float(second.replace(',', '.')):.9f}"
-
-
-def _cells(line: str, delimiter: str | None) -> list[str]:
-    line = _clock_in_seconds(line)
+def _cells(line: str, delimiter: str | None, clock: ClockTimes | None = None) -> list[str]:
+    """Split a line; times become seconds if there is a clock."""
     if delimiter is None:
+        line = line if clock is None else clock.in_seconds(line)
         return [each.strip('"') for each in line.split()]
-    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
+    cells = next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
+    return cells if clock is None else [clock.in_seconds(each) for each in cells]
 
 
-def _are_numbers(cells: Sequence[str]) -> bool:
+def _number(cell: str) -> str:
+    """Return a number with a decimal point, and E before its exponent."""
+    return FORTRAN.sub("e", cell.strip().replace(",", "."))
+
+
+def _are_numbers(cells: Sequence[str], read: Callable[[str], str] = _number) -> bool:
     try:
-        return bool([float(each.replace(",", ".")) for each in cells])
+        return bool([float(read(each)) for each in cells])
     except ValueError:
         return False
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
     """Return labels and units from one row, or from two rows of which one has only units; else empty."""
-    rows = [row for line in head if (row := _row(line, layout))]
-    labels, units = (rows or [[""] * layout.columns])[-1], [""] * layout.columns
-    if len(rows) > 1:
-        above = rows[-2]
-        if all(UNIT_CELL.fullmatch(each) for each in labels):
-            labels, units = above, labels
-        elif all(UNIT_CELL.fullmatch(each) for each in above):
-            units = above
+    rows = [row for line in head if any(row := _row(line, layout))]
+    named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
+    labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)
     said = [UNIT.search(each) for each in labels]
     return (
         [UNIT.sub("", each).strip() for each in labels],
@@ -229,18 +261,43 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
     )
 
 
+def _are_units(row: Sequence[str]) -> bool:
+    """Whether cells are units, behind a title or not."""
+    cells = row[1:] if TITLE.fullmatch(row[0]) else row
+    return any(cells) and all(UNIT_CELL.fullmatch(each) for each in cells)
+
+
 def _row(line: str, layout: _Layout) -> list[str]:
     """Split a line of a heading into one cell per column; empty if that fails."""
-    line = line.strip().lstrip("#% ")
-    tries = [layout.cells(line), *(_Layout(each, layout.columns, 0).cells(line) for each in DELIMITERS)]
+    line = line.strip("\r\n ").lstrip("#% ")
+    tries = [layout.cells(line), *(replace(layout, delimiter=each).cells(line) for each in DELIMITERS)]
     tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
+    tries += [each[1:] for each in tries if len(each) == layout.columns + 1 and TITLE.fullmatch(each[0])]
+    tries += [each[:-1] for each in tries if len(each) == layout.columns + 1 and each[-1] == "Comment"]
     found = next((each for each in tries if len(each) == layout.columns), [])
     return [each.strip().strip('"') for each in found]
 
 
-def _statements(head: Sequence[str]) -> Iterator[tuple[str, float]]:
+def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]]:
+    """Yield the facts of each column, and those of the file: LabVIEW's ``Delta_X`` has a number for each."""
+    own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
+    shared: list[tuple[str, float]] = []
     for line in head:
-        if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
-            # A cell after the number may be its unit, or another name.
-            unit = found[3] if found[3].casefold() in UNITS else ""
-            yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))
+        name, *rest = layout.cells(line) or [""]
+        filled = [each for each in rest if each.strip()]
+        numbers = [float(_number(each)) for each in filled] if _are_numbers(filled) else []
+        if len(numbers) > 1 and 0 <= layout.columns - len(numbers) <= 1:
+            for facts, number in zip(own[-len(numbers) :], numbers, strict=True):
+                facts.append((name.strip(), number))
+        else:
+            shared += _statements(line)
+    return ((each, shared) for each in own)
+
+
+def _statements(line: str) -> Iterator[tuple[str, float]]:
+    if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
+        # A cell after the number may be its unit, or another name.
+        unit = found[3] if found[3].casefold() in UNITS else ""
+        yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))
+    elif (found := SENTENCE.search(line)) and _are_numbers([number := found[1] or found[3]]):
+        yield f"rate {found[2] or f'{found[4]}/s'}", float(number)

@@ -16,7 +16,7 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 from ..errors import UnusableData
 from ..signals.arrays import Reals
 from ._alignment import stated_rate_hz, told_start_s
-from ._source_channel import SourceChannel, text_of
+from ._source_channel import SourceChannel, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
@@ -67,8 +67,8 @@ class Hdf5Source:
                 raw = dataset[row, start:stop]
         values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0)
         values += _number(dataset, "add_offset", 0.0)
-        if "_FillValue" in dataset.attrs:
-            values[raw == dataset.attrs["_FillValue"]] = np.nan
+        for name in {"_FillValue", "missing_value"} & dataset.attrs.keys():
+            values[raw == dataset.attrs[name]] = np.nan
         return values
 
 
@@ -98,13 +98,13 @@ def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
         rate_hz, trouble = stated_rate_hz(facts)
         said = {"sample_rate_hz": rate_hz, "time_trouble": trouble, "start_s": told_start_s(facts)}
         if dataset.ndim == 1:
-            yield _channel(dataset, dataset.name, dataset.shape[0], said), _Place(dataset.name, None)
+            yield _channel(dataset, dataset.name, dataset.shape[0], 0, said), _Place(dataset.name, None)
             continue
         has_time_first = dataset.shape[0] >= dataset.shape[1]
         samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            yield _channel(dataset, name, samples, said), _Place(dataset.name, row, has_time_first)
+            yield _channel(dataset, name, samples, row, said), _Place(dataset.name, row, has_time_first)
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:
@@ -117,18 +117,18 @@ def _holds_samples(item: h5py.HLObject) -> bool:
     )
 
 
-def _channel(dataset: h5py.Dataset, name: str, samples: int, said: Mapping[str, Any]) -> SourceChannel:
+def _channel(
+    dataset: h5py.Dataset, name: str, samples: int, place: int, said: Mapping[str, Any]
+) -> SourceChannel:
     scale = abs(_number(dataset, "scale_factor", 1.0))
     is_exact = dataset.dtype.itemsize <= EXACT_KINDS.get(dataset.dtype.kind, 0)
     is_exact = is_exact and _number(dataset, "add_offset", 0.0) == 0.0
-    unit = next(
-        (_text(dataset, each) for each in ("units", "unit", "Units", "Unit") if each in dataset.attrs), ""
-    )
     return SourceChannel(
         name=name,
         samples=samples,
         label=name.rsplit("/", 1)[-1],
-        unit=unit,
+        unit=unit_among(dataset.attrs.items(), place),
+        stated_scale="" if "scale_factor" in dataset.attrs else scale_among(dataset.attrs.items()),
         step=scale if is_exact else None,
         origin=_origin(dataset.file),
         **said,
@@ -137,7 +137,7 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int, said: Mapping[str, 
 
 def _origin(file: h5py.File) -> Origin | None:
     """Read the origin stated by a recording or by an export of one."""
-    said = _text(file, "origin") if "origin" in file.attrs else ""
+    said = str(file.attrs.get("origin", ""))
     return Origin(said) if said in set(Origin) else None
 
 
@@ -154,9 +154,3 @@ def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
     return float(np.ravel(dataset.attrs[name])[0]) if name in dataset.attrs else otherwise
-
-
-def _text(item: h5py.HLObject, name: str) -> str:
-    value = np.ravel(item.attrs[name])[0]
-    # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
-    return text_of(value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape"))

@@ -215,6 +215,11 @@ def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
         factor = mapped.factor(found.unit)
     except ValueError as error:
         raise InvalidRequest(f"{name}: {error}") from error
+    if found.stated_scale and mapped.scale is None:
+        raise InvalidRequest(
+            f"{name} says {found.stated_scale} for {found.name}, and not whether this was applied to its "
+            "numbers; give scale in the mapping"
+        )
     full_scale = mapped.full_scale or found.full_scale
     return ChannelHeader(
         role=mapped.role,

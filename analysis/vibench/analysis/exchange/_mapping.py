@@ -1,5 +1,6 @@
 """Mapping of a foreign file, as TOML: its channels and the excitation."""
 
+import re
 from datetime import date
 from typing import Literal, Self
 
@@ -33,6 +34,21 @@ _LARGEST_CORRECTION = 0.2
 def _is_another_quantity(file_unit: str) -> bool:
     """Return whether a unit belongs to a motion or a force, which no scale turns into another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
+
+
+def unit_in_name(name: str) -> str:
+    """Return the unit at the end of a name: ``"v / mm/s"``, ``"v_mm_s"``; empty if there is none."""
+    for found in _BEFORE_UNIT.finditer(name):
+        unit, sign = name[found.end() :].strip(" ])"), found[0].strip()
+        unit = unit.replace("_", "/") if sign == "_" else unit
+        is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
+        is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
+        if sign == "[" or (is_known and (not is_letter or (unit == "g" and sign))):
+            return unit
+    return ""
+
+
+_BEFORE_UNIT = re.compile(r"^|\s*[\[(/,;_]\s*|\s+in\s+(?=.)")
 
 
 class ChannelMapping(FrozenModel):

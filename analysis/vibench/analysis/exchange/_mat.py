@@ -25,7 +25,7 @@ from ._alignment import stated_rate_hz, told_start_s
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, open_hdf5_source
-from ._source_channel import SourceChannel, TableSource
+from ._source_channel import SourceChannel, TableSource, scale_among, unit_among
 
 # The elements of a MATLAB 5 file are checked first, because scipy's reader crashes on wrong types.
 #
@@ -218,27 +218,26 @@ def _numbers(
     facts = (*((name, value) for name, value in own.items() if np.size(value) == 1), *around)
     start_s = told_start_s(facts)
     rate_hz, trouble = stated_rate_hz(facts)
-    unit = struct.get("units", struct.get("unit", ""))
+    scale = "" if "scale_factor" in struct else scale_among(facts)
     for name, value in struct.items():
         match value:
             case dict():
                 yield from _numbers(value, f"{prefix}{name}.", facts)
             case np.ndarray() if _holds_samples(value):
-                for channel, row in _channels(
-                    f"{prefix}{name}", value, unit if isinstance(unit, str) else ""
-                ):
-                    told = replace(channel, sample_rate_hz=rate_hz, start_s=start_s, time_trouble=trouble)
-                    yield told, row
+                for place, (channel, row) in enumerate(_channels(f"{prefix}{name}", value)):
+                    unit = unit_among(struct.items(), place)
+                    told = replace(channel, unit=unit, stated_scale=scale, sample_rate_hz=rate_hz)
+                    yield replace(told, start_s=start_s, time_trouble=trouble), row
 
 
 def _holds_samples(values: np.ndarray[Any, Any]) -> bool:
     return values.dtype.kind in "iuf" and values.ndim in {1, 2} and max(values.shape) >= FEWEST_SAMPLES
 
 
-def _channels(name: str, values: np.ndarray[Any, Any], unit: str) -> Iterator[tuple[SourceChannel, Any]]:
+def _channels(name: str, values: np.ndarray[Any, Any]) -> Iterator[tuple[SourceChannel, Any]]:
     """Yield a channel for each row of a matrix, or for each column where there are fewer columns."""
     rows = np.atleast_2d(values) if values.ndim == 1 or values.shape[0] < values.shape[1] else values.T
     label = name.removesuffix(".values").rsplit(".", 1)[-1]
     for number, row in enumerate(rows, start=1):
         own = name if len(rows) == 1 else f"{name}#{number}"
-        yield SourceChannel(own, row.size, label, unit=unit), np.asarray(row, dtype=np.float64)
+        yield SourceChannel(own, row.size, label), np.asarray(row, dtype=np.float64)

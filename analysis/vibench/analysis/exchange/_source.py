@@ -18,7 +18,8 @@ from ..signals.arrays import Reals
 from ._alignment import time_axis
 from ._csv import open_csv
 from ._excerpt import BLOCK_SAMPLES
-from ._hdf5_source import open_hdf5_source
+from ._hdf5_source import Hdf5Source, open_hdf5_source
+from ._mapping import unit_in_name
 from ._mat import open_mat
 from ._source_channel import SourceChannel
 from ._tdms_source import open_tdms
@@ -104,7 +105,7 @@ def opened_source(path: Path) -> Iterator[Source]:
         yield replace(plain, found=dict(zip(_channels_with_times(plain), source.channels, strict=True)))
 
 
-def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
+def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
     """Yield the channels with their times from the file."""
     read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
@@ -117,7 +118,15 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
         near = [time for time in above if len(_group(time)) == nearest]
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
-        yield axes[chosen[0]].of(each) if chosen else each
+        if (
+            isinstance(source.source, Hdf5Source)
+            and len({axes[time].moments for time in near if axes[time].unit is not None}) > 1
+        ):
+            # Names in order of the alphabet do not tell which times belong to a channel.
+            named = ", ".join(shortened(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
+            axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
+        told = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
+        yield axes[chosen[0]].of(told) if chosen else told
 
 
 def _group(channel: SourceChannel) -> str:

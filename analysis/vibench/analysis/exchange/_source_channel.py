@@ -1,8 +1,12 @@
 """One channel of a foreign file, and a table in memory as a source."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
+from typing import Any
+
+import numpy as np
 
 from vibench.acquisition.recording import Origin
 
@@ -37,6 +41,32 @@ def text_of(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
+_UNIT = re.compile(r"(?:ni[ _]?)?(?:y[ _]?)?units?(?:[ _]?(?:labels?|strings?|names?|descriptions?))?", re.I)
+_SCALE = re.compile(
+    r"scale|scaling|(?:(?:scal\w*|cal\w*)[ _]?)?factor|gain|slope|lsb|(?:volts?|v)[ _]?per[ _]?\w+", re.I
+)
+
+
+def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0) -> str:
+    """Return the stated unit, or the one at a place of a list of units; empty if there is none."""
+    for name, value in facts:
+        if _UNIT.fullmatch(name) and (units := np.ravel(value)).size and units.dtype.kind in "SUO":
+            unit = units[place if units.size > 1 and place < units.size else 0]
+            # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
+            return text_of(unit if isinstance(unit, bytes) else str(unit).encode("utf-8", "surrogateescape"))
+    return ""
+
+
+def scale_among(facts: Iterable[tuple[str, Any]]) -> str:
+    """Return a stated scale that readers do not know to be applied or not, such as ``"gain = 0.001"``."""
+    for name, value in facts:
+        if _SCALE.fullmatch(name) and np.size(value) == 1 and np.ravel(value).dtype.kind in "iuf":
+            number = float(np.ravel(value)[0])
+            if number != 1.0:
+                return f"{name} = {number:.6g}"
+    return ""
+
+
 @dataclass(frozen=True)
 class SourceChannel:
     """A channel as described by its file."""
@@ -64,6 +94,8 @@ class SourceChannel:
     """First sample and its place in sample intervals, for each stretch; empty if all are even."""
     time_unit: str | None = None
     """Unit of its times, empty if not stated; None without times."""
+    stated_scale: str = ""
+    """Scale in the file that its numbers may lack; empty if there is none."""
     time_trouble: str = ""
     """Contradiction in the file's time information; empty if there is none."""
 

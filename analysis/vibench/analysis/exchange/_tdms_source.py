@@ -12,11 +12,12 @@ import numpy as np
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._alignment import restarts, stated_rate_hz, told_start_s
-from ._source_channel import SourceChannel
+from ._source_channel import SourceChannel, scale_among, unit_among
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
-UNIT = "unit_string"
+LONGEST_NS = 1000 * 86400 * 10**9
+"""Time stamps are counted within a thousand days, which leave a double 15 ns."""
 START_ERROR_S = 1e-6
 """Start times are kept in microseconds."""
 
@@ -34,7 +35,10 @@ class TdmsSource:
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
         """Read a stretch."""
-        return np.asarray(self.found[channel][start:stop], dtype=np.float64)
+        values = self.found[channel][start:stop]
+        if values.dtype.kind == "M":
+            return np.asarray(values.astype("M8[ns]").astype(np.int64) % LONGEST_NS * 1e-9)
+        return np.asarray(values, dtype=np.float64)
 
 
 @contextmanager
@@ -83,7 +87,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             each
             for group in file.groups()
             for each in group.channels()
-            if len(each) > 1 and each.dtype.kind in "iuf"
+            if len(each) > 1 and each.dtype.kind in "iufM"
         ]
         yield TdmsSource({_channel(file, each, statements): each for each in found})
 
@@ -104,7 +108,8 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
         samples=len(channel),
         label=channel.name,
         sample_rate_hz=rate_hz,
-        unit=str(own.get(UNIT, "")),
+        unit="s" if channel.dtype.kind == "M" else unit_among(own.items()),
+        stated_scale=scale_among(own.items()),
         start_s=next(iter(starts_s.values()), told_start_s(own.items())),
         start_error_s=START_ERROR_S,
         runs=runs,

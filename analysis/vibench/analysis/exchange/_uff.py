@@ -130,6 +130,11 @@ def date_line(started_utc: str) -> str:
 
 
 HEADER_LINES = 11
+UNITS = "164"
+LENGTHS = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "in"}
+"""Unit of length, by the units in a metre (dataset 164)."""
+MOTIONS = {8: "m", 11: "m/s", 12: "m/s2"}
+"""Units of displacement, velocity and acceleration, by data type."""
 LEAST_TEXT = 2
 """Least characters per number in free text: a digit and a separator."""
 DIGITS = 5e-6
@@ -192,11 +197,15 @@ def open_uff(path: Path) -> Iterator[UffSource]:
 
 
 def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
-    number = 0
+    number, length = 0, "m"
     while line := file.readline():
         if line.strip() != DELIMITER.strip().encode():
             continue
         kind = _line(file)
+        if kind.strip() == UNITS:
+            _, factors = _line(file), _line(file)
+            per_metre = _real(factors[:25]) or 1.0
+            length = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
         if kind[:6].strip() != "58":
             _skip_text(file)
             continue
@@ -204,7 +213,7 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
         header = [_line(file) for _ in range(HEADER_LINES)]
         body = _body(file, kind, header)
         if body is not None:
-            yield _channel(number, header), body
+            yield _channel(number, header, length), body
 
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
@@ -253,18 +262,20 @@ def _skip_text(file: BinaryIO) -> None:
     raise ValueError("it ends inside a dataset")
 
 
-def _channel(number: int, header: list[str]) -> SourceChannel:
+def _channel(number: int, header: list[str], length: str) -> SourceChannel:
     rates = [rate for line in header[:5] if (rate := exact_rate_hz(line)) is not None]
     label = header[0].strip()
     unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
     second = SECONDS.get(unit.casefold())
+    # Without a label, motion is in the units of dataset 164.
+    motion = MOTIONS.get(_whole(header[8][:10]), "") if length != "m" else ""
     return SourceChannel(
         name=str(number),
         samples=int(header[6][10:20]),
         label="" if label == "NONE" else label,
         sample_rate_hz=rates[0] if rates else None,
         origin=next(filter(None, map(read_origin, header[:5])), None),
-        unit=header[8][46:66].strip().removesuffix("NONE"),
+        unit=header[8][46:66].strip().removesuffix("NONE") or motion.replace("m", length, 1),
         rate_bounds_hz=None if increment is None else rate_bounds(increment, DIGITS * increment, unit),
         start_s=start * second if start is not None and second is not None else None,
         start_error_s=DIGITS * abs(start) * second if start is not None and second is not None else 0.0,

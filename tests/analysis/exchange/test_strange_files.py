@@ -1,0 +1,185 @@
+"""Ordinary files of other programs with unusual times, units and scales are read right, or refused."""
+
+from datetime import datetime, timedelta
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from vibench.acquisition import open_recording, validated
+from vibench.analysis.errors import InvalidRequest, UnusableData
+from vibench.analysis.exchange import ImportMapping, import_recording
+
+RATE_HZ = 5120.0
+G = 9.80665
+LATE = 13
+"""Sample intervals by which a channel starts later."""
+TIMES = np.arange(4000) / RATE_HZ
+
+
+def signal(times):
+    """Return volts, acceleration and velocity in SI units."""
+    phase = 2 * np.pi * 37.0 * times
+    return np.stack((np.cos(phase), 30.0 * np.sin(phase), 0.5 * np.cos(phase + 1.0)))
+
+
+def imported(path, names=("u", "a", "v")):
+    """Return the samples of a file, lost ones as NaN."""
+    plan = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 37, "settle_s": 0, "duration_s": 0.5}
+    roles = ("drive_voltage", "base_acceleration", "m0_velocity")
+    content = {
+        "started_utc": "2026-03-01T12:00:00Z",
+        "sample_rate_hz": RATE_HZ,
+        "measurement": {"name": "m", "excitation": plan},
+        "channels": [{"source": name, "role": role} for name, role in zip(names, roles, strict=True)],
+    }
+    made = import_recording(path, validated(content, ImportMapping, "test"), path.with_name("made.h5"))
+    with open_recording(made) as recording:
+        return np.stack([recording.read(role) for role in roles])
+
+
+def is_right(samples, lost=0):
+    """Check samples at their moments."""
+    missing = np.isnan(samples[0])
+    expected = np.where(missing, np.nan, signal(np.arange(samples.shape[1]) / RATE_HZ))
+    np.testing.assert_allclose(samples, expected, atol=2e-4, equal_nan=True)
+    assert missing.sum() == lost
+
+
+def text(path, head, columns, between=","):
+    """Write a table below a heading; columns are texts or numbers."""
+    cells = [[each if isinstance(each, str) else f"{each:.10g}" for each in column] for column in columns]
+    path.write_text(head + "\n" + "".join(between.join(row) + "\n" for row in zip(*cells, strict=True)))
+    return path
+
+
+FORMS = (
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%m/%d/%Y %I:%M:%S.%f %p",
+    "%d/%m/%Y %H:%M:%S.%f",
+    "%Y/%m/%d %H:%M:%S,%f",
+    "%d-%b-%Y %H:%M:%S.%f",
+    "%y-%m-%d %H:%M:%S.%f",
+    "%d.%m.%Y;%H:%M:%S.%f",
+    "%H:%M:%S.%f",
+    "%I:%M:%S.%f %p",
+    "%M:%S.%f",
+)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("start", ["2026-02-28 23:59:59.6Z", "2026-03-04 11:59:59Z"])
+def test_dates_and_times_of_day_in_any_form_place_samples(tmp_path, form, start):
+    kept = np.delete(np.arange(TIMES.size), slice(1500, 1537))
+    clock = [(datetime.fromisoformat(start) + timedelta(seconds=TIMES[k])).strftime(form) for k in kept]
+    head = "Date;Time;u;a;v" if ";" in form else "Time;u;a;v"
+    is_right(imported(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
+
+
+def test_a_record_that_goes_on_a_day_later_is_not_read_as_one(tmp_path):
+    clock = [f"0{1 + k // 2000}.03.2026 12:00:{TIMES[k]:09.6f}" for k in range(TIMES.size)]
+    with pytest.raises(InvalidRequest, match="intervals and"):
+        imported(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";"))
+
+
+@pytest.mark.parametrize("sign", ".,")
+def test_separators_of_thousands_are_refused(tmp_path, sign):
+    volts, base, velocity = signal(TIMES)
+    grouped = [f"{round(1e3 * each):,d}".replace(",", sign) for each in base]
+    with pytest.raises(UnusableData, match="seems to be one of thousands"):
+        imported(text(tmp_path / "a.csv", "t;u;a;v", (TIMES, volts, grouped, velocity), ";"))
+
+
+UNITS = (
+    "t,u / mV,a / g,v / mm/s",
+    "t_s,u_mV,a_g,v_mm_s",
+    "Time,u,a,v\ns,mV,g,mm/s\nDC,AC,AC,AC",
+    "Name,u,a,v\nUnit,mV,g,mm/s",
+    "Time,u,a,v\nhh:mm:ss.ms,mV,g,mm/s",
+)
+
+
+@pytest.mark.parametrize("head", UNITS)
+def test_units_in_names_and_in_any_row_of_the_heading_give_scales(tmp_path, head):
+    volts, base, velocity = signal(TIMES)
+    columns = (TIMES, 1e3 * volts, base / G, 1e3 * velocity)
+    is_right(imported(text(tmp_path / "a.csv", head, columns), "234"))
+
+
+def test_a_start_for_each_column_of_labview_aligns_channels(tmp_path):
+    volts, base, _ = signal(TIMES)
+    velocity = signal(TIMES + LATE / RATE_HZ)[2]
+    head = f"X0;0;0;{LATE / RATE_HZ:.9f}\nDelta_X;{1 / RATE_HZ};{1 / RATE_HZ};{1 / RATE_HZ}\nu;a;v"
+    columns = (volts, base, velocity)
+    is_right(imported(text(tmp_path / "a.txt", head.replace(";", "\t"), columns, "\t")), lost=LATE)
+
+
+def test_comments_and_fortran_numbers_are_read_and_a_stated_rate_is_compared(tmp_path):
+    cells = [[f"{each:.9E}".replace("E", "D") for each in row] for row in (TIMES, *signal(TIMES))]
+    cells[0][2000] = f"# marker\n{cells[0][2000]}"
+    is_right(imported(text(tmp_path / "a.txt", "t u a v", cells, " ")))
+    with pytest.raises(InvalidRequest, match="says 4096 samples/s"):
+        imported(text(tmp_path / "b.txt", "Data recorded at 4096 Hz\nu a v", cells[1:], " "))
+
+
+def test_time_stamps_of_a_tdms_file_show_lost_samples(tmp_path):
+    nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
+    kept = np.delete(np.arange(TIMES.size), slice(1500, 1537))
+    start = np.datetime64("2026-03-01T23:59:59.5", "us")
+    stamps = start + (TIMES[kept] * 1e6).round().astype("timedelta64[us]")
+    volts, base, velocity = signal(TIMES[kept])
+    columns = {"Time": stamps, "u": 1e3 * volts, "a": base / G, "v": velocity}
+    units = {"u": {"NI_UnitDescription": "mV"}, "a": {"Unit": "g"}}
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment(
+            [nptdms.ChannelObject("g", name, row, units.get(name, {})) for name, row in columns.items()]
+        )
+    is_right(imported(tmp_path / "a.tdms"), lost=37)
+
+
+def test_units_and_rates_beside_matrices_of_matlab_are_used(tmp_path):
+    volts, base, velocity = signal(TIMES)
+    content = {"data": np.stack((1e3 * volts, base / G, 1e3 * velocity)).T, "Ts": 1 / RATE_HZ}
+    units = np.array(["mV", "g", "mm/s"], dtype=object)
+    savemat(tmp_path / "a.mat", {**content, "units": units})
+    names = ("data#1", "data#2", "data#3")
+    is_right(imported(tmp_path / "a.mat", names))
+    savemat(tmp_path / "b.mat", {**content, "Ts": 1 / 4096})
+    with pytest.raises(InvalidRequest, match="says 4096 samples/s"):
+        imported(tmp_path / "b.mat", names)
+
+
+def hdf5(path, columns, **facts):
+    """Write datasets with the same attributes."""
+    with h5py.File(path, "w") as file:
+        for name, values in columns.items():
+            file.create_dataset(name, data=values).attrs.update(facts)
+    return path
+
+
+def test_doubtful_scales_and_times_of_hdf5_are_refused_and_missing_values_are_lost(tmp_path):
+    columns = dict(zip("uav", signal(TIMES), strict=True))
+    names = ("/u", "/a", "/v")
+    with pytest.raises(InvalidRequest, match=r"says gain = 0\.01 for /u"):
+        imported(hdf5(tmp_path / "a.h5", columns, gain=0.01), names)
+    times = {f"x{k}": TIMES + k * LATE / RATE_HZ for k in range(2)}
+    with pytest.raises(InvalidRequest, match="has different times in /x0, /x1"):
+        imported(hdf5(tmp_path / "b.h5", {**columns, **times}), names)
+    for each in columns.values():
+        each[700:710] = -999.0
+    is_right(imported(hdf5(tmp_path / "c.h5", columns, missing_value=-999.0), names), lost=10)
+
+
+def test_motion_of_a_universal_file_without_labels_is_in_its_stated_length(tmp_path):
+    pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+    path = tmp_path / "a.uff"
+    length = f"{1e3:25.16E}".replace("E", "D")
+    path.write_text(f"    -1\n   164\n         5mm                           2\n{length}\n 0\n    -1\n")
+    kinds = {"func_type": 1, "rsp_node": 1, "rsp_dir": 3, "ref_node": 0, "ref_dir": 0, "abscissa_spacing": 1}
+    axes = {"abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s", "orddenom_spec_data_type": 0}
+    for name, row, kind, scale in zip("uav", signal(TIMES), (0, 12, 11), (1, 1e3, 1e3), strict=True):
+        about = {"ordinate_spec_data_type": kind, "ordinate_axis_units_lab": "NONE", "ord_data_type": 4}
+        made = pyuff.prepare_58(binary=0, data=scale * row, x=TIMES, id1=name, **kinds, **axes, **about)
+        pyuff.UFF(str(path)).write_sets([made], "add")
+    is_right(imported(path))
