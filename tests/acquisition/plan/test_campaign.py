@@ -164,6 +164,10 @@ class TestRefusals:
         with pytest.raises(ConfigurationError, match="measurements"):
             loaded(tmp_path, 'name = "c"\nmeasurements = []\n')
 
+    def test_an_empty_list_of_failures_to_retry_after_is_refused(self, tmp_path):
+        with pytest.raises(ConfigurationError, match=r"retry\.on = \[\]: give 1 or more"):
+            loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
+
     def test_a_ramp_without_stairs_is_refused(self):
         with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 leaves fewer than 4 stairs.*at most 0\.05"):
             Measurement(

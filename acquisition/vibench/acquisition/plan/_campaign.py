@@ -40,7 +40,9 @@ class RetryPolicy(FrozenModel):
 
     attempts: PositiveInt = Field(default=1, le=100)
     """Attempts at each point, including the first; every attempt has a separate file."""
-    on: tuple[Retryable, ...] = (Retryable.DATA_LOST, Retryable.INSTRUMENT_LOST, Retryable.INSTRUMENT_FAULT)
+    on: tuple[Retryable, ...] = Field(
+        default=(Retryable.DATA_LOST, Retryable.INSTRUMENT_LOST, Retryable.INSTRUMENT_FAULT), min_length=1
+    )
     reopen_for_s: NonNegativeFloat = Field(default=60.0, le=86400)
     """How long to search for a lost instrument before the campaign ends [s]."""
 

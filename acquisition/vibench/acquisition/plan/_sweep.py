@@ -142,7 +142,7 @@ class Sweep(FrozenModel):
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
     frequency_hz: Values | None = None
-    order: tuple[SweepAxis, ...] = USUAL_ORDER
+    order: tuple[SweepAxis, ...] = Field(default=USUAL_ORDER, min_length=1)
     """The axes, the outermost (slowest) first."""
     continue_from_previous: SweepAxis | None = None
     """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the specimen stays on its

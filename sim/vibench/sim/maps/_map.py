@@ -267,7 +267,9 @@ class Map(GridPlan):
     """Random additional starts at every point, to find coexisting motions and their shares."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random states."""
-    observe: tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...] = (Observable.RESPONSE,)
+    observe: Annotated[tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...], Field(min_length=1)] = (
+        Observable.RESPONSE,
+    )
     """Additional observables: "lyapunov" is the largest exponent, over up to 25 s at each point (tens of
     times the work)."""
     accuracy: Accuracy = Accuracy.STANDARD
