@@ -412,6 +412,7 @@ def _usual(kind: str, *options: str) -> Case:
         ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out", *options),
         {"plan.toml": (PLAN + DWELL).encode()},
         prepare=(__name__, json.dumps(odd)),
+        hangs_s=4 * HANGS_S,
     )
 
 
@@ -426,7 +427,7 @@ def attack(shard: Shard) -> Tally:
             usual.lay(folder)
             ended = runner.run_in(folder, usual)
             if ended.code:
-                raise RuntimeError(f"a usual measurement failed: {ended.err}")
+                raise RuntimeError(f"a usual measurement failed: {ended.faults} {ended.err}")
             recorded = (folder / "out" / "point.h5").read_bytes()
             shutil.rmtree(folder / "out")
 

@@ -12,7 +12,7 @@ from vibench.sim import Accuracy
 
 from .analyse import complain_about
 from .options import option
-from .output import bold, console, leave_output_to_json, print_json
+from .output import bold, console, leave_output_to_json, print_json, print_warnings
 from .paper.figures import FILES, paper_figure
 from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder
@@ -87,7 +87,10 @@ def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iter
             f"figure {wanted[0]} shows the experiment; give its recordings with --recordings DIR, such as "
             "vibench demo makes"
         )
+    from vibench.analysis.report import check_warnings
+
     results = analyse_files(recordings_in(folder), folder.name)
+    print_warnings(check_warnings(results))
     complain_about(results)
     return lambda number: _measured(number, results)
 

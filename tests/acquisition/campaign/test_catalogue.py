@@ -1,6 +1,7 @@
 """The catalogue of a folder: what it says, that it reads what has changed, and that it can be made again."""
 
 import os
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -136,3 +137,10 @@ def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
 def test_a_missing_folder_gives_one_sentence(tmp_path):
     with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
         list_recordings(tmp_path / "nowhere")
+
+
+def test_a_copy_is_listed_as_one(folder):
+    shutil.copy(folder / "monday" / "dwell.h5", folder / "again.h5")
+    by_path = {each.path: each.verdict for each in list_recordings(folder)}
+    assert by_path["monday/dwell.h5"] == "samples not checked; has the same samples as again.h5"
+    assert by_path["again.h5"] == by_path["tuesday/late/sweep.h5"] == "samples not checked"

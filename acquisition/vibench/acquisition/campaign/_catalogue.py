@@ -8,7 +8,7 @@ import os
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -28,6 +28,8 @@ from ..recording import (
     SealDepth,
     SealKey,
     SealState,
+    copy_sentence,
+    first_copies,
     forget_checks,
     noted_seals,
     open_recording,
@@ -71,6 +73,8 @@ class CatalogueEntry:
     operator: str = ""
     notes: str = ""
     recording_id: str = ""
+    samples_id: str = ""
+    """Equal in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
     """As in `recording.SealState`, as far as a quick check shows; or empty."""
 
@@ -121,6 +125,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         operator=str(recording.confirmations.get("operator", "")),
         notes=str(recording.plan.get("notes", "")),
         recording_id=recording.recording_id,
+        samples_id=recording.samples_id,
         seal=seal.state.value,
     )
 
@@ -163,7 +168,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 
 CATALOGUE_NAME = "catalogue.sqlite"
-VERSION = 4
+VERSION = 5
 """Raised whenever an entry changes; an older catalogue is then made again."""
 WAIT_S = 10.0
 """Waiting time for another program that writes the same catalogue."""
@@ -277,7 +282,14 @@ def _entries(connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
     rows = connection.execute(
         f"SELECT {columns} FROM recordings ORDER BY started_utc, path"  # noqa: S608 - names of fields
     )
-    return tuple(CatalogueEntry(*row) for row in rows)
+    entries = [CatalogueEntry(*row) for row in rows]
+    firsts = [entries[first] for first in first_copies(entries)]
+    return tuple(
+        each
+        if each is first
+        else replace(each, verdict=f"{each.verdict}; {copy_sentence(first, first.path, each)}")
+        for each, first in zip(entries, firsts, strict=True)
+    )
 
 
 MISSING = "missing"

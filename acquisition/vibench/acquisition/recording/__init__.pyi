@@ -80,6 +80,8 @@ from ._seal import (
     SealKey as SealKey,
     SealState as SealState,
     closed_on_error as closed_on_error,
+    copy_sentence as copy_sentence,
+    first_copies as first_copies,
     forget_checks as forget_checks,
     noted_seals as noted_seals,
     opened as opened,

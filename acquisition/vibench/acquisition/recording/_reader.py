@@ -33,6 +33,7 @@ from ._seal import (
     journal_objection,
     remember,
     require_reachable,
+    samples_id,
     seal_key,
     seal_of,
     was_checked,
@@ -174,6 +175,8 @@ class RecordingDescription:
     origin: Origin
     started_utc: str
     recording_id: str
+    samples_id: str
+    """SHA-256 of all channels' checksums: equal in copies. Empty while it grows."""
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
@@ -455,6 +458,7 @@ def _read(handle: OpenRecording) -> Recording:
         origin=facts.origin,
         started_utc=facts.started_utc,
         recording_id=facts.recording_id,
+        samples_id="" if is_part else samples_id(file, roles),
         channels=require_different(channel_header(role, file[role]) for role in roles),
         plan=configuration.plan_json,
         bench=configuration.bench_json,

@@ -16,7 +16,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import h5py
 import numpy as np
@@ -183,6 +183,40 @@ def require_reachable(file: h5py.File | str, error: Exception) -> None:
 def seal_of(file: h5py.File) -> str:
     """Return the seal of a recording, unchecked; empty without one."""
     return str(read_attributes(file[layout.SEAL]).get(SHA256, "")) if layout.SEAL in file else ""
+
+
+def samples_id(file: h5py.File, roles: Sequence[str]) -> str:
+    """Return the SHA-256 of the channels' checksums as stated; empty where one is missing."""
+    stated = [str(read_attributes(file[role]).get("sha256", "")) for role in roles]
+    return _sha256(" ".join(stated).encode()) if all(stated) else ""
+
+
+class Identified(Protocol):
+    """What shows that two files are one recording."""
+
+    @property
+    def recording_id(self) -> str: ...
+    @property
+    def samples_id(self) -> str: ...
+
+
+def first_copies(recordings: Sequence[Identified]) -> list[int]:
+    """Return for each recording the place of the first one that has its samples or its identity."""
+    seen: dict[str, int] = {}
+    firsts = []
+    for place, each in enumerate(recordings):
+        known = [key for key in (each.samples_id, each.recording_id) if key]
+        first = next((seen[key] for key in known if key in seen), place)
+        seen |= dict.fromkeys(known, first)
+        firsts.append(first)
+    return firsts
+
+
+def copy_sentence(kept: Identified, name: str, copy: Identified) -> str:
+    """Say of ``copy`` that it is the recording ``name`` once more, or states that it is."""
+    if copy.samples_id and copy.samples_id == kept.samples_id:
+        return f"has the same samples as {name}"
+    return f"states that it is the recording {name}: one of the two was altered, or is not finished"
 
 
 def seal_result(group: h5py.Group, key: SealKey | None) -> None:

@@ -12,7 +12,7 @@ from vibench.sim.operating_system.this import replace_file
 from ..comparison.curve import Curve, curve_difference
 from ..errors import InvalidRequest
 from ..figures.comparison import comparison_figure
-from ..results.campaign_results import CampaignResults
+from ..results.campaign_results import CampaignResults, counted_once
 from ..results.compared_recording import ComparedRecording, kept_result
 from ..tables import Table, write_csv
 from ._report import write_report
@@ -79,7 +79,8 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
         raise InvalidRequest("a report of no recordings was requested; add a recording to the comparison")
     kept = [kept_result(each) for each in recordings]
     failures = tuple(failure for _, failed in kept for failure in failed)
-    write_report(CampaignResults(target.stem, tuple(result for result, _ in kept), failures), target)
+    results = counted_once([result for result, _ in kept])
+    write_report(CampaignResults(target.stem, results, failures), target)
 
 
 def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:

@@ -368,7 +368,7 @@ def check_table(checks: tuple[Check, ...]) -> ReportTable:
     return ReportTable("Checks", (), rows)
 
 
-CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Overloads", "Drop-outs", "Drive level"})
+CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Copies", "Overloads", "Drop-outs", "Drive level"})
 """Checks whose warnings mean that a result is wrong or unplanned; other warnings only qualify it."""
 _MOST_NUMBERS = 3
 

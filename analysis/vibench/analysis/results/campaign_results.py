@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.plan import present_word
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import Recording, copy_sentence, first_copies
 from vibench.sim import Accuracy, Specimen
 from vibench.sim.background import Observer, Progress, ignore_progress
 
@@ -23,7 +23,7 @@ from ..overlay.draws import DRAWS, DrawSource, base_source, drawn, voltage_sourc
 from ..overlay.driven_rig import described_shaker
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
-from ..recordings.checks import AbstractAnalysis
+from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..recordings.response import response_role, response_roles
 from ..sine.dwell_analysis import DwellAnalysis
@@ -186,8 +186,9 @@ def analyse_files(
 ) -> CampaignResults:
     """Analyse recordings one after the other with `analyse`, and overlay the model on each.
 
-    By default the model comes from each recording's bench configuration. If that describes no shaker, a
-    shaker is fitted to the weakest noise among the recordings. Raises NotEnoughData when no path is given.
+    A copy of a recording is counted once. By default the model comes from each recording's bench
+    configuration. If that describes no shaker, a shaker is fitted to the weakest noise among the recordings.
+    Raises NotEnoughData when no path is given.
 
     Parameters
     ----------
@@ -231,7 +232,21 @@ def analyse_files(
             continue
         results.append(result)
         failures.extend(failed)
-    return CampaignResults(name, tuple(results), tuple(failures))
+    return CampaignResults(name, counted_once(results), tuple(failures))
+
+
+def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
+    """Leave out copies of a recording; the checks of the one that counts name them."""
+    firsts = first_copies([each.analysis.facts for each in results])
+    kept = {first: results[first] for first in firsts}
+    for place, (first, each) in enumerate(zip(firsts, results, strict=True)):
+        if place != first:
+            counted, copy = kept[first].analysis, each.analysis.facts
+            said = copy_sentence(counted.facts, counted.facts.path.name, copy)
+            check = Check("Copies", Verdict.WARNING, f"{copy.path.name} {said}; it is counted once")
+            analysis = replace(counted, checks=(*counted.checks, check))
+            kept[first] = replace(kept[first], analysis=analysis)
+    return tuple(kept.values())
 
 
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:

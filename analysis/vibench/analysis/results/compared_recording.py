@@ -31,6 +31,8 @@ class ComparedRecording(Labelled):
 
     path: Path
     name: str
+    recording_id: str
+    samples_id: str
     curves: tuple[Curve, ...]
     failures: tuple[str, ...]
     """Sentences on what could not be analysed or simulated."""
@@ -54,10 +56,13 @@ def compare_recording(
     """
     with open_recording(path) as recording:
         result, failures = result_of(recording, simulation, request)
-    name = result.analysis.facts.name
+    facts = result.analysis.facts
+    name = facts.name
     return ComparedRecording(
         path=path,
         name=name,
+        recording_id=facts.recording_id,
+        samples_id=facts.samples_id,
         curves=tuple(sorted_curve(each) for each in _curves(result, name)),
         failures=tuple(each.sentence for each in failures),
         warnings=tuple(each.text for each in result.analysis.checks if each.verdict is Verdict.WARNING),

@@ -1,13 +1,21 @@
 """The Compare page overlays recordings and predictions and exports them."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from vibench.analysis import Curve, CurveKind, CurveOrigin
+from vibench.analysis import (
+    Curve,
+    CurveKind,
+    CurveOrigin,
+    FrequencyResponseRequest,
+    Simulation,
+    compare_recording,
+)
 from vibench.analysis.prediction.progress import SimulatedPoint, SimulationProgress
 from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.widgets.theme import DARK
@@ -147,6 +155,19 @@ def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
     svg = (tmp_path / "out.svg").read_text()
     assert re.search(r'id="model, Response I, predicted"', svg)
     assert "twice, transmission, measured" in (tmp_path / "out.csv").read_text().splitlines()[0]
+
+
+def test_a_copy_under_another_name_is_shown_once(page, record_noise, tmp_path):
+    notices = []
+    page.context.noticed.connect(notices.append)
+    path = record_noise(tmp_path, "noise", 2.0)
+    copy = shutil.copy(path, tmp_path / "copy.h5")
+    for each in (path, copy):
+        page._recordings[each] = None
+        page._compared(compare_recording(each, FrequencyResponseRequest(), Simulation.LEFT_OUT))
+    assert [each.what for each in notices] == [f"{copy} has the same samples as {path}."]
+    assert {each.source for each in page.curves.curves} == {"noise"}
+    assert set(page._recordings) == {path}
 
 
 @pytest.mark.thorough

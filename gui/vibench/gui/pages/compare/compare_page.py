@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QGroupBox, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
+from vibench.acquisition.recording import copy_sentence, first_copies
 from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_recording
 from vibench.analysis.dynamics import branch_curves
 from vibench.sim.background import Job
@@ -179,6 +180,13 @@ class ComparePage(Page):
         ask(export_comparison, self._exported, self._refused, path, shown, recordings, pair, marked)
 
     def _compared(self, found: ComparedRecording) -> None:
+        others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
+        if (first := first_copies([*others, found])[-1]) < len(others):
+            del self._recordings[found.path]
+            said = copy_sentence(others[first], str(others[first].path), found)
+            self.context.say(Notice(NoticeKind.WARNING, f"{found.path} {said}.", "It is shown once."))
+            self._end_job()
+            return
         self._recordings[found.path] = found
         self.curves.replace_source(found.name, found.curves)
         for sentence in found.failures:
