@@ -425,7 +425,7 @@ def journal_objection(path: Path, seal: str) -> str:
 
     No program notes two seals for one file: where the tables differ, neither confirms it.
     """
-    noted = noted_seals(path.parent).get(path.name, ())
+    noted = noted_seals(path.parent).get(path.name, [])
     stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
     if stated and seal not in stated:
         point = noted[0].point
