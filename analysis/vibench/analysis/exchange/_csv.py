@@ -6,7 +6,7 @@ Read columns of text, separated by commas, semicolons, tabs or blanks, into memo
 import codecs
 import csv
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -59,7 +59,6 @@ STATEMENT = re.compile(
     r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
 )
 """A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
-
 SENTENCE = re.compile(
     r"(?:sampled|recorded|acquired) (?:at|with) ([\d.]+) ?(k?hz)|([\d.]+) ?(k?s)(?:a|amples?)?(?:/| per )s",
     re.I,
@@ -223,7 +222,7 @@ def _layout(line: str) -> _Layout | None:
         while filled and not cells[filled - 1].strip():
             filled -= 1
         if (delimiter is None or delimiter in line) and filled and _are_numbers(cells[:filled]):
-            has_text = not _are_numbers(_cells(line, delimiter)[:filled], str)
+            has_text = bool(FORTRAN.search(line)) or _cells(line, delimiter)[:filled] != cells[:filled]
             return _Layout(delimiter, filled, len(cells) - filled, has_text)
     return None
 
@@ -242,15 +241,15 @@ def _number(cell: str) -> str:
     return FORTRAN.sub("e", cell.strip().replace(",", "."))
 
 
-def _are_numbers(cells: Sequence[str], read: Callable[[str], str] = _number) -> bool:
+def _are_numbers(cells: Sequence[str]) -> bool:
     try:
-        return bool([float(read(each)) for each in cells])
+        return bool([float(_number(each)) for each in cells])
     except ValueError:
         return False
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units from one row, or from two rows of which one has only units; else empty."""
+    """Return labels and units from one row, or from two of which one has only units; else empty."""
     rows = [row for line in head if any(row := _row(line, layout))]
     named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
     labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)

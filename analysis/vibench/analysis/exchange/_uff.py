@@ -203,9 +203,10 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
             continue
         kind = _line(file)
         if kind.strip() == UNITS:
-            _, factors = _line(file), _line(file)
+            begin, _, factors = file.tell(), _line(file), _line(file)
             per_metre = _real(factors[:25]) or 1.0
             length = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
+            file.seek(begin)
         if kind[:6].strip() != "58":
             _skip_text(file)
             continue
