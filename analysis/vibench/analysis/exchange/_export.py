@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -242,76 +242,57 @@ def export_functions(
 WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]
 
 
-class Exporter(Protocol):
-    """Exporter of one format, a row of `EXPORTERS`."""
-
-    @property
-    def write_functions(self) -> WriteFunctions | None:
-        """Function that writes frequency responses and spectra; None if the format cannot."""
-
-    def export(
-        self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
-    ) -> tuple[Path, ...]:
-        """Write and return the files; incomplete files are removed."""
-
-
 def _accept(_excerpt: Excerpt) -> None:
     """Accept an excerpt of any length."""
 
 
-@dataclass(frozen=True)
-class SamplesFile:
-    """A format for samples only; facts and results are written beside it."""
+WriteSamples = Callable[[Excerpt, Path, TransferObserver], None]
+WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
-    write: Callable[[Excerpt, Path, TransferObserver], None]
+
+@dataclass(frozen=True)
+class Exporter:
+    """Exporter of one format, a row of `EXPORTERS`."""
+
+    write: WriteSamples | None = None
+    """Writes samples; facts and results are written beside them."""
     require: Callable[[Excerpt], None] = _accept
     """Raises InvalidRequest for what the format cannot hold."""
     write_functions: WriteFunctions | None = None
+    """Writes frequency responses and spectra; None if the format cannot."""
+    write_all: WriteAll | None = None
+    """Writes samples, facts and results into one file."""
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
     ) -> tuple[Path, ...]:
-        """Write samples, facts and tables after checking that all names are free."""
-        recording, facts = excerpt.recording, facts_path(path)
+        """Write and return the files after checking that all names are free."""
+        recording, facts, written = excerpt.recording, facts_path(path), [path]
         are_included = results is Results.INCLUDED
-        require_unused(facts)
         self.require(excerpt)
-        if are_included:
-            result_paths(recording, path)
-        with new_file(path) as unfinished:
-            self.write(excerpt, unfinished, observer)
-        with new_file(facts) as unfinished:
-            write_facts(excerpt, unfinished)
-        tables = write_result_tables(recording, path) if are_included else ()
-        return path, facts, *tables
-
-
-@dataclass(frozen=True)
-class WholeFile:
-    """A format that stores facts and results too."""
-
-    write: Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
-    require: Callable[[Excerpt], None] = _accept
-    write_functions: WriteFunctions | None = None
-
-    def export(
-        self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
-    ) -> tuple[Path, ...]:
-        """Write everything into one file."""
-        self.require(excerpt)
-        structs = matlab_results(excerpt.recording) if results is Results.INCLUDED else {}
-        with new_file(path) as unfinished:
-            self.write(excerpt, unfinished, structs, observer)
-        return (path,)
+        if self.write_all is not None:
+            structs = matlab_results(recording) if are_included else {}
+            with new_file(path) as unfinished:
+                self.write_all(excerpt, unfinished, structs, observer)
+        if self.write is not None:
+            require_unused(facts)
+            if are_included:
+                result_paths(recording, path)
+            with new_file(path) as unfinished:
+                self.write(excerpt, unfinished, observer)
+            with new_file(facts) as unfinished:
+                write_facts(excerpt, unfinished)
+            written += [facts, *(write_result_tables(recording, path) if are_included else ())]
+        return tuple(written)
 
 
 EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
     {
-        Format.CSV: SamplesFile(write_csv_samples),
-        Format.UFF: SamplesFile(write_uff, write_functions=write_uff_functions),
-        Format.MAT: WholeFile(write_mat, require_small),
-        Format.NEXUS: SamplesFile(write_nexus),
-        Format.WAV: SamplesFile(write_wav, require_sound),
+        Format.CSV: Exporter(write_csv_samples),
+        Format.UFF: Exporter(write_uff, write_functions=write_uff_functions),
+        Format.MAT: Exporter(require=require_small, write_all=write_mat),
+        Format.NEXUS: Exporter(write_nexus),
+        Format.WAV: Exporter(write_wav, require_sound),
     }
 )
 """Exporters by format. A new format needs a module with its writer, a value above, and a row here."""
