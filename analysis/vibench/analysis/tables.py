@@ -84,7 +84,7 @@ def columns(source: object, keys: str) -> dict[str, Any]:
 
 
 def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
-    """Return values of several parts below each other, by keys as in `columns`; NaN where a part has none."""
+    """Return concatenated values of several parts, by keys as in `columns`; NaN for missing values."""
     found = [columns(each, keys) for each in parts]
     names = [each.partition("=")[0] for each in keys.split()]
     return {
@@ -173,9 +173,9 @@ UNITS = {
     "_ns_per_m": "N s m-1",
     "_s_per_m": "s m-1",
 }
-"""Unit of a value by the end of its name; the longest that fits."""
+"""Unit of a value by the end of its name; the longest match counts."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
-"""What values are given over, the first that a result has."""
+"""Independent variables; the first that a result has is used."""
 
 
 class Labelled:
@@ -218,7 +218,7 @@ class Labelled:
 
 
 def unit_of(name: str) -> str:
-    """Return the unit that the end of a name says, in UDUNITS text; empty where it says none.
+    """Return the unit given by the end of a name, in UDUNITS text; empty without one.
 
     >>> unit_of("damping_ns_per_m"), unit_of("frequency_hz"), unit_of("response_i")
     ('N s m-1', 'Hz', '')
@@ -228,7 +228,7 @@ def unit_of(name: str) -> str:
 
 
 def _unit(part: Any, key: str, unit: str) -> str:
-    """Return the unit of one of its values; ``unit`` is what holds the part says of it."""
+    """Return the unit of a value of a part; ``unit`` is the part's unit in its parent."""
     said = getattr(part, "OWN_UNITS", {}).get(key)
     if said is None:
         return unit_of(key)
@@ -240,7 +240,7 @@ def _attributes(unit: str) -> dict[str, str]:
 
 
 def holds_array(annotation: object) -> bool:
-    """Say whether a type is one of arrays: numpy 2.5 has an alias where older ones have the class itself."""
+    """Return whether a type is an array: an alias in numpy 2.5, the class itself in older versions."""
     return "ndarray" in str(annotation).lower()
 
 
@@ -287,7 +287,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Return type and length of every list of a part; None where it holds anything else."""
+    """Return type and length of every list of a part; None if it contains anything else."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:
@@ -301,7 +301,7 @@ def _row_shape(part: Any) -> tuple[Any, ...] | None:
 
 
 def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[str, Any]) -> None:
-    """Lay parts of single numbers below each other: one variable a field, NaN where a row has none."""
+    """Combine parts of single numbers into one variable per field, with NaN for missing numbers."""
     for key, _ in _numbers_of(rows[0]):
         values = [getattr(row, key) for row in rows]
         is_word = any(isinstance(each, str) for each in values)
@@ -320,7 +320,7 @@ def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[s
 
 
 def _numbers_of(part: Any) -> Iterator[tuple[str, Any]]:
-    """Go through the fields of a result, then the arrays that it computes from them."""
+    """Yield the fields of a result, then the arrays computed from them."""
     for each in fields(part):
         yield each.name, getattr(part, each.name)
     for name, found in inspect.getmembers(type(part), lambda member: isinstance(member, property)):

@@ -1,4 +1,4 @@
-"""The analysis of each kind of excitation: that of its family, or its own."""
+"""The analysis of each kind of excitation; kinds of a family may share one."""
 
 from collections.abc import Mapping
 from typing import Any

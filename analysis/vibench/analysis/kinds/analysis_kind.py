@@ -51,17 +51,17 @@ class AnalysisKind(Generic[P, A, L]):
     """How recordings of one kind of excitation are analysed: plan, analysis and overlay belong together."""
 
     family: str
-    """What JSON calls the results; kinds with equal results share it."""
+    """Name of the results in JSON; kinds with equal results share it."""
     analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
     draws: Callable[[A], Callable[[SimulatedChannels], Draw[Any]]]
-    """Give what estimates from simulated channels what was estimated from the recorded ones."""
+    """Return the function that estimates the recorded quantities from simulated channels."""
     compared: Callable[[A], tuple[Quantity, ...]]
-    """What of the measurement is set into the draws."""
+    """Return the measured quantities that are compared with the draws."""
     lay: Callable[[A, Drawn[Any]], L]
-    """Compare with all draws."""
+    """Compare the analysis with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
     """Curves of the response, measured or simulated, of the recording with that name."""
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
-    """Budgets of the numbers that a reader takes away."""
+    """Return uncertainty budgets of the main results."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()
     """Sorts the results of a family, weak to strong; without it they stay in the order given."""

@@ -39,7 +39,7 @@ def _analyse(
     facts: RecordingFacts, channels: Channels, plan: DwellPlan, _: FrequencyResponseRequest
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
-    # A dwell that lasts until it is known well enough is known by all of it.
+    # A dwell that lasts until its bound is met is analysed as a whole.
     longest_s = WINDOW_S if facts.measurement.until is None else inf
     found = measured_dwell(channels, plan, towards_hz, longest_s)
     motion = dwell_motion(channels, found)

@@ -41,7 +41,7 @@ def stepped_analysis(
     label: SegmentLabel = SegmentLabel.STEP,
     result: type[SteppedSineAnalysis] = SteppedSineAnalysis,
 ) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
-    """Return the analysis of a kind that records step after step, under a label of its own."""
+    """Return the analysis of a kind that records step after step, with a label for the kind."""
 
     def analyse(
         facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
@@ -73,6 +73,6 @@ STEPPED_SINE = stepped_analysis(lambda plan, _: plan.amplitude_vpp)
 STEPPED_LEVEL = stepped_analysis(
     lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), result=SteppedLevelAnalysis
 )
-# With feedback the setting is not the plan's, and is known of no step.
+# With feedback the setting differs from the plan's and is unknown for each step.
 SETTLED_SINE = stepped_analysis(lambda *_: nan)
 RESONANCE_TRACKING = stepped_analysis(lambda *_: nan, SegmentLabel.RESONANCE)
