@@ -46,28 +46,28 @@ def test_a_campaign_is_catalogued_and_its_end_notified(vibench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_campaign_accepts_only_settings_confirmed_at_its_check(vibench, tmp_path):
+def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
-    checked = vibench("bench", "check", "--bench", bench, "--knobs", knobs, cwd=tmp_path)
+    checked = vibench_here("bench", "check", "--bench", bench, "--knobs", knobs, cwd=tmp_path)
     assert checked.returncode == 0, checked.stderr
     knobs.write_text(knobs.read_text().replace('"simulated"', '"A. Student"'))
-    made = vibench(*campaign, "--out", "out", cwd=tmp_path)
+    made = vibench_here(*campaign, "--out", "out", cwd=tmp_path)
     assert made.returncode == 0, made.stderr
     with open_recording(next(tmp_path.glob("out/*.h5"))) as recording:
         assert recording.confirmations["operator"] == "A. Student"
     knobs.write_text(knobs.read_text().replace('"10 dB"', '"20 dB"'))
-    refused = vibench(*campaign, "--out", "elsewhere", cwd=tmp_path)
+    refused = vibench_here(*campaign, "--out", "elsewhere", cwd=tmp_path)
     assert refused.returncode == 1
     assert "does not confirm Bruel & Kjaer 2706 gain at 10 dB" in refused.stderr
     assert not list(tmp_path.glob("elsewhere/*.h5*"))
 
 
 @pytest.mark.thorough
-def test_a_foreign_file_is_not_overwritten_by_a_knob_sheet(vibench, tmp_path):
+def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     before = plan.read_text()
-    refused = vibench("bench", "check", "--bench", bench, "--knobs", plan, cwd=tmp_path)
+    refused = vibench_here("bench", "check", "--bench", bench, "--knobs", plan, cwd=tmp_path)
     assert refused.returncode == 1
     assert plan.read_text() == before
 

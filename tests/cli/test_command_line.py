@@ -33,31 +33,31 @@ def campaign(folder, text=QUICK):
 
 
 @pytest.mark.thorough
-def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vibench, tmp_path):
+def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vibench_here, tmp_path):
     plan = campaign(tmp_path)
-    first = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
+    first = vibench_here("measure", plan, "--out", "recordings", cwd=tmp_path)
     assert first.returncode == 0, first.stderr
     with open_recording(tmp_path / "recordings" / "dwell.h5") as recording:
         assert recording.state is RecordingState.COMPLETE
     before = (tmp_path / "recordings" / "dwell.h5").read_bytes()
-    second = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
+    second = vibench_here("measure", plan, "--out", "recordings", cwd=tmp_path)
     assert second.returncode == 1
     assert "dwell.h5 exists already, and nothing is ever overwritten" in second.stderr
-    resumed = vibench("measure", plan, "--out", "recordings", "--resume", cwd=tmp_path)
+    resumed = vibench_here("measure", plan, "--out", "recordings", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0
     assert "kept" in resumed.stdout
     assert (tmp_path / "recordings" / "dwell.h5").read_bytes() == before
 
 
 @pytest.mark.thorough
-def test_campaign_file_and_page_are_reported_as_json(vibench, tmp_path):
-    measured = vibench("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
+def test_campaign_file_and_page_are_reported_as_json(vibench_here, tmp_path):
+    measured = vibench_here("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
     (row,) = json.loads(measured.stdout)["recordings"]
     assert (row["name"], row["outcome"]) == ("dwell", "recorded")
     recording = tmp_path / row["path"]
-    exported = vibench("export", recording, "--to", "csv", "--until", "0.1", "--json", cwd=tmp_path)
+    exported = vibench_here("export", recording, "--to", "csv", "--until", "0.1", "--json", cwd=tmp_path)
     assert all((tmp_path / each).is_file() for each in json.loads(exported.stdout)["files"])
-    packed = vibench("pack", "recordings", "--license", "https://example.org/l", "--json", cwd=tmp_path)
+    packed = vibench_here("pack", "recordings", "--license", "https://example.org/l", "--json", cwd=tmp_path)
     assert json.loads(packed.stdout)["untrusted"] == {}
 
 

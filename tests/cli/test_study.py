@@ -60,9 +60,9 @@ def test_an_estimate_counts_points_and_work_without_a_file(vibench_here, tmp_pat
 
 @pytest.mark.thorough
 @pytest.mark.timeout(COMPILING_S)
-def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench, tmp_path):
+def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench_here, tmp_path):
     asked = plan(tmp_path)
-    first = vibench("study", asked, "--out", "a.h5", "--json", cwd=tmp_path, timeout_s=COMPILING_S)
+    first = vibench_here("study", asked, "--out", "a.h5", "--json", cwd=tmp_path)
     assert first.returncode == 0, first.stderr
     said = json.loads(first.stdout)
     assert (said["points"], said["kept"], said["failures"]) == (12, 12, [])
@@ -70,10 +70,10 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vi
     assert np.all(results.state == PointState.DONE)
     assert results.values("response_i", amplitude=20e-6, frequency=230.0).shape == (1, 1, 1, 2)
     before = (tmp_path / "a.h5").read_bytes()
-    second = vibench("study", asked, "--out", "a.h5", cwd=tmp_path)
+    second = vibench_here("study", asked, "--out", "a.h5", cwd=tmp_path)
     assert second.returncode == 1
     assert "a.h5 exists, and nothing is ever overwritten; resume it" in second.stderr
-    resumed = vibench("study", asked, "--out", "a.h5", "--resume", "--workers", "1", cwd=tmp_path)
+    resumed = vibench_here("study", asked, "--out", "a.h5", "--resume", "--workers", "1", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
     assert "12 of 12 points, 0 failed (complete)" in resumed.stdout
     assert (tmp_path / "a.h5").read_bytes() == before

@@ -151,7 +151,6 @@ def test_a_resume_lists_its_points_before_it_plays(folder, damage):
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_verifying_finds_every_damage(folder, damage):
-    assert {each.verdict for each in verify_recordings(folder)} == {"intact"}
     damage(folder)
     bad = [each for each in verify_recordings(folder) if each.is_bad]
     assert [each.path for each in bad] == ["two.h5"]

@@ -283,7 +283,6 @@ def test_the_phase_of_a_second_superharmonic_depends_on_the_nearer_bumper(carrie
     [
         ((60e-6, 30e-6), -90, 193.175, 2.075e-6),
         pytest.param((30e-6, 60e-6), 90, 193.175, 2.075e-6, marks=pytest.mark.slow),
-        ((60e-6, 30e-6), -60, 193.092, 2.417e-6),
     ],
 )
 def test_a_subharmonic_resonance_is_found_by_twice_its_phase(

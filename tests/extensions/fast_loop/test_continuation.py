@@ -250,14 +250,6 @@ def test_motions_near_grazing_are_refused_with_the_loops_multiplier(rig):
         require_held(fast, plan)
 
 
-@pytest.mark.thorough
-def test_a_branch_among_stops_is_refused_from_where_the_loop_with_its_contacts_has_a_multiplier_of_one():
-    stops, plan = among_stops(low_hz=96.4, high_hz=98.7)
-    with pytest.raises(LimitExceeded, match=r"hold it from 97\.5 to 96\.[78]\d* Hz, behind 1 fold\."):
-        require_held(fast_loop(stops), plan)
-    require_held(fast_loop(stops), plan.model_copy(update={"low_hz": 96.85}))
-
-
 def test_a_branch_without_start_or_force_in_the_model_is_refused():
     stops, plan = among_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
     with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):

@@ -23,7 +23,7 @@ def drifts(contact, cells, duration_s):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("cells", [2, 4, 20])
+@pytest.mark.parametrize("cells", [2, 4])
 def test_undamped_hertz_chains_have_small_unbiased_energy_errors(cells):
     found = drifts("hertz", cells, 0.5)
     assert np.abs(found).max() < 2e-5
