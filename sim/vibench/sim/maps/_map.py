@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
-from ..scene.prediction import MotionKind, ScenePrediction
+from ..scene.prediction import MotionKind, ScenePrediction, state_of
 from ..scene.scene import BUDGET_S, AutomaticDuration, Given, Observable, Rest, Scene, Target
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
@@ -435,12 +435,10 @@ class Map(GridPlan):
         """Return the start of a point that does not continue another."""
         if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
-            x, y, z, vx, vy, vz = (float(each) for each in random_state(specimen, drive, drawn))
-            return Given((x, y, z, vx, vy, vz), RANDOM)
+            return Given(state_of(random_state(specimen, drive, drawn)), RANDOM)
         if self.chain:
             return Rest()
-        x, y, z, vx, vy, vz = (said[each.field] for each in START)
-        return Given((x, y, z, vx, vy, vz))
+        return Given(state_of(np.array([said[each.field] for each in START])))
 
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
         """Value of every quantity at a place."""

@@ -367,9 +367,9 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
     """Solve by damped Newton iteration, halving steps; return unknowns and success."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearised(unknowns, omega, amplitude_m)
-    error = _size(residual)
+    error = size_of(residual)
     for _ in range(NEWTON_ITERATIONS):
-        if error < ROUNDING * max(1.0, _size(unknowns)):
+        if error < ROUNDING * max(1.0, size_of(unknowns)):
             return unknowns, True
         try:
             step = np.linalg.solve(jacobian, residual)
@@ -378,18 +378,18 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
         for halving in range(MOST_HALVINGS):
             trial = unknowns - 0.5**halving * step
             trial_residual, trial_jacobian, _, _ = problem.linearised(trial, omega, amplitude_m)
-            trial_error = _size(trial_residual)
+            trial_error = size_of(trial_residual)
             if trial_error < error:
                 break
         else:
             # At rounding level no step helps any more: that is convergence, elsewhere it is not.
-            return unknowns, error < 1e3 * ROUNDING * max(1.0, _size(unknowns))
+            return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
-    return unknowns, error < 1e3 * ROUNDING * max(1.0, _size(unknowns))
+    return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
 
 
-def _size(values: Vector) -> float:
-    """Largest magnitude; infinite when anything is not finite."""
+def size_of(values: Vector) -> float:
+    """Return the largest magnitude; infinite when anything is not finite."""
     size = float(np.max(np.abs(values)))
     return size if math.isfinite(size) else math.inf
 

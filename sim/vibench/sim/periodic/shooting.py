@@ -26,7 +26,7 @@ from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
 from ..specimen.stops import chosen
 from .branch import NEUTRAL, BifurcationKind, OrbitSigns, Symmetry
 from .floquet import multipliers
-from .harmonic_balance import phasors_of
+from .harmonic_balance import phasors_of, size_of
 
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
@@ -237,7 +237,7 @@ def periodic_orbit(
     state = first.copy()
     gone = (mapping.image(state, drive) - state) / scales
     for _ in range(NEWTON_ITERATIONS):
-        if not _size(gone) > RETURNED:
+        if not size_of(gone) > RETURNED:
             break
         slope = mapping.derivative(state, drive) - np.eye(6)
         if not bool(np.all(np.isfinite(slope))):
@@ -257,14 +257,9 @@ def _damped_step(
     for halving in range(MOST_HALVINGS):
         trial = state - 0.5**halving * step
         trial_gone = (mapping.image(trial, drive) - trial) / scales
-        if _size(trial_gone) < _size(gone):
+        if size_of(trial_gone) < size_of(gone):
             return trial, trial_gone, True
     return state, gone, False
-
-
-def _size(values: Vector) -> float:
-    size = float(np.max(np.abs(values)))
-    return size if math.isfinite(size) else math.inf
 
 
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
@@ -275,7 +270,7 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
     waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
     lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
-    defect = _size(gone)
+    defect = size_of(gone)
     found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)) and np.all(np.isfinite(lines)))
     return PeriodicOrbit(
         drive=drive,
@@ -317,7 +312,7 @@ def _missing(derivative: Table, gone: Vector) -> float:
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
-    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * (_size(gone) + FLOW_ERROR))
+    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * (size_of(gone) + FLOW_ERROR))
 
 
 def _signs(

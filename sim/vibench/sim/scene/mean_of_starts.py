@@ -84,10 +84,7 @@ def others_of(starts: Sequence[Start]) -> int | None:
 
 
 def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
-    """Return the next numbers of starts and windows, at most doubling the motion followed so far.
-
-    ``error`` is the requested one; ``lead`` is the time before the first window, in windows.
-    """
+    """Return the next numbers of starts and windows, at most doubling the motion followed so far."""
     windows = windows_of(starts)
     if len(starts) < FEWEST_STARTS:
         return FEWEST_STARTS, windows
@@ -100,7 +97,8 @@ def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tupl
 def windows_help(starts: Sequence[Start], lead: float) -> bool:
     """Return whether more windows of the same starts reduce the error more cheaply than more starts.
 
-    More starts also find rare motions, so windows must cost half as much or less.
+    More starts also find rare motions, so windows must cost half as much or less. ``lead`` is the time before
+    the first window, in windows.
     """
     windows = windows_of(starts)
     if lead < 1.0 or any(each.repeats is not None for each in starts):

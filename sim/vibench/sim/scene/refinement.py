@@ -364,18 +364,8 @@ class _Refinement:
         windows = [self._observed(each, periods) for each in (run, twin)]
         if windows[0] is None or windows[1] is None:
             return
-        found = self._in_window(windows[0], windows[1], run)
-        if found.error_estimate is not None:
-            errors = (
-                found.response_i_error,
-                found.response_ii_error,
-                found.relative_i_error,
-                found.relative_ii_error,
-            )
-            stated = np.array(errors, dtype=np.float64) + self._unsettled
-            found = replace(with_errors(found, stated), memory=StartMemory.UNKNOWN)
-            found = _reported(found, self._target, self._clock, 1, None)
-        yield found
+        found = self._in_window(windows[0], windows[1], run, self._unsettled)
+        yield replace(found, memory=StartMemory.UNKNOWN)
 
     @property
     def _unsettled(self) -> float:
@@ -389,17 +379,14 @@ class _Refinement:
         return SAFETY * float(np.abs(before - points[-1]).max(axis=1).min()) / size
 
     def _in_window(
-        self,
-        window: ObservedWindow,
-        other: ObservedWindow,
-        run: FollowedRun,
+        self, window: ObservedWindow, other: ObservedWindow, run: FollowedRun, unsettled: float = 0.0
     ) -> ScenePrediction:
         """Return the result for the motion of one start in a stated window, checked by a stricter run."""
         answer = window.responses_m
         off = np.abs(answer - other.responses_m) / answer
         is_parted = not float(off.max()) < PARTED
         times = 0.5 * student_quantile(1, COVERED) if is_parted else SAFETY
-        errors = times * off + ROUNDING * np.repeat(answer[::2], 2) / answer
+        errors = times * off + ROUNDING * np.repeat(answer[::2], 2) / answer + unsettled
         found = self._prediction(answer, errors, run.time_s, window.length_s, window.impacts)
         found = replace(
             found,
@@ -545,6 +532,7 @@ class _Refinement:
     ) -> ScenePrediction:
         """Return a prediction with responses and relative errors; callers replace the other fields."""
         amplitude_m = self._scene.drive.amplitude_m
+        is_free = never_touches(self._scene.specimen, self._motion)
         response_i, response_ii, relative_i, relative_ii = (
             None if math.isnan(each) else float(each) / amplitude_m for each in responses_m
         )
@@ -572,13 +560,9 @@ class _Refinement:
             outcome=Outcome.REACHED_END,
             method=self._method,
             accuracy=self._scene.accuracy.value,
-            memory=StartMemory.KEPT if self._never_touches else StartMemory.UNKNOWN,
+            memory=StartMemory.KEPT if is_free else StartMemory.UNKNOWN,
         )
         return with_errors(found, errors)
-
-    @property
-    def _never_touches(self) -> bool:
-        return never_touches(self._scene.specimen, self._motion)
 
 
 def _reported(
