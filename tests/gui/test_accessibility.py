@@ -141,10 +141,13 @@ def test_every_field_has_a_visible_edge(window, qapp, qtbot, contrast, theme):
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize(
     "size", [(1024, 700), (1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}"
 )
-def test_no_text_is_cut_off(window, qapp, size):
+def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
+    window.context.choose_theme(theme)
+    qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
     window.resize(*size)
     for name in window.pages:
         window.show_page(name)
