@@ -42,6 +42,14 @@ def pool():
     pool.close()
 
 
+@pytest.fixture
+def patient_pool():
+    """For answers that do not end by time, also where a process takes seconds to start."""
+    pool = Pool(1, longest_s=60.0)
+    yield pool
+    pool.close()
+
+
 def polled(pool, is_there):
     while not is_there():
         pool.poll(0.1)
@@ -124,13 +132,13 @@ def odd(_number):
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("function", [lambda_of, odd])
-def test_an_unpicklable_answer_is_an_error_and_the_next_job_runs(pool, function):
+def test_an_unpicklable_answer_is_an_error_and_the_next_job_runs(patient_pool, function):
     errors, answers = [], []
-    pool.ask(function, answers.append, errors.append, 0)
-    polled(pool, lambda: errors)
+    patient_pool.ask(function, answers.append, errors.append, 0)
+    polled(patient_pool, lambda: errors)
     assert isinstance(errors[0], (pickle.PicklingError, AttributeError, ChildProcessError))
-    pool.ask(factorial, answers.append, errors.append, 5)
-    polled(pool, lambda: answers)
+    patient_pool.ask(factorial, answers.append, errors.append, 5)
+    polled(patient_pool, lambda: answers)
     assert answers == [120]
 
 

@@ -44,7 +44,7 @@ def test_the_program_of_tests_passes_under_the_sanitizers(tmp_path):
 
 
 def test_a_broken_structure_returns_an_error_code():
-    assert "-1:" in output_of(sys.executable, FUZZ, native_engine().path, "--count", 3000)
+    assert "-1:" in output_of(sys.executable, FUZZ, native_engine().path, "--count", 400)
 
 
 @needs_gcc
@@ -55,4 +55,4 @@ def test_broken_structures_cause_no_undefined_behaviour(tmp_path):
     output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "api.cpp", "-o", library)
     runtime = output_of("g++", "-print-file-name=libasan.so").strip()
     environment = {"LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0"}
-    output_of(sys.executable, FUZZ, library, "--count", 1000, **environment)
+    output_of(sys.executable, FUZZ, library, "--count", 300, **environment)
