@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from vibench.acquisition import ConfigurationError, printable
 from vibench.acquisition.rig import load_rig
 
-from .window.open_window import display_trouble
+from .window.display import display_trouble
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QLabel

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from vibench.gui.window import open_window as _display
+from vibench.gui.window import display
 
 
 def started(tmp_path, **environment):
@@ -18,9 +18,9 @@ def started(tmp_path, **environment):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a display")
-@pytest.mark.parametrize("display", [{}, {"DISPLAY": ":97"}], ids=["none", "dead"])
-def test_a_missing_display_is_reported_in_one_sentence(tmp_path, display):
-    result = started(tmp_path, **display)
+@pytest.mark.parametrize("given", [{}, {"DISPLAY": ":97"}], ids=["none", "dead"])
+def test_a_missing_display_is_reported_in_one_sentence(tmp_path, given):
+    result = started(tmp_path, **given)
     assert result.returncode == 1
     assert result.stderr.startswith("The window cannot be opened: ")
     assert len(result.stderr.splitlines()) == 1
@@ -32,8 +32,22 @@ def test_missing_libraries_are_reported_with_the_packages_to_install(monkeypatch
     def refused(path):
         raise OSError("libxcb-cursor.so.0: cannot open shared object file: No such file or directory")
 
-    monkeypatch.setattr(_display.ctypes, "CDLL", refused)
-    said = _display._plugin_trouble()
+    monkeypatch.setattr(display.ctypes, "CDLL", refused)
+    said = display._plugin_trouble()
     assert "libxcb-cursor0 is missing" in said
     assert "apt-get install" in said
     assert "libxkbcommon-x11-0" in said
+
+
+def test_qt_that_cannot_be_loaded_is_reported_in_one_sentence(tmp_path):
+    """As on a machine without the libraries that Qt links to."""
+    package = tmp_path / "PySide6"
+    package.mkdir()
+    missing = "libglib-2.0.so.0: cannot open shared object file"
+    (package / "__init__.py").write_text(f'raise ImportError("{missing}")\n')
+    result = started(tmp_path, PYTHONPATH=str(tmp_path), QT_QPA_PLATFORM="offscreen")
+    assert result.returncode == 1
+    assert result.stderr.startswith(
+        f"The window cannot be opened: Qt cannot be loaded ({missing}); on Debian: "
+    )
+    assert len(result.stderr.splitlines()) == 1
