@@ -368,7 +368,7 @@ def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
         since_s = time.monotonic()
         code = happen(laboratory)
         took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
-        if code is not None:
+        if cell.cause.startswith("stop "):
             exits["stop"] = code
         if cell.subject == "measure":
             exits["measure"] = laboratory.ended()

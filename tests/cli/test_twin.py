@@ -5,6 +5,7 @@ import signal
 import time
 from pathlib import Path
 from threading import Event
+from types import SimpleNamespace
 
 import pytest
 
@@ -19,7 +20,9 @@ from vibench.acquisition.engine import (
     start_engine,
 )
 from vibench.acquisition.plan import Campaign
-from vibench.acquisition.rig import load_rig, with_faults
+from vibench.acquisition.rig import load_rig, specimen_of, with_faults
+from vibench.analysis.hidden_motion import ChangeWatch, Hidden, KnownNumber, Level
+from vibench.cli.twin import _Following
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE, LOOK_S, PATIENCE_S = Event(), 0.02, 200.0
@@ -114,3 +117,21 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     assert ("specimen", "The upper gap is 46 um.") in events
     assert "limit" not in dict(events)
     assert gaps == ()
+
+
+def test_a_twin_whose_baseline_finds_no_room_goes_on_with_one_sentence(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    known = {Hidden.M1: KnownNumber(value=2.1e-3, low=2.0e-3, high=2.2e-3)}
+    live = SimpleNamespace(watch=ChangeWatch(Level(mean=1.0, sd=0.1)), known=known)
+    following = _Following(None, rig, specimen_of(rig), live, (0, 1), plan="dwell")
+    resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
+    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, usual[1]))
+    try:
+        following._keep_baseline()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, usual)
+    (said,) = "".join(capsys.readouterr().err.split("\n")).split("warning: ")[1:]
+    assert "could not be written (File too large)" in said
+    assert not [each for each in tmp_path.rglob("*") if each.is_file()]

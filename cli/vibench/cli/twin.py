@@ -34,7 +34,7 @@ from vibench.sim import Specimen
 from vibench.sim.operating_system.this import lower_priority
 
 from .options import option
-from .output import console
+from .output import console, print_warnings
 from .specimen_option import SpecimenOption, read_specimen
 from .watch import Pid
 
@@ -124,7 +124,11 @@ class _Following:
             before = Baseline(bench=self.rig.name, since=datetime.now(UTC), numbers=live.known, levels={})
         if self.plan not in before.levels:
             levels = {**before.levels, self.plan: watch.usual}
-            keep_baseline(before.model_copy(update={"levels": levels}), path)
+            try:
+                keep_baseline(before.model_copy(update={"levels": levels}), path)
+            except OSError as error:  # a full disk; the twin still watches this run
+                reason = f"{path} could not be written ({error.strerror})"
+                print_warnings([f"{reason}: the usual level of this run is not stored; make room"])
 
     def _status(self, rate_hz: float) -> TwinStatus:
         newest = self.live.newest

@@ -1,4 +1,4 @@
-"""Work that takes longer than a frame: spawned processes do it, and a timer polls for the answers."""
+"""Work that takes longer than a frame: spawned processes do it, or the window, one step in each pass."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -14,6 +14,12 @@ LONGEST_S = 900.0
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
+
+
+def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
+    """Call a step in the next pass of the event loop, so that frames and input come in between."""
+    # Not 0: that posts an event, and Qt handles what is posted meanwhile in the same pass.
+    QTimer.singleShot(1, receiver, step)
 
 
 class Background(Pool, QObject):

@@ -11,7 +11,7 @@ from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 
 from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.engine import (
@@ -38,6 +38,7 @@ from vibench.acquisition.rig import KnobSheet, Rig
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.stop_files import SWITCH_OFF
 
+from ..background.background import in_next_pass
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
@@ -381,7 +382,7 @@ class Bridge(QObject):
             self._is_looking = False
         else:
             self.beat()
-            QTimer.singleShot(0, self, lambda: self._take(view, first_sample + size, rest, size))
+            in_next_pass(self, lambda: self._take(view, first_sample + size, rest, size))
 
     def _emit_news(self, status: EngineStatus) -> None:
         for message in status.messages:

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
+from ..background.background import in_next_pass
 from ..engine_link.bridge import Urgency
 from ..page.app_context import AppContext, SettingKey
 from ..page.page import Page, file_kind
@@ -301,7 +302,7 @@ class Window(QMainWindow):
     def _retheme(self, theme: Theme) -> None:
         """Change the colours: first the frame, then page by page, so that the window stays responsive."""
         self._prepare_theme(theme)
-        QTimer.singleShot(0, self, self._theme_next)
+        in_next_pass(self, self._theme_next)
 
     def _prepare_theme(self, theme: Theme) -> None:
         application = QApplication.instance()
@@ -335,7 +336,7 @@ class Window(QMainWindow):
         if self._unthemed:
             self._unthemed.pop(0)()
             self.context.bridge.beat()
-            QTimer.singleShot(0, self, self._theme_next)
+            in_next_pass(self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:
         """Focus the first page's next step, and not STOP."""

@@ -14,7 +14,7 @@ from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, has_overview, kept_levels
 from vibench.sim.background import Job
 
-from ...background.background import LatestRequest
+from ...background.background import LatestRequest, in_next_pass
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, FileKind, Page
@@ -41,6 +41,8 @@ LOOK_S = 2.0
 """Interval between checks for deleted files [s]."""
 CHECK_WAIT_MS = 250
 """How long a recording stays open before it is checked whole."""
+PAINTED_MS = 50
+"""After this time the pictures of an opened recording are painted."""
 
 
 class FilesPage(Page):
@@ -122,7 +124,7 @@ class FilesPage(Page):
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
         # Show the page first, because both steps together would block the event loop.
-        QTimer.singleShot(0, self, lambda: self._choose(path))
+        in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
         """Open a recording, also if it is open already; if it is listed, selecting it opens it."""
@@ -191,19 +193,20 @@ class FilesPage(Page):
         """Add one channel per event loop pass; all channels of a long recording would block the window."""
         if recording is not self._opened:
             return
+        if len(levels) == len(recording.roles):
+            self._show(levels)
+            return
         role = recording.roles[len(levels)]
         levels[role] = kept_levels(recording, role)
         self.time_histories.prepare(recording.channel(role))
-        if len(levels) == len(recording.roles):
-            self._show(levels)
-        else:
-            QTimer.singleShot(0, lambda: self._take_next(recording, levels))
+        in_next_pass(self, lambda: self._take_next(recording, levels))
 
     def _show(self, levels: Levels) -> None:
         self._making = None
         if self._opened is None:
             return
-        self._show_facts()
+        # After the pictures: to check the seal takes as long as to draw them.
+        QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)
         hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
