@@ -10,6 +10,13 @@ from vibench.acquisition import Overload, RecordingError, run_campaign
 from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, list_recordings
 from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME, _band
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, ResonanceTracking, RunState, SineSweep
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin as RecordingOrigin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 from vibench.acquisition.run.run import Run
 
 DWELL = Measurement(
@@ -144,3 +151,19 @@ def test_a_copy_is_listed_as_one(folder):
     by_path = {each.path: each.verdict for each in list_recordings(folder)}
     assert by_path["monday/dwell.h5"] == "samples not checked; has the same samples as again.h5"
     assert by_path["again.h5"] == by_path["tuesday/late/sweep.h5"] == "samples not checked"
+
+
+def test_two_recordings_without_samples_are_no_copies(tmp_path):
+    for name in "ab":
+        channels = (ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 1.0, 10.0),)
+        header = RecordingHeader(
+            channels,
+            5120.0,
+            100,
+            RecordingOrigin.SIMULATED,
+            DWELL.model_dump_json(),
+            '{"name": "a"}',
+        )
+        with create_recording(tmp_path / f"{name}.h5", header) as writer:
+            writer.finish(RecordingState.STOPPED, "before the first sample")
+    assert [each.verdict for each in list_recordings(tmp_path)] == ["stopped"] * 2

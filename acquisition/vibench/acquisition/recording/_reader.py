@@ -176,7 +176,7 @@ class RecordingDescription:
     started_utc: str
     recording_id: str
     samples_id: str
-    """SHA-256 of all channels' checksums: equal in copies. Empty while it grows."""
+    """SHA-256 of all channels' checksums: equal in copies. Empty while it grows and without samples."""
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
@@ -458,7 +458,7 @@ def _read(handle: OpenRecording) -> Recording:
         origin=facts.origin,
         started_utc=facts.started_utc,
         recording_id=facts.recording_id,
-        samples_id="" if is_part else samples_id(file, roles),
+        samples_id="" if is_part or facts.samples == 0 else samples_id(file, roles),
         channels=require_different(channel_header(role, file[role]) for role in roles),
         plan=configuration.plan_json,
         bench=configuration.bench_json,

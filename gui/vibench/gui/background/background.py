@@ -18,7 +18,7 @@ Answer = TypeVar("Answer")
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
     """Call a step in the next pass of the event loop, so that frames and input come in between."""
-    # Not 0: that posts an event, and Qt handles what is posted meanwhile in the same pass.
+    # Not 0: Qt then calls two steps before another timer.
     QTimer.singleShot(1, receiver, step)
 
 
