@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibench.cli import main
+from vibench.cli.output import console
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -46,6 +47,8 @@ def vibench_here() -> Vibench:
             patch.setattr(sys, "argv", words)
             for name, value in {"COLUMNS": "200", **(environment or {})}.items():
                 patch.setenv(name, value)
+            # A command with --json leaves the console on the standard error of its process.
+            patch.setattr(console, "_file", None)
             with pytest.raises(SystemExit) as ended:
                 main()
         return subprocess.CompletedProcess(words, ended.value.code or 0, out.getvalue(), err.getvalue())
