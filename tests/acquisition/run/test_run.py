@@ -31,9 +31,10 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.run.acquisition_loop import BLOCK_S
 from vibench.acquisition.run.phase_runner import HOLD_LONGEST_S
 from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.silence_watch import LISTEN_S, LowLevelCheck, sine_amplitude
+from vibench.acquisition.run.silence_watch import LISTEN_S, SILENT_V, LowLevelCheck, sine_amplitude
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 RATE = 5120.0
@@ -448,6 +449,28 @@ class TestStopLevels:
         # The last stair of the ramp lies below what counts as silence.
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
+
+    def test_samples_that_wait_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
+        """A busy computer reads five times as fast as real time, and ten seconds are unread."""
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        convert, read = bench.world.convert, bench.digitizer.read
+        unread = 10 * round(bench.digitizer.sample_rate_hz)
+        convert(unread)
+        stopped = bench.world.samples + unread
+
+        def read_slowly(samples):
+            convert(samples // 5)
+            return read(samples)
+
+        monkeypatch.setattr(bench.digitizer, "read", read_slowly)
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
+        play(run)
+        loud = np.flatnonzero(np.abs(bench.recorder.channel(0)) > SILENT_V)
+        took_s = (loud[-1] - stopped) / bench.digitizer.sample_rate_hz
+        # The block in which the stop is seen, then the ramp.
+        assert took_s <= BLOCK_S / 5 + shortest_ramp_s(bench.rig)
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
         run = run_of(bench, tmp_path)

@@ -62,6 +62,27 @@ class AcquisitionLoop:
             yield self._next(min(longest, waiting))
             waiting -= min(longest, waiting)
 
+    def pass_time(self, duration_s: float) -> Iterator[Block]:
+        """Read for another ``duration_s`` as in `read_for`, but leave samples unread that waited before.
+
+        If more time has passed already, what follows is delayed accordingly.
+        """
+        rate_hz = self._digitizer.sample_rate_hz
+        self._due_s += duration_s
+        goal = round(self._due_s * rate_hz)
+        piece = max(1, round(min(duration_s, BLOCK_S) * rate_hz))
+        sampled = self.samples
+        while sampled < goal:
+            yield self._next(min(piece, goal - self.samples))
+            sampled = self._sampled
+        # Less than half a sample is the rounding of the goal, which must not accumulate.
+        self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
+
+    @property
+    def _sampled(self) -> int:
+        """Number of samples converted so far, read or not."""
+        return self.samples + self._digitizer.waiting_samples
+
     def linger(self, duration_s: float) -> Block:
         """Read and record an additional block, and delay everything after it accordingly."""
         self._due_s += duration_s
@@ -76,8 +97,8 @@ class AcquisitionLoop:
         return block
 
     def cut(self) -> None:
-        """Start the next stretch now, even if the last one is incomplete."""
-        self._due_s = self.elapsed_s
+        """Start the next stretch now, even if the last one is incomplete and samples wait."""
+        self._due_s = self._sampled / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:
         """Start ``segment`` at the next sample, unless it is open already; end any other."""

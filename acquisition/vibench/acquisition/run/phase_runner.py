@@ -323,7 +323,10 @@ class PhaseRunner:
         return late_s
 
     def _catch_up(self, into: Heard | None = None) -> Iterator[Progress]:
-        for block in self.loop.catch_up():
+        return self._recorded(self.loop.catch_up(), into)
+
+    def _recorded(self, blocks: Iterator[Block], into: Heard | None = None) -> Iterator[Progress]:
+        for block in blocks:
             if into is not None:
                 into.append(block)
             yield self._report_progress(block)
@@ -345,9 +348,7 @@ class PhaseRunner:
             self._enter(RunState.RAMPING_DOWN)
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level)):
-                yield from self._read(wait_s)
-                if self._drive.is_commanded:
-                    yield from self._catch_up()
+                yield from self._recorded(self.loop.pass_time(wait_s))
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
