@@ -1,11 +1,22 @@
-"""Labels of a logarithmic axis are at 1, 2 and 5 of every decade and do not overlap."""
+"""Labels of an axis do not overlap; those of a logarithmic one are at 1, 2 and 5 of every decade."""
 
+from itertools import pairwise
 from math import log10
 
 import numpy as np
 import pytest
+from PySide6.QtGui import QFontMetricsF
 
-from vibench.gui.plots.axis import LOG_FREQUENCY, AxisItem, PlotAxis, Scale, logarithmic_ticks, number_text
+from vibench.gui.plots.axis import (
+    FREQUENCY,
+    LOG_FREQUENCY,
+    TIME,
+    AxisItem,
+    PlotAxis,
+    Scale,
+    logarithmic_ticks,
+    number_text,
+)
 
 
 def test_decades_have_labels_at_one_two_and_five():
@@ -61,3 +72,19 @@ def test_minor_ticks_have_no_numbers(qapp):
     written = [item.tickStrings(values, 1.0, step) for step, values in item.tickValues(1.7, 2.9, 400.0)]
     assert set(written[0]) == {"100", "200", "500"}
     assert set(written[1]) == {""}
+
+
+@pytest.mark.parametrize("width", [40, 60, 90, 140])
+@pytest.mark.parametrize(
+    ("quantity", "low", "high"),
+    [(PlotAxis("Displacement", "m"), -30e-6, 30e-6), (FREQUENCY, 0.0, 1600.0), (TIME, 0.0, 0.03)],
+)
+def test_numbers_of_a_narrow_axis_do_not_touch(qapp, width, quantity, low, high):
+    axis = AxisItem("bottom", quantity)
+    values = [(step, places) for step, places in axis.tickValues(low, high, width) if places]
+    labels = [text for step, places in values for text in axis.tickStrings(places, 1.0, step)]
+    metrics = QFontMetricsF(axis.font())
+    pixels = [(place - low) / (high - low) * width for _, places in values for place in places]
+    half = [metrics.horizontalAdvance(text) / 2 for text in labels]
+    ends = sorted((at - each, at + each) for at, each in zip(pixels, half, strict=True))
+    assert all(right < left for (_, right), (left, _) in pairwise(ends)), labels

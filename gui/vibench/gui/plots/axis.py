@@ -167,8 +167,8 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             # Draw one labelled level only, because each grid line costs time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
-            if self._is_upright:
-                step, values = thin_ticks(step, values, self._most_labels(size))
+            widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
+            step, values = thin_ticks(step, values, self._most_labels(size, f"{widest}0"))
             return [(step / factor, [value / factor for value in values])]
         shift = log10(self._axis.shown.per_si)
         ticks = logarithmic_ticks(low + shift, high + shift)
@@ -186,9 +186,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         factor = self._axis.shown.per_si
         return [number_text(10**value * factor) for value in values]
 
-    def _most_labels(self, size: float) -> int:
+    def _most_labels(self, size: float, widest: str = _WIDE) -> int:
         metrics = QFontMetricsF(self.font())
-        each = _LINE_DISTANCE * metrics.height() if self._is_upright else metrics.horizontalAdvance(_WIDE)
+        each = _LINE_DISTANCE * metrics.height() if self._is_upright else metrics.horizontalAdvance(widest)
         return max(2, int(size / each))
 
 
