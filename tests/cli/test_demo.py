@@ -26,13 +26,13 @@ NAMES = (
     "dwell_strong",
 )
 
-pytestmark = [pytest.mark.thorough, pytest.mark.timeout(700)]
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(1200)]
 
 
 @pytest.fixture(scope="module")
 def demo(vibench, tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    result = vibench("demo", "--draws", "5", "--out", "demo", cwd=folder, timeout_s=690)
+    result = vibench("demo", "--draws", "5", "--out", "demo", cwd=folder, timeout_s=1180)
     assert result.returncode == 0, result.stderr
     assert str(folder / "demo" / "report.html") in result.stdout.replace("\n", "")
     return folder / "demo"
