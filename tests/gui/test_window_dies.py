@@ -20,7 +20,7 @@ from vibench.acquisition.engine import (
     announced_engines,
     left_alone,
 )
-from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.recording import EventKind, RecordingState
 from vibench.gui.page.app_context import USUAL_PATIENCE_S
 from vibench.gui.widgets.notice import RUN
 
@@ -108,8 +108,8 @@ def silent_after_s(window, number, folder):
     with open_recording(path) as recording:
         assert recording.state is RecordingState.STOPPED
         assert "nobody has looked" in recording.reason or "has ended" in recording.reason
-        # The time when the last setting of the ramp was verified; tests of the engine measure the drive.
-        silent_s = next(event.unix_time_s for event in recording.events if event.kind == "silence")
+        # The output was read back as off then; tests of the engine measure the drive.
+        silent_s = next(event.unix_time_s for event in recording.events if event.kind == EventKind.OFF)
         assert recording.samples > 0
     return silent_s - signalled_s
 

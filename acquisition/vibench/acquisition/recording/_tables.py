@@ -34,6 +34,8 @@ class EventKind(StrEnum):
     LATE = "late"
     """The drive fell behind its plan for a moment: by how much, and where."""
     END = "end"
+    OFF = "off"
+    """The output was switched off after an early end, before the samples that show its silence were read."""
     SILENCE = "silence"
 
 

@@ -354,6 +354,7 @@ class PhaseRunner:
                     self.loop.log(EventKind.END, harder.reason)
                     break
         self._drive.cut()
+        self.loop.log(EventKind.OFF, "output switched off")
         yield from self._listened()
         self.loop.log(EventKind.SILENCE, f"{level.value}: {self._silence.text()}")
         self._silence.require_silence()
