@@ -18,6 +18,11 @@ SANITIZED = (
     *("g++", "-std=c++20", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off"),
     *("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"),
 )
+PROGRAM = """
+import ctypes, sys
+words = [each.encode() for each in sys.argv[1:]]
+sys.exit(ctypes.CDLL(sys.argv[1]).main(len(words), (ctypes.c_char_p * len(words))(*words)))
+"""
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "rigid:0.3", "linear", "power:3+5+7")
 needs_gcc = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++ here for its sanitizers")
 
@@ -29,18 +34,31 @@ def output_of(*command, **environment):
     return result.stdout
 
 
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory):
+    """The engine with its program of tests as one library, which takes two minutes to compile."""
+    library = tmp_path_factory.mktemp("engine") / "sanitized.so"
+    output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "test_engine.cpp", "-o", library)
+    return library
+
+
+def output_under_sanitizers(*words):
+    runtime = output_of("g++", "-print-file-name=libasan.so").strip()
+    return output_of(sys.executable, *words, LD_PRELOAD=runtime, ASAN_OPTIONS="detect_leaks=0")
+
+
 @needs_gcc
 @pytest.mark.thorough
-@pytest.mark.timeout(600)  # g++ takes 20 s of a core to compile with sanitizers
-def test_the_program_of_tests_passes_under_the_sanitizers(tmp_path):
+@pytest.mark.timeout(600)
+def test_the_program_of_tests_passes_under_the_sanitizers(sanitized, tmp_path):
     engine = native_engine()
     shapes = collision_structure(engine).tobytes() + power_structure(engine).tobytes()
     for law in LAWS:
         scene = scene_of(engine, gong2025(contact=law), Harmonic(130.0, 20e-6))
         (tmp_path / law.replace(":", "_")).write_bytes(scene.tobytes() + shapes)
-    files = sorted(tmp_path.iterdir())
-    output_of(*SANITIZED, ROOT / "native" / "test_engine.cpp", "-o", tmp_path / "program")
-    assert "all checks passed" in output_of(tmp_path / "program", *files)
+    assert "all checks passed" in output_under_sanitizers(
+        "-c", PROGRAM, sanitized, *sorted(tmp_path.iterdir())
+    )
 
 
 def test_a_broken_structure_returns_an_error_code():
@@ -50,9 +68,5 @@ def test_a_broken_structure_returns_an_error_code():
 @needs_gcc
 @pytest.mark.thorough
 @pytest.mark.timeout(600)
-def test_broken_structures_cause_no_undefined_behaviour(tmp_path):
-    library = tmp_path / "engine-sanitized.so"
-    output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "api.cpp", "-o", library)
-    runtime = output_of("g++", "-print-file-name=libasan.so").strip()
-    environment = {"LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0"}
-    output_of(sys.executable, FUZZ, library, "--count", 300, **environment)
+def test_broken_structures_cause_no_undefined_behaviour(sanitized):
+    output_under_sanitizers(FUZZ, sanitized, "--count", 300)
