@@ -19,7 +19,7 @@ LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")  # how HDF5 notes what is whose axi
 
 
 def attributes_sha256(item):
-    """Of what an object says of itself: attributes, type and shape, as JSON."""
+    """Return the hash of an object's attributes, type and shape, as JSON."""
     said = {}
     for name in item.attrs:
         if name not in LINKS:
@@ -31,7 +31,7 @@ def attributes_sha256(item):
 
 
 def data_sha256(item):
-    """Of a dataset's numbers or texts, one after the other; a group has none."""
+    """Return the hash of a dataset's values in order; empty for a group."""
     if not isinstance(item, h5py.Dataset):
         return ""
     return hashlib.sha256(np.asarray(item[()]).tobytes()).hexdigest()

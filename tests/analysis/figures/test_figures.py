@@ -154,7 +154,7 @@ def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_parts_beyond_the_planned_ones_match_feedback(dwell_file):
+def test_parts_beyond_the_planned_ones_are_explained_by_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]

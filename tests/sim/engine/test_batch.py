@@ -144,7 +144,7 @@ def test_stops_with_unequal_gaps_are_touched_at_their_positions():
 
 
 def test_a_specimen_unsuitable_for_batches_is_refused():
-    with pytest.raises(ValueError, match="cannot be followed in a batch"):
+    with pytest.raises(ValueError, match="cannot be simulated in a batch"):
         followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 
 

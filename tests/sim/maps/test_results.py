@@ -95,7 +95,7 @@ def test_a_basin_map_distinguishes_attractors_and_kicks_them():
 def test_kicks_need_a_basin_map(adaptive):
     with pytest.raises(InvalidStudy, match="over the start alone"):
         kick_stability(adaptive)
-    with pytest.raises(InvalidStudy, match="-3 kicks are asked for; give 1 or more"):
+    with pytest.raises(InvalidStudy, match="-3 kicks were requested; give 1 or more"):
         kick_stability(adaptive, kicks=-3)
 
 

@@ -92,7 +92,7 @@ def test_invalid_study_values_are_named(key, value, said):
 
 def test_more_points_than_a_file_should_hold_are_refused():
     many = {"start": 1.0, "stop": 900.0, "step": 0.001}
-    with pytest.raises(ValidationError, match="points are asked for; a study holds at most"):
+    with pytest.raises(ValidationError, match="points were requested; a study has at most"):
         Study(frequencies_hz=many, amplitudes_m=[k * 1e-6 for k in range(1, 13)])
 
 

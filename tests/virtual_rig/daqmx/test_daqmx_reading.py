@@ -195,7 +195,7 @@ def test_a_task_stays_reserved_through_a_stop_if_it_was_reserved_before(task, da
     rival.start()
 
 
-def test_the_world_is_commanded_to_stop_converting(task, daq):
+def test_stopping_a_task_stops_the_conversion(task, daq):
     task.read(10)
     assert len(daq.world.conversions) == 1
     task.stop()

@@ -31,7 +31,7 @@ def test_a_block_passes_any_bytes_unchanged_between_other_units(data):
 
 
 @given(st.binary(max_size=300), st.binary(max_size=20))
-def test_a_stream_is_cut_after_the_newline_that_is_not_in_the_block(data, after):
+def test_a_message_ends_at_the_newline_after_its_block(data, after):
     message = b"DATA EMEM," + as_block(data) + b"\n"
     assert message_end(message + after) == len(message)
 

@@ -392,9 +392,9 @@ class CampaignEstimate:
     duration_s: float
     """Rig time, with bench checks, lead-ins and ramps."""
     rest_s: float
-    """Of that, pauses between recordings."""
+    """Part of it for pauses between recordings [s]."""
     lead_in_s: float
-    """Of that, lead-ins of points in chains."""
+    """Part of it for lead-ins of points in chains [s]."""
     largest_bytes: int
     """Largest size [bytes] of one growing recording."""
     total_bytes: int

@@ -40,7 +40,7 @@ def feedback_controller(
     Parameters
     ----------
     measurement
-        Of a kind of excitation that has a controller.
+        Measurement with an excitation that has a controller.
     rig
         The rig on which it runs.
     channels

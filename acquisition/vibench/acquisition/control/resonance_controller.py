@@ -315,7 +315,8 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
-    # Each harmonic over the phase of the base times its order; turned and scaled as all together.
+    # Subtract the base's phase times the order from each harmonic; rotate and scale the batches so that their
+    # mean is the value found before.
     away = np.angle(base * base.mean().conjugate())
     orders = np.arange(1, ORDERS) / plan.subharmonic
     ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]

@@ -56,7 +56,7 @@ class DaqmxOutput:
         Raises
         ------
         SettingRefused
-            When the device takes another sample rate than the one asked for.
+            When the device takes another sample rate than requested.
         InstrumentError
             As `_daqmx_errors` tells them apart; nothing stays reserved then.
         """

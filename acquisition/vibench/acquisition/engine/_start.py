@@ -123,7 +123,7 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
     if not line:
         process.wait()
         raise EngineGone(
-            f"the engine's process ended with code {process.returncode} before it could be asked; "
+            f"the engine's process ended with code {process.returncode} before it answered; "
             "run 'python -m vibench.acquisition.engine' to see why"
         )
     return EngineProcess(process, EngineAddress.model_validate_json(line))

@@ -34,7 +34,7 @@ class Settling(FrozenModel):
     shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
     """Wait at least this long at every frequency [s]."""
     longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
-    """Wait no longer than this; the motion is then recorded as not settled [s]."""
+    """Longest wait [s]; the motion is then recorded as not settled."""
 
     @model_validator(mode="after")
     def _waits_in_order(self) -> Self:

@@ -37,7 +37,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     start_share: Share = 0.02
     """Setting at the start of the first frequency, over ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
-    """Wait no longer than this; the step is then recorded and flagged [s]."""
+    """Longest wait [s]; the step is then recorded and flagged."""
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step of the tone between two frequencies of the list [Hz]."""
 

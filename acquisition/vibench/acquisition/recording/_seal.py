@@ -245,7 +245,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
-        if dataset.nbytes > LARGEST_TABLE_BYTES:  # of a small file, compressed
+        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to this
             raise RecordingError(f"{dataset.name} holds {dataset.nbytes:.2g} bytes, which no result has")
         yield np.asarray(dataset[()])
         return

@@ -44,7 +44,7 @@ class BaseQuantity(StrEnum):
     M0_ACCELERATION = "m0_acceleration"
     """[m/s2]"""
     P = "p"
-    """Of m1 against m2 [m]."""
+    """Displacement of m1 relative to m2 [m]."""
 
 
 _COLUMNS = {

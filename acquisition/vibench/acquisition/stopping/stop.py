@@ -181,7 +181,7 @@ class DrivesOn:
 
 
 DRIVES_ON = DrivesOn()
-"""Of this process."""
+"""Drives of this process that may be on."""
 
 
 RESERVE_BYTES = 16_000_000
@@ -225,4 +225,4 @@ class MemoryReserve:
 
 
 MEMORY_RESERVE = MemoryReserve()
-"""Of this process."""
+"""Reserved memory of this process."""

@@ -225,7 +225,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     drive_hz
         Drive frequency, to convert exponents per period to exponents per second.
     seed
-        Of the random frequencies and surrogates.
+        Seed of the random frequencies and surrogates.
     """
     if not 0.0 < drive_hz < math.inf:
         raise InvalidRequest(f"a drive frequency of {drive_hz} Hz is not allowed; give a positive one")

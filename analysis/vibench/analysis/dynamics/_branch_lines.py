@@ -239,7 +239,7 @@ class BranchDiagram(Labelled):
 
     @property
     def least_growth_time_s(self) -> float | None:
-        """Least growth time by e of an unstable motion that the bench can hold; None without a bench."""
+        """Shortest e-folding time [s] of an unstable motion that the bench can hold; None without a bench."""
         loop_s = self.request.loop_time_s
         return None if loop_s is None else least_growth_time_s(loop_s)
 

@@ -74,7 +74,7 @@ class ChainRequest(SpecimenChoice):
                 "or take a swept drive"
             )
         if self.drive is ChainDrive.STEADY and len(self.frequencies_hz) * len(self.lengths) > MOST_RUNS:
-            raise ValueError(f"more than {MOST_RUNS} runs are asked for; take a larger step")
+            raise ValueError(f"more than {MOST_RUNS} runs were requested; take a larger step")
         if self.drive is ChainDrive.SWEPT and self.start_hz == self.stop_hz:
             raise ValueError(
                 f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz goes nowhere; give two different "

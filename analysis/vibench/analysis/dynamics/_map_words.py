@@ -44,7 +44,7 @@ def motion_classes(results: MapResults, start: int = 0) -> Reals:
     Returns
     -------
     ndarray
-        Of the shape of what varies.
+        The shape of the grid of varied parameters.
     """
     motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)

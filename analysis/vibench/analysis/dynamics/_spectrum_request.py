@@ -53,7 +53,9 @@ class SpectrumRequest(SpecimenChoice):
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
             )
         if self.points > MOST_POINTS:
-            raise ValueError(f"{self.points} points are asked for; at most {MOST_POINTS}: take a larger step")
+            raise ValueError(
+                f"{self.points} points were requested; at most {MOST_POINTS}: take a larger step"
+            )
         return self
 
     @property

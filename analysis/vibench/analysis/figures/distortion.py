@@ -94,7 +94,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         color=style.BOUNDS,
         linewidth=0.9,
         linestyle=":",
-        label="what does not repeat there",
+        label="noise or chaos on these lines",
     )
     style.magnitude_axis(axes)
     axes.set_ylabel("velocity of the mass [m/s]")
@@ -112,8 +112,8 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     found = distortion(periodic)
     said = [
         (
-            f"From {periodic.realisations} realisations: what does not repeat from one period to the next, "
-            "noise of the channels or chaos of the specimen, gives one of them a standard deviation of "
+            f"From {periodic.realisations} realisations: noise of the channels or chaos of the specimen, "
+            "which do not repeat from period to period, give one realisation a standard deviation of "
             f"{_percent(found.noise_share)} of the transmission (median)"
         )
     ]

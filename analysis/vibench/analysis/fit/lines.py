@@ -88,7 +88,7 @@ class Descended:
     logarithms: Reals
     """Logarithms of the free parameters."""
     covariance: Reals
-    """Their covariance, for a correct model."""
+    """Covariance of the logarithms, for a correct model."""
     freedoms: Reals
     """Degrees of freedom of each uncertainty; few if few lines determine it."""
     phases: tuple[float, float]

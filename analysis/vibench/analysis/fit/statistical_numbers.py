@@ -187,7 +187,7 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     rate_hz
         Samples a second.
     drive_hz
-        Of a sine; None where the drive has no one frequency.
+        Frequency of a sine; None for other drives.
     """
     velocity = motion[1]
     parts = (*_in_bands(motion, rate_hz), _spread(velocity), _spread(_displacement(velocity, rate_hz)))

@@ -227,7 +227,7 @@ def best_linear_approximation(
     periods
         Periods per realisation.
     frequency_hz
-        Of the lines.
+        Frequencies of the lines.
     """
     count = len(drive)
     through = np.sum(base * np.conj(drive), axis=0)
@@ -586,7 +586,7 @@ def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(
-            f"the lowest line asked for is {np.min(orders)}; lines are known up to {frequency_hz.size - 1}, "
+            f"the lowest line requested is {np.min(orders)}; lines are known up to {frequency_hz.size - 1}, "
             f"{frequency_hz[-1]:g} Hz: record with a higher sample rate"
         )
     return np.asarray(marked)

@@ -193,7 +193,7 @@ class FrequencyResponseRequest:
         if samples < wished or samples < wished + hop_samples(int(wished), self.overlap):
             raise NotEnoughData(
                 f"{samples / sample_rate_hz:.3g} s of noise were recorded, less than two segments of the "
-                f"{wished / sample_rate_hz:.3g} s asked for: ask for a coarser resolution, or measure longer"
+                f"{wished / sample_rate_hz:.3g} s requested: request a coarser resolution, or measure longer"
             )
         return int(wished)
 

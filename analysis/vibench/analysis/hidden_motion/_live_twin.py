@@ -37,11 +37,11 @@ from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 
 # Detection of changes of the specimen: innovations of a track compared with a baseline, block by block.
 #
-# Each block of a tenth of a second lies within the usual level or outside it. Page's test (CUSUM,
-# Biometrika 41, 100, 1954) adds up the likelihood ratio of "one block in two is out" to "one in a hundred
-# is". By Lorden (Ann. Math. Stat. 42, 1897, 1971) the mean time between false alarms is at least
-# exp(threshold) blocks, as long as no more than one block in a hundred lies out without a change; the
-# threshold is chosen so that this is `FALSE_ALARM_S`. Five blocks in a row that lie out are an alarm.
+# Each block of 0.1 s is within the usual level or outside it. Page's test (CUSUM, Biometrika 41, 100, 1954)
+# sums the log likelihood ratio of two hypotheses: half of the blocks are outside, or one in a hundred. If at
+# most one in a hundred is outside without a change, the mean time between false alarms is at least
+# exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). The threshold makes this `FALSE_ALARM_S`.
+# Five consecutive blocks outside are an alarm.
 
 BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0

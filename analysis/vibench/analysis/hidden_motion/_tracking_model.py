@@ -148,7 +148,7 @@ def small_steps_of(tracked: TrackedSpecimen, step_s: float) -> int:
     """Return the small steps per sample that resolve the shortest collision."""
     if tracked.steepness == 0.0:
         return _FEWEST_SMALL_STEPS
-    # pi / 2 times the time to the deepest point at full speed, and back.
+    # The time to the deepest point and back is pi / 2 times that at constant speed.
     deepest_m = indentation_m(tracked, _FASTEST_APPROACH_M_PER_S)
     duration_s = math.pi * deepest_m / _FASTEST_APPROACH_M_PER_S
     return max(_FEWEST_SMALL_STEPS, math.ceil(step_s * _SMALL_STEPS_A_CONTACT / duration_s))

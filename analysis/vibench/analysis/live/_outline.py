@@ -336,9 +336,7 @@ def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     """
     kept = recording.read_overview(role)
     if kept is None:
-        raise InvalidRequest(
-            f"{recording.path.name} keeps no overview of {role}; make it with overview_levels"
-        )
+        raise InvalidRequest(f"{recording.path.name} has no overview of {role}; make it with overview_levels")
     return _levels(kept, recording.channel(role))
 
 

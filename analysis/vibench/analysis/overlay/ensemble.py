@@ -324,8 +324,8 @@ def logarithmic_difference(
 
 # Motions that end by chance, described by a rate per second.
 #
-# Chaos that is a transient, and collisions that a sweep loses, end at another time in every run. Their ends
-# follow a rate of escape (Tel and Lai, Phys. Rep. 460 (2008), ch. 1), and one end is one draw of it.
+# Transient chaos, and collisions in a sweep, end at a different time in every run. Escapes have a constant
+# rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
 """Runs that all stop within this time share one edge, possibly the end of the record."""

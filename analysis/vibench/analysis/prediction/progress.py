@@ -334,7 +334,7 @@ class SimulationRequest(SpecimenChoice):
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
-                f"{points} points are asked for; at most {MOST_POINTS} are simulated here: "
+                f"{points} points were requested; at most {MOST_POINTS} are simulated here: "
                 "take a larger step, or a study file"
             )
         self.study  # noqa: B018 - making it is the check

@@ -291,7 +291,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
         said = (f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources")
         rows.append(("specimen", ", ".join(said)))
     rows.append(("bench check", bench_check_text(facts)))
-    rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
+    rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} requested"
     rows.append(("sample rate", rate))
     return ReportTable("Bench", (), tuple(rows))
 
@@ -390,7 +390,7 @@ def write_report(
     results
         Results of `analyse_files`, of a whole campaign or of one recording.
     path
-        Of the HTML file; its folder is made.
+        Path of the HTML file; its folder is created.
     figures_folder
         Where PNG, SVG and CSV of each figure go beside it; None writes none.
     diagrams

@@ -104,8 +104,8 @@ def stroboscope(
     )
     if turns.size == 0:
         raise NotEnoughData(
-            f"the record of {drive.size / sample_rate_hz:g} s holds no drive period clear of its ends; "
-            "record longer"
+            f"the record of {drive.size / sample_rate_hz:g} s is too short for a drive period away from its "
+            "ends; record longer"
         )
     positions = (turns - offset) / per_sample + delay
     inside = slice(first, last + 1)

@@ -226,7 +226,7 @@ class SweepSums:
     Parameters
     ----------
     sample_rate_hz
-        Of the blocks.
+        Sample rate of the blocks.
     low_hz, high_hz
         Lower and upper end of the sweep, for both directions.
     interval_s

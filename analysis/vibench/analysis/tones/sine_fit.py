@@ -230,7 +230,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
     Parameters
     ----------
     density
-        Of the base acceleration [(m/s2)^2 / Hz].
+        Density of the base acceleration [(m/s2)^2 / Hz].
     low_hz, high_hz
         The band.
     """

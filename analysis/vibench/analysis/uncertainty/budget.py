@@ -163,11 +163,11 @@ class Stated:
     """Relative standard uncertainties of the channels from a bench configuration."""
 
     response: tuple[Contribution, ...]
-    """Of the channel that shows m0."""
+    """Contributions of the channel that shows m0."""
     base: tuple[Contribution, ...]
-    """Of the channel of the base."""
+    """Contributions of the channel of the base."""
     clock: Contribution
-    """Of every frequency."""
+    """Contribution to every frequency."""
 
     @property
     def scale_sd(self) -> float:

@@ -188,7 +188,7 @@ class Expected(Labelled):
     def _hindrance(self) -> str:
         match self.cause, self.quantity:
             case Cause.NOISE, name if name == RESPONSE_I:
-                return "noise in the motion lifts the largest value, and only a recording tells it"
+                return "noise in the motion raises the largest value, and only a recording shows by how much"
             case Cause.NOISE, _:
                 return "the sensors' noise is not stated"
             case Cause.CHANCE, name if name in {RESPONSE_I, RESPONSE_II}:

@@ -24,8 +24,8 @@ _BLOCKS, _FEWEST_BLOCKS = 50, 10
 _ALIKE = 1e-12
 """Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
-_UNTOLD = Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
-"""Of a maximum, and of all that a sweep shows in a tenth of a second."""
+_UNTOLD = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
+"""Chance in a maximum, and in a sweep's results from a tenth of a second."""
 _ENDS = 2
 """Intervals at either end of a sweep, where the largest value is no peak: it depends on where they begin."""
 _PEAKED = 1.05

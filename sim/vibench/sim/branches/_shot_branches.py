@@ -249,7 +249,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
     Parameters
     ----------
     frequency_hz
-        Of the drive [Hz].
+        Drive frequency.
     multiplier
         Magnitude of the largest Floquet multiplier over the whole period of the motion; same shape.
     periods

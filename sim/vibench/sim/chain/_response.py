@@ -177,7 +177,7 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     forces
         Integral of the force in each cell against the drive's term, shape (cells,) [N s].
     change
-        Of the state times exp(-i omega t) from the start to the end of the lines, shape (6 cells,).
+        Change of the state times exp(-i omega t) from start to end of the lines, shape (6 cells,).
     line_s
         Their length [s].
     """

@@ -265,7 +265,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     fit = collision_fit(engine, first.specimen) if is_batchable(first.specimen, first.tolerance) else None
     if fit is None:
         raise ValueError(
-            "This specimen cannot be followed in a batch: use Hertz's stops and three modes that turn."
+            "This specimen cannot be simulated in a batch: use Hertz contacts and three oscillating modes."
         )
     # Longest first, so that all lanes end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")

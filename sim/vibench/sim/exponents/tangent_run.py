@@ -117,7 +117,7 @@ ALMOST = 1e-9
 Enough = Callable[[Floats], bool]
 """Called during a run with the growth of the intervals so far, shape (n, m): returns whether it may end."""
 CYCLES = 2.0
-"""Cycles of the slowest mode in an interval, unless another is asked for."""
+"""Cycles of the slowest mode in an interval, unless another is requested."""
 
 
 @dataclass(frozen=True)

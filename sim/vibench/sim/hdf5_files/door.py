@@ -74,9 +74,9 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
     Parameters
     ----------
     path
-        Of the file.
+        Path of the file.
     locking
-        As of ``h5py.File``: HDF5's own choice if None.
+        As for ``h5py.File``; None leaves the choice to HDF5.
     """
     file = h5py.File(path, "r", locking=locking)
     try:

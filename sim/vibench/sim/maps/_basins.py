@@ -141,7 +141,7 @@ def kick_stability(
         Seed of the kicks; number of threads.
     """
     if kicks < 1:
-        raise InvalidStudy(f"{kicks} kicks are asked for; give 1 or more.")
+        raise InvalidStudy(f"{kicks} kicks were requested; give 1 or more.")
     if not results.plan.is_basin:
         raise InvalidStudy("kicks are asked of a map over drive or specimen; give one over the start alone.")
     found = []

@@ -315,7 +315,7 @@ class Map(GridPlan):
                 f"window_periods = {self.window_periods} does not fit {self.periods} periods; give fewer"
             )
         if self.grid.size > MOST_POINTS:
-            raise ValueError(f"{self.grid.size} points are asked for; a map holds at most {MOST_POINTS}")
+            raise ValueError(f"{self.grid.size} points were requested; a map has at most {MOST_POINTS}")
         for corner in (0, self.grid.size - 1):
             self.scene(self.grid.place(corner))
         for quantity in self.varied:
@@ -346,7 +346,7 @@ class Map(GridPlan):
     def range_of(self, quantity: Quantity) -> Range:
         """Return the range of a quantity that varies."""
         found = getattr(self, quantity.field)
-        assert isinstance(found, Range), "only what varies is asked for"
+        assert isinstance(found, Range), "only varied parameters are requested"
         return found
 
     @property

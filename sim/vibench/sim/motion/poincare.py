@@ -55,7 +55,7 @@ def flow_derivative(
     duration_s
         [s].
     accuracy
-        Of the motion; its derivative is as exact.
+        Accuracy of the motion and of its derivative.
     """
     run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
     run.carry(np.eye(DIRECTIONS))

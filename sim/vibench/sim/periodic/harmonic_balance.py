@@ -94,7 +94,7 @@ def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> 
     Parameters
     ----------
     structure
-        Its stiffness must be regular if harmonic 0 is asked for.
+        Its stiffness must be regular if harmonic 0 is requested.
     omega
         Angular frequency of the drive, positive [rad/s].
     harmonics

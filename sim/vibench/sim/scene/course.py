@@ -90,7 +90,7 @@ class FixedCourse:
             run.follow_tangent()
         is_chaos = pace.is_chaos if before is None else None
         window = observe_window(run, duration.window_s, pace.cycle([last]), is_chaos)
-        seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
+        seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s requested have passed")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
             # The period is known only now: observe the window again for lines without leakage.

@@ -84,7 +84,7 @@ class Ensemble:
     asked: int
     """Index of the motion from the requested start."""
     unseen_share: float
-    """Upper bound on the share of a motion that was not found, in 39 cases of 40; also for longer runs, in
+    """Upper 97.5 % confidence limit of the share of a motion that was not found; also for longer runs, in
     which chaotic or undecided starts may reach it."""
     escape: EscapeRate | None
     """Rate at which chaos died out; None without chaos."""

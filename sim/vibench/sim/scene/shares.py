@@ -130,9 +130,9 @@ class EscapeRate:
     rate_per_s: float
     """Number of escapes over the total time in chaos [1/s]."""
     low_per_s: float
-    """Lower bound on the rate, in 39 cases of 40; zero without escapes."""
+    """Lower 97.5 % confidence limit of the rate; zero without escapes."""
     high_per_s: float
-    """Upper bound on the rate, in 39 cases of 40; in 19 of 20 without escapes."""
+    """Upper 97.5 % confidence limit of the rate; 95 % without escapes."""
     escapes: int
     """Number of starts whose chaos died out."""
     chaotic_s: float

@@ -240,7 +240,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     settled_s: float | None = None
     match scene.duration:
         case FixedDuration(duration_s=duration_s, window_s=window_s):
-            ended = f"the {duration_s:g} s asked for are over"
+            ended = f"the {duration_s:g} s requested have passed"
         case AutomaticDuration():
             settled_s, window_s = transient_decay_s(motion), period_s
             duration_s = settled_s + period_s

@@ -108,7 +108,7 @@ Item = TypeVar("Item")
 class ThreadExecutor:
     """The requested number of threads; by default one per processor.
 
-    Raises InvalidStudy when fewer than one worker is asked for.
+    Raises InvalidStudy when fewer than one worker is requested.
     """
 
     def __init__(self, workers: int | None = None, solver: Solver = solve_scene) -> None:

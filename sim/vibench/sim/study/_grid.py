@@ -41,7 +41,7 @@ class PointState(IntEnum):
     FAILED = 3
     """The scene could not be computed; ``message`` says why. Its numbers are NaN."""
     FILLED = 4
-    """Of a map: not computed, because its neighbours agree; its numbers lie between theirs."""
+    """Filled in a map, not computed: its neighbours agree, and its numbers lie between theirs."""
 
 
 @dataclass(frozen=True)

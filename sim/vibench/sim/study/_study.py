@@ -220,7 +220,7 @@ class Study(GridPlan):
     def _fits_a_file(self) -> Self:
         points = self.grid.size
         if points > MOST_POINTS:
-            raise ValueError(f"{points} points are asked for; a study holds at most {MOST_POINTS}")
+            raise ValueError(f"{points} points were requested; a study has at most {MOST_POINTS}")
         return self
 
     @property

@@ -186,7 +186,7 @@ class FilesPage(Page):
         elif has_overview(recording):
             self._take_next(recording, {})
         else:
-            self._facts.setText("Reading all samples, for this file keeps no overview…")
+            self._facts.setText("Reading all samples, because this file has no overview…")
             self._making = self.context.background.ask(read_levels, self._show, self._failed, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
