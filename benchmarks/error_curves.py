@@ -275,7 +275,7 @@ def section(curves, models, chaos):
         f"Chaos at {PAPER_HZ:g} Hz and 5 µm: the largest stated error of the four responses, after a lead",
         f"of {LEAD_S:g} s. It falls as the root of the number of starts. Windows far shorter than the lead",
         "cost more for the same error, because every start settles again. Response I is the largest value in",
-        "the window, so that the window is part of the question: it is 5 s unless `--window` names another.",
+        "the window, so it depends on the window: 5 s, unless `--window` names another.",
         "Where settling takes longer than a window, several windows of one start share it.",
         "",
         "| window | " + " | ".join(f"{count} starts" for count in COUNTS) + " |",

@@ -75,7 +75,7 @@ def test_time_is_distributed_by_need():
         (Until(resonance_hz=0.00001), 1e6, "give less time or wider bounds"),
     ],
 )
-def test_a_distribution_that_cannot_be_is_one_sentence(until, time_s, said):
+def test_an_impossible_distribution_of_time_is_refused_in_one_sentence(until, time_s, said):
     with pytest.raises(ConfigurationError, match=said):
         within(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
 

@@ -96,8 +96,7 @@ def test_more_points_than_a_file_should_hold_are_refused():
         Study(frequencies_hz=many, amplitudes_m=[k * 1e-6 for k in range(1, 13)])
 
 
-def test_equal_studies_are_one_key():
-    """Whoever remembers answers by their study finds them again."""
+def test_equal_studies_are_equal_as_dictionary_keys():
     one, again = (Study(frequencies_hz=[100.0], amplitudes_m=[1e-6]) for _ in range(2))
     other = Study(frequencies_hz=[100.0], amplitudes_m=[1e-6], budget_s=0.0)
     assert len({one, again, other}) == 2

@@ -213,8 +213,8 @@ class BenchKind(StrEnum):
 class Bench:
     """The open instruments of a rig. Use it in a ``with``, or `close` it.
 
-    Leaving silences generator and analogue output first, then closes everything, whatever happened; an
-    error that is under way stays in front, and what fails while leaving becomes a note on it.
+    Leaving silences generator and analogue output first, then closes everything. After an error inside the
+    ``with``, that error is raised; errors while leaving become notes on it.
     """
 
     def __init__(

@@ -325,7 +325,7 @@ class PublishedState:
 def _free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(folder).free
-    except OSError:  # the folder is gone: the recorder will say so, and a picture ends no run
+    except OSError:  # the recorder reports a missing folder; this display must not end a run
         return 0
 
 

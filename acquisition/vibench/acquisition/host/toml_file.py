@@ -199,7 +199,7 @@ def _complaint(detail: Any) -> str:
     if not detail["loc"]:
         return reason
     match detail["input"]:
-        case dict() | [dict(), *_]:  # it would be cut off, and the reason says what is wrong in it
+        case dict() | [dict(), *_]:  # too long to show; the reason names the wrong entry
             given = ""
         case value:
             given = f" = {_shown(value)}"

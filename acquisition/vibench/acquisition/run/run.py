@@ -46,7 +46,7 @@ from .until import UntilWatch
 ROOM = 1.25
 """Least ratio of the step of a glide to the time of a setting, which varies."""
 _MOST_COMMANDS = 2
-"""For one change of tone: amplitude and frequency."""
+"""Commands for one change of tone: amplitude and frequency."""
 
 
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:

@@ -114,7 +114,7 @@ class Leakage:
         g [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
-        # Lines are a whole number of turns apart in a segment, like the terms of a window.
+        # Between two lines, and between two terms of a window, lie whole periods of the segment.
         rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):

@@ -157,7 +157,7 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
 def _require_rate(sample_rate_hz: float) -> None:
     if not sample_rate_hz >= LOWEST_RATE_HZ:
         raise UnusableData(
-            f"the motion was sampled at {sample_rate_hz:g} Hz, and impacts show from "
+            f"the motion was sampled at {sample_rate_hz:g} Hz, and impacts are visible only from "
             f"{LOWEST_RATE_HZ:g} Hz on; measure at a higher rate to follow the hidden motion"
         )
 

@@ -130,7 +130,7 @@ class _Resampling:
         self._sample_rate_hz = sample_rate_hz
         self._ratio = ratio
         self._shaker = shaker
-        # The pieces of a record are of one length, but the last.
+        # All pieces of a record have the same length, except the last.
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
     def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:

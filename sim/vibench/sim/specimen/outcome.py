@@ -5,9 +5,9 @@ from enum import IntEnum
 _TEXTS = (
     "reached the end time",
     "more impacts than allowed: raise max_impact_rate_hz, cut runs of over 6e7 impacts, or suspect chatter",
-    "the motion is beyond all numbers or their digits: lower the drive, or check the specimen's numbers",
-    "a contact made no progress: start less deep in a stop, ask for less accuracy, or check the specimen",
-    "more steps than a run may take: a mode is very fast; check masses and stiffnesses, or run shorter",
+    "the motion overflows or loses all its digits: lower the drive, or check the specimen's numbers",
+    "a contact made no progress: start less deep in a stop, request less accuracy, or check the specimen",
+    "more steps than allowed: a mode is very fast; check masses and stiffnesses, or run shorter",
 )
 
 

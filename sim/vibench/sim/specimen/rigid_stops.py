@@ -15,7 +15,7 @@ class RigidStops:
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     restitution: float
-    """0 (they stay together) to 1 (nothing is lost)."""
+    """Coefficient of restitution: 0 (the masses stay together) to 1 (no energy is lost)."""
     kind: Literal["rigid"] = "rigid"
 
     def __post_init__(self) -> None:
