@@ -271,7 +271,7 @@ def sentences(path: Path) -> Iterator[None]:
     except (ValueError, TypeError, LookupError) as error:  # pydantic's; missing columns
         raise RecordingError(
             f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
-            "another version. Nothing was changed; put back a copy, or move it away and resume from the recordings"
+            "another version. Nothing was changed; put back a copy, or move it away and resume"
         ) from error
     except sqlite3.Error as error:
         raise RecordingError(
