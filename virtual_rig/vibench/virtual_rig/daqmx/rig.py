@@ -26,10 +26,10 @@ FAILED_CALL_S = 0.5
 
 Without it, a temporary fault would never end for a program that retries."""
 
-TICK_S = 0.01
-"""Interval of updates in real time [s], well below the usual read times."""
+TICK_S = 0.02
+"""Interval of updates in real time while a task runs [s], well below the usual read times."""
 SLICE_S = 0.1
-"""Longest rig time computed without releasing the lock [s]."""
+"""Longest rig time computed without releasing the lock [s], and the interval of updates without a task."""
 
 YIELD_S = 1e-4
 """Pause between two slices while the rig lags behind the clock [s]."""
@@ -57,6 +57,11 @@ class Rig:
     def now_s(self) -> float:
         """Current rig time [s]."""
         return self.world.time_s
+
+    @property
+    def is_used(self) -> bool:
+        """Whether a task runs."""
+        return bool(self._acquisitions or self._generations)
 
     def wall_s(self, rig_s: float) -> float:
         """Return the wall-clock time of a rig time [s since 1970]; both coincide at switch-on."""
@@ -231,7 +236,8 @@ class WallPace:
                     behind_s = self._step(rig)
                 except AcquisitionError:
                     return  # the world has failed; the next call reports it
-            pause_s = YIELD_S if behind_s > 0 else TICK_S
+                is_used = rig.is_used
+            pause_s = YIELD_S if behind_s > 0 else TICK_S if is_used else SLICE_S
 
     def _step(self, rig: "Rig") -> float:
         """Compute at most one slice, so that the lock is released soon; return the remaining lag."""

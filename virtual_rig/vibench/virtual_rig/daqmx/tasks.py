@@ -317,6 +317,7 @@ class Task:
         return self.buffer
 
     def _begin(self) -> None:
+        self.rig.pace.pass_time(self.rig, 0.0)  # without a task, the rig is updated rarely
         if self.inputs:
             self.acquisition = self._acquire()
             self.rig.run_acquisition(self.acquisition)
