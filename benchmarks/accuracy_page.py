@@ -41,8 +41,9 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
-        "`standard` is the default. Use `quick` to look around, and `reference` to check a result. In chaos",
-        "no level predicts a single motion; only averages are meaningful.",
+        "`standard` is the default. Use `quick` to look around, and `reference` to check a result.",
+        f"A periodic motion is correct to {', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}.",
+        "In chaos no level predicts a single motion; only averages are meaningful.",
     )
     yield from _promises(benchmark)
     yield from (

@@ -229,8 +229,9 @@ def section(curves, models, chaos):
     yield from (
         HEADING,
         "",
-        "Ask for an error, a time, or both: `vibench predict --error 1% --time 2s`. Figures and tables of",
-        "this section are made by `python benchmarks/error_curves.py --markdown docs/accuracy.md`, with",
+        "Ask for an error (any up to 100 %), a time, or both: `vibench predict --error 1% --time 2s`. The",
+        "answer states the error that was reached. Figures and tables of this section are made by",
+        "`python benchmarks/error_curves.py --markdown docs/accuracy.md`, with",
         f"vibench {json.loads(software())['vibench']}. Times are processor time of one core.",
         "",
         "![Error over time of every method, the paper's four cases](images/tradeoff.png)",
