@@ -70,13 +70,7 @@ def _compare(axes: "Axes", curves: dict[str, Responses], what: str) -> None:
     for number, ((label, curve), colour, line) in enumerate(styles):
         f = curve.frequency_hz
         axes.plot(f, getattr(curve, what), color=colour, linestyle=line, label=label)
-        axes.fill_between(
-            f,
-            0.03 * number,
-            0.03 * number + 0.025,
-            where=curve.collides.tolist(),
-            transform=axes.get_xaxis_transform(),
-            color=colour,
-            linewidth=0,
-        )
+        foot, where = 0.03 * number, curve.collides.tolist()
+        bars = axes.get_xaxis_transform()
+        axes.fill_between(f, foot, foot + 0.025, where=where, transform=bars, color=colour)
         finish(axes, f, "response of m0 over A0")

@@ -64,17 +64,9 @@ def _draw_rates(
     axes: "Axes", found: Sequence[Similarity], place: float, colour: str, line: str, model: str
 ) -> None:
     apart = np.array([[each.rate - each.low, each.high - each.rate] for each in found]).T
-    axes.errorbar(
-        np.arange(len(found)) + 0.06 * place,
-        [100 * each.rate for each in found],
-        100 * np.maximum(apart, 0.0),
-        color=colour,
-        linestyle=line,
-        marker="o",
-        markersize=3,
-        capsize=2,
-        label=f"n = {model.removeprefix('power:')}",
-    )
+    at, rates = np.arange(len(found)) + 0.06 * place, [100 * each.rate for each in found]
+    look = {"color": colour, "label": f"n = {model.removeprefix('power:')}"}
+    axes.errorbar(at, rates, 100 * np.maximum(apart, 0.0), fmt=f"o{line}", capsize=2, **look)
 
 
 def definition(options: FigureOptions) -> str:

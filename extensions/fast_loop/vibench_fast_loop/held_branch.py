@@ -132,10 +132,8 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
             _model(axes, model, scale)
         for label, chosen, marks in _groups(found):
             if chosen.any():
-                axes.plot(
-                    found.frequency_hz[chosen], scale * found.m0_m[chosen], color=MEASURED,
-                    markersize=4, linestyle="none", label=label, **marks,
-                )  # fmt: skip
+                look = {"color": MEASURED, "linestyle": "none", "label": label, **marks}
+                axes.plot(found.frequency_hz[chosen], scale * found.m0_m[chosen], **look)
         axes.set_xlabel("drive frequency [Hz]")
         axes.set_ylabel(f"amplitude of m0 [{unit}]")
         legend_above(figure, [axes], columns=2)
@@ -188,10 +186,8 @@ def _model(axes: Axes, model: Branch, scale: float) -> None:
     ):
         if chosen.any():
             near = chosen | np.roll(chosen, 1)
-            axes.plot(
-                model.frequencies_hz, np.where(near, m0, np.nan),
-                color=SIMULATED, linestyle=style, linewidth=1.0, label=label,
-            )  # fmt: skip
+            part = np.where(near, m0, np.nan)
+            axes.plot(model.frequencies_hz, part, style, color=SIMULATED, linewidth=1.0, label=label)
 
 
 HELD_BRANCH = replace(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,6 +32,7 @@ _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
 _LOST = "no resonance found at this level"
 _SIMULATED = "simulated under the recorded base"
+_MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 2, "linewidth": 0.8}
 
 
 def backbone_figure(
@@ -90,13 +92,13 @@ def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
 def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
     axes.errorbar(
         _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
-        color=style.MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
+        **_MEASURED, label=_PHASE,
     )  # fmt: skip
     mode_hz, u_hz = rows(levels, "mode_hz u_mode_hz").values()
     if np.isfinite(mode_hz).any():
         axes.errorbar(
             _base(levels), mode_hz, 2 * u_hz, color=style.PREDICTED, marker="D", markerfacecolor="none",
-            markersize=4, linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
+            linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
         )  # fmt: skip
     axes.set_ylabel("frequency [Hz]")
     axes.margins(_MARGIN)
@@ -106,12 +108,10 @@ def _amplitudes(
     axes: Axes, levels: Sequence[TrackedResonance], base: Reals, simulated_m: Reals | None
 ) -> None:
     amplitude, scale, unit = _amplitude(levels)
-    axes.plot(_base(levels), amplitude, color=style.MEASURED, marker="o", markersize=4, linewidth=0.8)
+    axes.plot(_base(levels), amplitude, color=style.MEASURED, marker="o", linewidth=0.8)
     if simulated_m is not None:
-        axes.plot(
-            base, scale * simulated_m, color=style.SIMULATED, marker="s", markerfacecolor="none",
-            markersize=5, linestyle="none", label=_SIMULATED,
-        )  # fmt: skip
+        size = scale * simulated_m
+        axes.plot(base, size, "s", color=style.SIMULATED, markerfacecolor="none", label=_SIMULATED)
     axes.set_xlabel(_LEVEL)
     axes.margins(_MARGIN)
     _from_zero(axes, levels, unit)
@@ -121,8 +121,7 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
     amplitude, _, unit = _amplitude(levels)
     axes.errorbar(
         [each.frequency_hz for each in levels], amplitude,
-        xerr=[2 * each.u_frequency_hz for each in levels],
-        color=style.MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
+        xerr=[2 * each.u_frequency_hz for each in levels], **_MEASURED,
     )  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
     axes.set_xlabel("phase resonance [Hz]" if levels[0].is_fundamental else "drive at phase resonance [Hz]")

@@ -87,14 +87,11 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
     )
     period = "" if line.periods == 1 else f", period {line.periods}"
     for is_stable, piece in line.pieces():
-        axes.plot(
-            place[piece],
-            size[piece],
-            color=colour,
-            linestyle="-" if is_stable else (0, (3, 1.5)),
-            linewidth=1.3 if is_stable else 0.9,
-            label=f"{'stable' if is_stable else 'unstable'}{period}",
-        )
+        if is_stable:
+            axes.plot(place[piece], size[piece], color=colour, label=f"stable{period}")
+        else:
+            dashes, label = (0, (3, 1.5)), f"unstable{period}"
+            axes.plot(place[piece], size[piece], color=colour, linestyle=dashes, linewidth=0.9, label=label)
 
 
 def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
@@ -109,11 +106,11 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
     base_m = np.array([each.base_m_per_s2 for each in tracked]) / (2.0 * np.pi * frequency_hz) ** 2
     response = np.array([each.amplitude_m for each in tracked]) / base_m
     error_hz = [2.0 * each.u_frequency_hz for each in tracked]
+    label = "tracked, ± two standard uncertainties"
     panels[0].errorbar(
-        1e6 * base_m, frequency_hz, error_hz, color=style.MEASURED, linestyle="none", marker="o",
-        markersize=3.5, capsize=2, label="tracked, ± two standard uncertainties",
-    )  # fmt: skip
-    panels[1].plot(1e6 * base_m, response, color=style.MEASURED, linestyle="none", marker="o", markersize=3.5)
+        1e6 * base_m, frequency_hz, error_hz, fmt="o", color=style.MEASURED, capsize=2, label=label
+    )
+    panels[1].plot(1e6 * base_m, response, "o", color=style.MEASURED)
 
 
 def _growth(
@@ -127,13 +124,11 @@ def _growth(
             ("not holdable by this bench", grows & ~held, style.SIMULATED),
         ):
             if np.any(chosen):
-                axes.plot(
-                    place[chosen], line.growth_time_s[chosen], ".", markersize=3, color=colour, label=told
-                )
+                axes.plot(place[chosen], line.growth_time_s[chosen], ".", color=colour, label=told)
     axes.axhline(least_s, color=style.MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
     axes.set_yscale("log")
     low, high = axes.get_ylim()
-    axes.axhspan(min(low, 0.5 * least_s), least_s, color=style.COLLIDING, alpha=0.6, linewidth=0)
+    axes.axhspan(min(low, 0.5 * least_s), least_s, color=style.COLLIDING, alpha=0.6)
     axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
     axes.set_ylabel("time to\ngrow by e [s]")
 
@@ -152,16 +147,8 @@ def _events(axes: Axes, diagram: BranchDiagram) -> None:
                 each.frequency_hz if along is Parameter.FREQUENCY else 1e6 * each.amplitude_m
                 for each in found
             ]
-            axes.plot(
-                place,
-                [each.response_ii for each in found],
-                linestyle="none",
-                marker=mark,
-                markersize=4,
-                markerfacecolor="none",
-                color=colour,
-                label=kind,
-            )
+            size = [each.response_ii for each in found]
+            axes.plot(place, size, mark, markerfacecolor="none", color=colour, label=kind)
 
 
 def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> None:
@@ -169,16 +156,9 @@ def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) 
         return
     for curve in curves:
         is_simulated = curve.origin is CurveOrigin.SIMULATED
-        axes.plot(
-            curve.frequency_hz,
-            curve.magnitude,
-            color=style.SIMULATED if is_simulated else style.MEASURED,
-            linestyle="none",
-            marker=".",
-            markersize=2.5,
-            alpha=0.7,
-            label=style.plain_label(f"{curve.source}, {curve.origin.value}"),
-        )
+        colour = style.SIMULATED if is_simulated else style.MEASURED
+        label = style.plain_label(f"{curve.source}, {curve.origin.value}")
+        axes.plot(curve.frequency_hz, curve.magnitude, ".", color=colour, alpha=0.7, label=label)
 
 
 def _across(axes: Axes, diagram: BranchDiagram) -> None:

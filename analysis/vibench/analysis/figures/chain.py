@@ -64,7 +64,7 @@ def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
 def _shade(axes: Axes, found: ChainAnswer) -> None:
     top_hz = float(found.linear_hz[-1])
     for gap in found.gaps:
-        axes.axvspan(gap.lower_hz, min(gap.upper_hz, top_hz), color=style.COLLIDING, linewidth=0)
+        axes.axvspan(gap.lower_hz, min(gap.upper_hz, top_hz), color=style.COLLIDING)
     axes.set_xlim(0.0, top_hz)
 
 
@@ -92,7 +92,7 @@ def _across(axes: Axes, found: ChainAnswer) -> None:
         axes.plot(found.linear_hz, linear, "--", color=colour, linewidth=0.8, label=name)
         over_hz, driven = found.driven_transmission(cells, place)
         marker = "o" if found.request.drive is ChainDrive.STEADY else ""
-        axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker, markersize=3)
+        axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker)
     axes.plot([], "--", color=style.BOUNDS, linewidth=0.8, label="without contact")
     style.magnitude_axis(axes)
     axes.set_ylabel("|x / U|")
@@ -116,9 +116,8 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
         norm=Normalize(-top, top) if is_steady else LogNorm(top * 10.0**-_DECADES, top),
         rasterized=True,
     )
-    axes.plot(
-        run.impact_time_s, run.impact_cell + 1, ".", color=style.MEASURED, markersize=2 if is_steady else 0.6
-    )
+    size = 2.0 if is_steady else 0.6
+    axes.plot(run.impact_time_s, run.impact_cell + 1, ".", color=style.MEASURED, markersize=size)
     axes.set_xlim(times[0], times[-1])
     axes.set_ylabel("cell")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -131,14 +130,8 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
 def _per_cell(energies: Axes, impacts: Axes, run: ChainRun) -> None:
     place = np.arange(1, run.cells + 1)
     factor, unit = style.prefixed(float(np.nanmax(run.energy_j, initial=0.0)), "J")
-    energies.errorbar(
-        place,
-        factor * run.energy_j,
-        factor * run.energy_error_j,
-        fmt="o",
-        markersize=3,
-        color=style.SIMULATED,
-    )
+    energy, error = factor * run.energy_j, factor * run.energy_error_j
+    energies.errorbar(place, energy, error, fmt="o", color=style.SIMULATED)
     if float(np.nanmin(run.energy_j, initial=math.inf)) > 0.0:
         style.magnitude_axis(energies)
     energies.set_ylabel(f"mean energy [{unit}]")

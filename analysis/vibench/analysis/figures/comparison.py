@@ -83,16 +83,13 @@ def _curve(axes: Axes, curve: Curve, colour: str) -> None:
     lone = curve.frequency_hz.size <= _LONE
     known = np.isfinite(curve.relative_sd)
     if known.any() and not lone:
-        axes.fill_between(
-            curve.frequency_hz, curve.lower, curve.upper, color=colour, alpha=0.18, linewidth=0, where=known
-        )
+        axes.fill_between(curve.frequency_hz, curve.lower, curve.upper, color=colour, alpha=0.18, where=known)
     axes.plot(
         curve.frequency_hz,
         curve.magnitude,
         color=colour,
         linestyle="none" if lone else _STYLES[curve.origin][curve.response is CurveKind.RESPONSE_II],
         marker="o" if lone else None,
-        markersize=5,
         linewidth=1.0,
         label=style.plain_label(curve.name),
         gid=printable(curve.name),

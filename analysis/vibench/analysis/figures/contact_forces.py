@@ -64,7 +64,7 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     axes.set_ylabel("force [N]")
     if isinstance(specimen.contact, RigidStops):
         axes.plot([1e6 * p[0], 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, side], color=style.MEASURED)
-        axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3, linewidth=0)
+        axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3)
         axes.set_ylim(min(-0.1 * side, side), max(-0.1 * side, side))
         axes.set_yticks([0.0])
         return []

@@ -56,26 +56,16 @@ def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
 
 def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     frequency_hz = periodic.frequency_response.frequency_hz
-    axes.plot(
-        frequency_hz,
+    noise, label = (
         _share(periodic.noise_variance, periodic),
-        color=style.BOUNDS,
-        linewidth=0.9,
-        label="not repeating (noise or chaos), one realisation",
+        "not repeating (noise or chaos), one realisation",
     )
+    axes.plot(frequency_hz, noise, color=style.BOUNDS, linewidth=0.9, label=label)
     varied = periodic.distortion_variance
     if varied is not None:
         # If noise explains all of the scatter, there is no distortion to draw.
         seen = np.where(varied > 0, _share(varied, periodic), np.nan)
-        axes.plot(
-            frequency_hz,
-            seen,
-            color=style.MEASURED,
-            marker=".",
-            markersize=3,
-            linewidth=0.7,
-            label="nonlinear distortion",
-        )
+        axes.plot(frequency_hz, seen, ".-", color=style.MEASURED, linewidth=0.7, label="nonlinear distortion")
     style.magnitude_axis(axes)
     axes.set_ylabel("sd over |H|")
 
@@ -87,24 +77,12 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         (is_even, _EVEN, "o", "even lines, not driven"),
         (~is_even, _ODD, "x", "odd lines, not driven"),
     ):
-        _dots(axes, lines.frequency_hz[chosen], lines.response_amplitude[chosen], (colour, marker, label))
-    axes.plot(
-        lines.frequency_hz,
-        lines.noise_amplitude,
-        color=style.BOUNDS,
-        linewidth=0.9,
-        linestyle=":",
-        label="noise or chaos on these lines",
-    )
+        size = lines.response_amplitude[chosen]
+        axes.plot(lines.frequency_hz[chosen], size, marker, color=colour, markersize=2.5, label=label)
+    label = "noise or chaos on these lines"
+    axes.plot(lines.frequency_hz, lines.noise_amplitude, ":", color=style.BOUNDS, linewidth=0.9, label=label)
     style.magnitude_axis(axes)
     axes.set_ylabel("velocity of the mass [m/s]")
-
-
-def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, str, str]) -> None:
-    colour, marker, label = look
-    axes.plot(
-        frequency_hz, amplitude, color=colour, marker=marker, markersize=2.5, linestyle="none", label=label
-    )
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:

@@ -65,9 +65,7 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
     motion = response.displacement
     stop_s = (motion.samples.size - motion.edge_samples) / motion.sample_rate_hz
     axes.axvspan(stop_s - response.window_s, stop_s, color=style.COLLIDING, zorder=0, label="window analysed")
-    axes.fill_between(
-        found.time_s, factor * found.lower, factor * found.upper, color=style.MEASURED, linewidth=0
-    )
+    axes.fill_between(found.time_s, factor * found.lower, factor * found.upper, color=style.MEASURED)
     axes.set_xlim(0, motion.samples.size / motion.sample_rate_hz)
     axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of {analysis.facts.mass} [{unit}]")
 
@@ -85,14 +83,8 @@ def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> Non
     factor, unit = style.prefixed(float(np.max(np.abs(motion))), "m")
     axes.plot(1e3 * time_s, factor * motion, color=style.MEASURED, linewidth=1.2, label="measured")
     if laid is not None:
-        axes.plot(
-            1e3 * time_s,
-            factor * last_periods(laid.response)[1],
-            color=style.SIMULATED,
-            linewidth=0.8,
-            linestyle=(0, (4, 2)),
-            label=simulated_label(laid.run),
-        )
+        simulated = factor * last_periods(laid.response)[1]
+        axes.plot(1e3 * time_s, simulated, label=simulated_label(laid.run), **style.SIMULATED_CURVE)
     axes.set_xlim(1e3 * float(time_s[0]), 0)
     axes.set_ylabel(f"x [{unit}]")
 

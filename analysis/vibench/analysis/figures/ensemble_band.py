@@ -10,11 +10,22 @@ from matplotlib.axes import Axes
 from vibench.sim import Specimen
 
 from ..overlay.draws import SimulatedRun
-from ..overlay.overlay import AbstractOverlay
+from ..overlay.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, SteppedSineOverlay, SweepOverlay
 from ..overlay.prediction import ResponsePrediction
 from ..signals.arrays import Reals
 from ..tables import Table, columns, table
 from . import style
+
+ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
+"""Attributes of the responses to sines."""
+RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
+
+
+def draw_sines(axes: Axes, along: Reals, sines: ResponsePrediction, what: str, label: str) -> None:
+    """Draw the response without contact, and dots for the steady sines, over the abscissae ``along``."""
+    rising = np.argsort(along)
+    axes.plot(along[rising], sines.linear[rising], **style.LINEAR_CURVE)
+    axes.plot(along, getattr(sines, ATTRIBUTES[what]), ".", color=style.PREDICTED, label=label)
 
 
 def simulated_label(run: SimulatedRun) -> str:
@@ -38,16 +49,9 @@ def draw_band(
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
         return None
-    axes.fill_between(
-        along,
-        shown(found.lower),
-        shown(found.upper),
-        color=style.SIMULATED,
-        alpha=0.25,
-        linewidth=0,
-        zorder=1.5,
-        label="95 % of draws",  # their number differs between recordings: the caption states it
-    )
+    # Their number differs between recordings: the caption states it.
+    look: dict[str, Any] = {"color": style.SIMULATED, "alpha": 0.25, "zorder": 1.5, "label": "95 % of draws"}
+    axes.fill_between(along, shown(found.lower), shown(found.upper), **look)
     return shown(found.median)
 
 
@@ -104,6 +108,15 @@ def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str
     }
 
 
+def simulated_responses(laid: SweepOverlay | SteppedSineOverlay) -> dict[str, Reals]:
+    """Return a table's columns with the simulated responses to sines and their draws."""
+    return {
+        **columns(laid.response, "response_i_simulated=response_i response_ii_simulated=response_ii"),
+        **band_columns(laid, RESPONSE_I, "response_i"),
+        **band_columns(laid, RESPONSE_II, "response_ii"),
+    }
+
+
 _LABEL_HEIGHT = 1.01
 """Just above the axis, in parts of its height."""
 _FREE_LABEL = "resonances without contact"
@@ -146,13 +159,5 @@ def _write(axes: Axes, frequencies_hz: Sequence[float], colour: str) -> None:
     low, high = axes.get_xlim()
     for frequency in frequencies_hz:
         if low <= frequency <= high:
-            axes.text(
-                frequency,
-                _LABEL_HEIGHT,
-                f"{frequency:.0f}",
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                va="bottom",
-                fontsize=7,
-                color=colour,
-            )
+            place: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+            axes.text(frequency, _LABEL_HEIGHT, f"{frequency:.0f}", fontsize=7, color=colour, **place)

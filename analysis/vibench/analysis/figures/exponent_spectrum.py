@@ -47,16 +47,9 @@ def _exponents(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
         if not known.any():
             continue
         reach = np.abs(np.stack([values[known, k] - low[known, k], high[known, k] - values[known, k]]))
+        colour, label, reach = style.LEVELS[k], f"λ{k + 1}", np.nan_to_num(reach)
         axes.errorbar(
-            place[known],
-            values[known, k],
-            np.nan_to_num(reach),
-            color=style.LEVELS[k],
-            marker=".",
-            markersize=3,
-            linewidth=0.9,
-            elinewidth=0.7,
-            label=f"λ{k + 1}",
+            place[known], values[known, k], reach, fmt=".-", linewidth=0.9, color=colour, label=label
         )
     axes.axhline(0.0, color=style.BOUNDS, linewidth=0.7)
     axes.set_ylabel("exponent [1/s]")
@@ -64,16 +57,8 @@ def _exponents(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
 
 def _dimension(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
     middle, low, high = (found.column(n) for n in ("dimension", "dimension_low", "dimension_high"))
-    axes.errorbar(
-        place,
-        middle,
-        np.nan_to_num(np.abs(np.stack([middle - low, high - middle]))),
-        color=style.MEASURED,
-        marker=".",
-        markersize=3,
-        linewidth=0.9,
-        elinewidth=0.7,
-    )
+    reach = np.nan_to_num(np.abs(np.stack([middle - low, high - middle])))
+    axes.errorbar(place, middle, reach, fmt=".-", color=style.MEASURED, linewidth=0.9)
     axes.set_ylabel("dimension")
 
 

@@ -53,7 +53,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     rate = motion.sample_rate_hz
     for gone in motion.tracked.not_followed:
         first, last = (motion.first_sample + each for each in (gone.first, gone.stop))
-        axes.axvspan(first / rate, last / rate, color=style.COLLIDING, linewidth=0, label="not followed")
+        axes.axvspan(first / rate, last / rate, color=style.COLLIDING, label="not followed")
     length = max(1, motion.tracked.p.size // _COLUMNS)
     count = motion.tracked.p.size // length
     pieces = motion.tracked.p[: count * length].reshape(count, length)
@@ -61,7 +61,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     low, high = np.full(count, np.nan), np.full(count, np.nan)
     low[told], high[told] = np.nanmin(pieces[told], axis=1), np.nanmax(pieces[told], axis=1)
     time_s = motion.time_s[: count * length : length]
-    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED, linewidth=0)
+    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED)
     _stops(axes, motion)
     axes.set_xlim(motion.time_s[0], motion.time_s[-1])
     axes.set_xlabel("time [s]")
@@ -77,22 +77,15 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     time_s, p, sd = motion.time_s[place], motion.tracked.p[place], motion.tracked.p_sd[place]
     free = motion.free.p[place]
     low, high = _MICRO * (p - _BOUND * sd), _MICRO * (p + _BOUND * sd)
-    axes.fill_between(time_s, low, high, color=style.BOUNDS, linewidth=0, label="bounds of 95 %")
+    axes.fill_between(time_s, low, high, color=style.BOUNDS, label="bounds of 95 %")
     axes.plot(time_s, _MICRO * p, color=style.MEASURED, linewidth=1.1, label="tracked")
     axes.plot(time_s, _MICRO * free, color=style.PREDICTED, linestyle=":", label="without a contact model")
     _stops(axes, motion)
     if time_s.size:
         axes.set_xlim(time_s[0], time_s[-1])
     axes.set_xlabel("time [s]")
-    return (
-        table(
-            f"hidden_motion_{motion.name}",
-            time_s=time_s,
-            p_m=p,
-            p_sd_m=sd,
-            p_without_contact_model_m=free,
-        ),
-    )
+    found = {"time_s": time_s, "p_m": p, "p_sd_m": sd, "p_without_contact_model_m": free}
+    return (table(f"hidden_motion_{motion.name}", **found),)
 
 
 def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
@@ -144,7 +137,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
         axes.set_title("as described: not told by this motion", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
     low, high = _band(depth, at_1um, exponent)
-    axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5, linewidth=0)
+    axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5)
     return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force, low_n=low, high_n=high),)
 
 

@@ -23,7 +23,6 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
             where=found.differs.tolist(),
             transform=axes.get_xaxis_transform(),
             color=style.COLLIDING,
-            linewidth=0,
             label="they differ",
         )
         for curve, jumps, colour, line, label in (

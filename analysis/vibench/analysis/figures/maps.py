@@ -165,13 +165,8 @@ def _scale(name: str, values: Reals) -> Normalize:
 def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
     """Draw a recording's level as a line, with measured values in the colours of the map."""
     frequency_hz, amplitude_m = np.array(level.pairs).T
-    axes.plot(
-        frequency_hz,
-        MICRO * amplitude_m,
-        color=style.MEASURED,
-        linewidth=4.0,
-        label=style.plain_label(level.name),
-    )
+    label = style.plain_label(level.name)
+    axes.plot(frequency_hz, MICRO * amplitude_m, color=style.MEASURED, linewidth=4.0, label=label)
     for curve in level.measured:
         place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
         axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)

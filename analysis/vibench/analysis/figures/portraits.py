@@ -59,22 +59,11 @@ def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     speed, speed_unit = style.prefixed(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
     rate = analysis.response.displacement.sample_rate_hz
     shown = round(_ORBIT_PERIODS / section.drive_hz * rate)
-    axes.plot(
-        length * section.orbit_displacement_m[-shown:],
-        speed * section.orbit_velocity_m_per_s[-shown:],
-        color=style.BOUNDS,
-        linewidth=0.4,
-        label=f"last {_ORBIT_PERIODS:g} drive periods",
-    )
-    axes.plot(
-        length * section.displacement_m[-_MOST_POINTS:],
-        speed * section.velocity_m_per_s[-_MOST_POINTS:],
-        color=style.SIMULATED,
-        linestyle="none",
-        marker=".",
-        markersize=2.5,
-        label="once a drive period",
-    )
+    orbit = length * section.orbit_displacement_m[-shown:], speed * section.orbit_velocity_m_per_s[-shown:]
+    label = f"last {_ORBIT_PERIODS:g} drive periods"
+    axes.plot(*orbit, color=style.BOUNDS, linewidth=0.4, label=label)
+    points = length * section.displacement_m[-_MOST_POINTS:], speed * section.velocity_m_per_s[-_MOST_POINTS:]
+    axes.plot(*points, ".", color=style.SIMULATED, markersize=2.5, label="once a drive period")
     axes.set_xlabel(f"x of {analysis.facts.mass} [{unit}]")
     axes.set_ylabel(f"velocity of {analysis.facts.mass} [{speed_unit}]")
     axes.set_title(f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}")

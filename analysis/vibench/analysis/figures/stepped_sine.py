@@ -21,10 +21,16 @@ from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis, feedback_sentences, noted_jumps
 from ..tables import columns, plus_minus, table
 from . import style
-from .ensemble_band import band_columns, run_text, simulated_label
+from .ensemble_band import (
+    ATTRIBUTES,
+    RESPONSE_LABELS,
+    draw_sines,
+    run_text,
+    simulated_label,
+    simulated_responses,
+)
 
 _HEIGHT_IN = 4.6
-_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 _MARKERS = {"up": "^", "down": "v"}
 
 
@@ -52,8 +58,6 @@ def stepped_sine_figure(
         first, second = figure.subplots(2, 1, sharex=True)
         _responses(first, along, analysis, laid, RESPONSE_I)
         _responses(second, along, analysis, laid, RESPONSE_II)
-        first.set_ylabel("Response I\nmax |x| / A0")
-        second.set_ylabel("Response II\n|x at f| / A0")
         second.set_xlabel(look.axis)
         style.legend_above(figure, [first], columns=2)
     found = analysis.response
@@ -63,9 +67,7 @@ def stepped_sine_figure(
         "phase_rad",
     )
     if laid is not None:
-        content |= columns(laid.response, "response_i_simulated=response_i response_ii_simulated=response_ii")
-        content |= band_columns(laid, RESPONSE_I, "response_i")
-        content |= band_columns(laid, RESPONSE_II, "response_ii")
+        content |= simulated_responses(laid)
     name = f"stepped_sine_{analysis.facts.name}"
     return style.DrawnFigure(
         name=name,
@@ -79,68 +81,35 @@ def stepped_sine_figure(
 def _responses(
     axes: Axes, along: Reals, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str
 ) -> None:
-    found, attribute = analysis.response, _ATTRIBUTES[what]
-    rising = np.argsort(along)
+    found, attribute = analysis.response, ATTRIBUTES[what]
     if laid is not None:
-        sines = laid.prediction
-        axes.plot(
-            along[rising],
-            sines.linear[rising],
-            color=style.LINEAR,
-            linestyle="--",
-            label="without contact",
-        )
-        axes.plot(
-            along,
-            getattr(sines, attribute),
-            color=style.PREDICTED,
-            linestyle="none",
-            marker=".",
-            markersize=4,
-            label="steady sines from rest",
-        )
+        draw_sines(axes, along, laid.prediction, what, "steady sines from rest")
     for direction in sorted(set(found.direction)):
         chosen = np.array([each == direction for each in found.direction])
         marker = _MARKERS.get(direction, "o")
-        axes.plot(
-            along[chosen],
-            getattr(found, attribute)[chosen],
-            color=style.MEASURED,
-            label=f"measured, {direction}",
-            linestyle="none",
-            marker=marker,
-            markersize=4,
-        )
+        values = getattr(found, attribute)[chosen]
+        axes.plot(along[chosen], values, marker, color=style.MEASURED, label=f"measured, {direction}")
         if laid is not None:
             _draw_simulated(axes, along, chosen, laid, what, (marker, direction))
     for jump in noted_jumps(analysis.facts.feedback):
-        axes.axvspan(jump.low_hz, jump.high_hz, color=style.MEASURED, alpha=0.3, linewidth=0)
+        axes.axvspan(jump.low_hz, jump.high_hz, color=style.MEASURED, alpha=0.3)
     style.magnitude_axis(axes)
+    axes.set_ylabel(RESPONSE_LABELS[what])
 
 
 def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
     """Draw the median of the draws at every step of one direction, with the 95 % band as an error bar."""
-    values, reach = getattr(laid.response, _ATTRIBUTES[what])[chosen], None
+    values, reach = getattr(laid.response, ATTRIBUTES[what])[chosen], None
     found = laid.quantity(what)
     if found is not None and laid.run.draws > 1:
         values = found.median[chosen]
         reach = np.clip([values - found.lower[chosen], found.upper[chosen] - values], 0.0, None)
     marker, direction = look
-    axes.errorbar(
-        along[chosen],
-        values,
-        yerr=reach,
-        color=style.SIMULATED,
-        markerfacecolor="none",
-        label=f"{simulated_label(laid.run)}, {direction}",
-        linestyle="none",
-        marker=marker,
-        markersize=4,
-        elinewidth=0.8,
-        capsize=1.5,
-    )
+    label = f"{simulated_label(laid.run)}, {direction}"
+    empty: dict[str, Any] = {"markerfacecolor": "none", "elinewidth": 0.8, "capsize": 1.5}
+    axes.errorbar(along[chosen], values, reach, fmt=marker, color=style.SIMULATED, label=label, **empty)
 
 
 def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:

@@ -36,6 +36,13 @@ COLLIDING = "#d9d9d9"
 LEVELS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of several levels in one figure, weak to strong, in addition to line styles."""
 LEVEL_STYLES = ("-", "--", "-.", ":", "-", "--")
+SIMULATED_CURVE: Mapping[str, Any] = MappingProxyType(
+    {"color": SIMULATED, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 3.5}
+)
+"""A simulation over the measurement."""
+LINEAR_CURVE: Mapping[str, Any] = MappingProxyType(
+    {"color": LINEAR, "linestyle": "--", "linewidth": 1.0, "label": "without contact"}
+)
 
 WIDTH_IN = 7.2
 """Width that fits the text of A4 and a report's column."""
@@ -63,6 +70,8 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
         "grid.color": "#e3e3e3",
         "grid.linewidth": 0.5,
         "lines.linewidth": 1.2,
+        "lines.markersize": 4.0,
+        "patch.linewidth": 0.0,
         "legend.fontsize": 8.0,
         "legend.frameon": False,
         "xtick.labelsize": 8.0,

@@ -11,11 +11,19 @@ from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Table, columns, plus_minus, table
 from . import style
-from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
+from .ensemble_band import (
+    ATTRIBUTES,
+    RESPONSE_LABELS,
+    draw_band,
+    draw_sines,
+    run_text,
+    simulated_label,
+    simulated_responses,
+    sines_table,
+)
 from .hysteresis import jumps_text
 
 _HEIGHT_IN = 6.4
-_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 
 
 def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> style.DrawnFigure:
@@ -24,8 +32,8 @@ def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> s
         figure = style.new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
         _envelope(envelope, analysis, laid)
-        _responses(first, analysis, laid, RESPONSE_I, "Response I\nmax |x| / A0")
-        _responses(second, analysis, laid, RESPONSE_II, "Response II\n|x at f| / A0")
+        _responses(first, analysis, laid, RESPONSE_I)
+        _responses(second, analysis, laid, RESPONSE_II)
         second.set_xlabel("drive frequency [Hz]")
         first.tick_params(labelbottom=False)
         style.legend_above(figure, [envelope, first], columns=3)
@@ -46,15 +54,8 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
     for number, region in enumerate(analysis.collisions.regions):
         label = "masses collide (measured)" if number == 0 else None
         axes.axvspan(region.start.time_s, region.stop.time_s, color=style.COLLIDING, zorder=0, label=label)
-    axes.fill_between(
-        found.time_s,
-        factor * found.lower,
-        factor * found.upper,
-        color=style.MEASURED,
-        alpha=0.85,
-        linewidth=0,
-        label=f"measured {analysis.facts.mass} velocity",
-    )
+    low, high, label = factor * found.lower, factor * found.upper, f"measured {analysis.facts.mass} velocity"
+    axes.fill_between(found.time_s, low, high, color=style.MEASURED, alpha=0.85, label=label)
     if laid is not None:
         for number, outline in enumerate((laid.response.upper, laid.response.lower)):
             label = simulated_label(laid.run) if number == 0 else None
@@ -81,52 +82,26 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
     top.set_xlabel("drive frequency [Hz]")
 
 
-def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str, label: str) -> None:
-    measured, attribute = analysis.response, _ATTRIBUTES[what]
+def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str) -> None:
+    measured, attribute = analysis.response, ATTRIBUTES[what]
     for region in analysis.collisions.regions:
         axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     if laid is not None:
         sines = laid.prediction
-        axes.plot(
-            sines.frequency_hz,
-            sines.linear,
-            color=style.LINEAR,
-            linestyle="--",
-            linewidth=1.0,
-            label="without contact",
-        )
-        axes.plot(
-            sines.frequency_hz,
-            getattr(sines, attribute),
-            color=style.PREDICTED,
-            linestyle="none",
-            marker=".",
-            markersize=3,
-            label="steady sines of the measured A0",
-        )
-    axes.plot(
-        measured.frequency_hz,
-        getattr(measured, attribute),
-        color=style.MEASURED,
-        linewidth=1.3,
-        label="measured response",
-    )
+        draw_sines(axes, sines.frequency_hz, sines, what, "steady sines of the measured A0")
+    response = getattr(measured, attribute)
+    axes.plot(measured.frequency_hz, response, color=style.MEASURED, label="measured response")
     if laid is not None:
         middle = draw_band(axes, measured.frequency_hz, laid, what)
-        axes.plot(
-            laid.response.frequency_hz,
-            getattr(laid.response, attribute) if middle is None else middle,
-            color=style.SIMULATED,
-            linewidth=0.7,
-            linestyle=(0, (4, 2)),
-        )
+        simulated = getattr(laid.response, attribute) if middle is None else middle
+        axes.plot(laid.response.frequency_hz, simulated, **style.SIMULATED_CURVE)
     for number, jump in enumerate(analysis.jumps):
         named = "jump" if number == 0 else None
         axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=named)
     ends = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
     axes.set_xlim(*ends)
     style.magnitude_axis(axes)
-    axes.set_ylabel(label)
+    axes.set_ylabel(RESPONSE_LABELS[what])
 
 
 def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
@@ -190,10 +165,6 @@ def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, 
     content["is_colliding"] = analysis.collisions.is_colliding.astype(np.int64)
     if laid is None:
         return (table(name, **content),)
-    content |= columns(
-        laid.response,
-        "velocity_upper_simulated_m_per_s=upper velocity_lower_simulated_m_per_s=lower "
-        "response_i_simulated=response_i response_ii_simulated=response_ii",
-    )
-    content |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
+    envelope = "velocity_upper_simulated_m_per_s=upper velocity_lower_simulated_m_per_s=lower"
+    content |= columns(laid.response, envelope) | simulated_responses(laid)
     return table(name, **content), sines_table(name, laid.prediction)

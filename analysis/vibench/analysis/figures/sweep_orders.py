@@ -57,14 +57,8 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
     for order, colour, line in zip(
         _SHOWN, (style.LEVELS[0], style.MEASURED, *style.LEVELS[1:4]), _ORDER_STYLES, strict=True
     ):
-        axes.plot(
-            response.harmonics_hz,
-            factor * np.abs(response.harmonics.order(order)),
-            color=colour,
-            linestyle=line,
-            linewidth=1.0,
-            label=order_label(order),
-        )
+        size, label = factor * np.abs(response.harmonics.order(order)), order_label(order)
+        axes.plot(response.harmonics_hz, size, line, color=colour, linewidth=1.0, label=label)
     ends = sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1])))
     axes.set_xlim(*ends)
     style.magnitude_axis(axes)

@@ -71,63 +71,32 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
     high = np.minimum(measured.magnitude_upper, size * _LARGEST_BOUND_RATIO)
     mark_resonances(axes, at)
+    bounds = f"{100 * measured.settings.confidence:g} % bounds"
     axes.fill_between(
-        measured.frequency_hz,
-        view.drawn(low),
-        view.drawn(high),
-        color=style.BOUNDS,
-        alpha=0.45,
-        linewidth=0,
-        label=f"{100 * measured.settings.confidence:g} % bounds",
+        measured.frequency_hz, view.drawn(low), view.drawn(high), color=style.BOUNDS, alpha=0.45, label=bounds
     )
     if laid is not None:
         simulated, sines = view.shown(laid.response.frequency_response), laid.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
         linear = np.abs(base_transmissibility(laid.run.specimen, fine_hz)[:, 0])
         linear = view.drawn(linear * view.factor(fine_hz))
-        axes.plot(fine_hz, linear, color=style.LINEAR, linestyle="--", label="without contact")
+        axes.plot(fine_hz, linear, **style.LINEAR_CURVE)
         micrometres = 1e6 * float(sines.amplitude_m[0])
-        axes.plot(
-            sines.frequency_hz,
-            view.drawn(sines.response_i * view.factor(sines.frequency_hz)),
-            color=style.PREDICTED,
-            linewidth=0.9,
-            label=f"Response I, sines of A0 = {micrometres:.3g} µm",
-        )
+        response_i = view.drawn(sines.response_i * view.factor(sines.frequency_hz))
+        label = f"Response I, sines of A0 = {micrometres:.3g} µm"
+        axes.plot(sines.frequency_hz, response_i, color=style.PREDICTED, linewidth=0.9, label=label)
         factor = view.factor(simulated.frequency_hz)
         middle = draw_band(
             axes, simulated.frequency_hz, laid, TRANSMISSION, lambda values: view.drawn(values * factor)
         )
-        axes.plot(
-            simulated.frequency_hz,
-            view.drawn(simulated.magnitude) if middle is None else middle,
-            color=style.SIMULATED,
-            linewidth=0.8,
-            linestyle=(0, (4, 2)),
-            zorder=3.5,
-            label=simulated_label(laid.run),
-        )
-    axes.plot(
-        measured.frequency_hz,
-        view.drawn(size),
-        color=style.MEASURED,
-        linewidth=1.5,
-        label="measured",
-        zorder=3,
-    )
+        curve = view.drawn(simulated.magnitude) if middle is None else middle
+        axes.plot(simulated.frequency_hz, curve, label=simulated_label(laid.run), **style.SIMULATED_CURVE)
+    axes.plot(measured.frequency_hz, view.drawn(size), color=style.MEASURED, label="measured", zorder=3)
     peaks = analysis.response.resonances
     peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
     heights = np.array([each.peak_magnitude for each in peaks])
-    axes.plot(
-        peaks_hz,
-        view.drawn(heights * view.factor(peaks_hz)),
-        linestyle="none",
-        marker="v",
-        markersize=5,
-        color=style.MEASURED,
-        label="resonances found" if peaks else None,
-        zorder=4,
-    )
+    tops, label_found = view.drawn(heights * view.factor(peaks_hz)), "resonances found" if peaks else None
+    axes.plot(peaks_hz, tops, "v", color=style.MEASURED, label=label_found, zorder=4)
     if view.scale is MagnitudeScale.LOG:
         style.magnitude_axis(axes)
     seen = size[np.isfinite(size) & (size > 0)]
@@ -142,16 +111,11 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: 
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
-    axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45, linewidth=0)
+    axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45)
     if laid is not None:
         simulated = view.shown(laid.response.frequency_response)
-        axes.plot(
-            *_unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad)),
-            color=style.SIMULATED,
-            linewidth=0.8,
-            linestyle=(0, (4, 2)),
-            zorder=3.5,
-        )
+        phase = _unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad))
+        axes.plot(*phase, **style.SIMULATED_CURVE)
     axes.plot(
         *_unbroken(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=style.MEASURED, linewidth=0.9
     )
