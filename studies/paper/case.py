@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -146,56 +145,54 @@ class Option:
     label: Callable[[Any], str]
 
 
-OPTIONS: Mapping[str, Option] = MappingProxyType(
-    {
-        "zeta": Option(
-            "the ratio of c_i = 2 zeta m_i w_i, each mass on its own spring",
-            "0.0165",
-            "damping_ratio",
-            float,
-            lambda ratio: f"c_i = 2 · {ratio:g} · m_i ω_i",
-        ),
-        "gap": Option("clearance [m]", "45e-6", "gap_m", float, lambda gap_m: f"gap {1e6 * gap_m:g} µm"),
-        "fit": Option(
-            "indentation at which models are fitted [m]",
-            "0.45e-6",
-            "fit_m",
-            float,
-            lambda fit_m: f"models fitted at {1e6 * fit_m:g} µm",
-        ),
-        "sum": Option(
-            "shares of 3+5+7", "3@0.05+5@0.15+7@0.8", "sum_model", "power:{}".format, "the sum as {}".format
-        ),
-        "compared": Option(
-            "models are compared up to [Hz]",
-            "400",
-            "similarity_highest_hz",
-            float,
-            "models compared up to {:g} Hz".format,
-        ),
-        "log": Option(
-            f"log10 of eq. 6 in {', '.join(LogarithmOf)}",
-            "mm",
-            "logarithm_of",
-            LogarithmOf,
-            "log10 of the response [{}]".format,
-        ),
-        "exponents": Option(
-            " or ".join(ExponentsBy), "ode45", "exponents_by", ExponentsBy, "exponents by {}".format
-        ),
-        "sweep-amplitude": Option(
-            "of the sweep's base [m]",
-            "5e-6",
-            "sweep_amplitude_m",
-            float,
-            lambda amplitude_m: f"sweep of {1e6 * amplitude_m:g} µm",
-        ),
-        "sweep-falls": Option(
-            "k of the sweep's A0 ~ f^-k", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
-        ),
-        "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "swept {}".format),
-    }
-)
+OPTIONS: Mapping[str, Option] = {
+    "zeta": Option(
+        "the ratio of c_i = 2 zeta m_i w_i, each mass on its own spring",
+        "0.0165",
+        "damping_ratio",
+        float,
+        lambda ratio: f"c_i = 2 · {ratio:g} · m_i ω_i",
+    ),
+    "gap": Option("clearance [m]", "45e-6", "gap_m", float, lambda gap_m: f"gap {1e6 * gap_m:g} µm"),
+    "fit": Option(
+        "indentation at which models are fitted [m]",
+        "0.45e-6",
+        "fit_m",
+        float,
+        lambda fit_m: f"models fitted at {1e6 * fit_m:g} µm",
+    ),
+    "sum": Option(
+        "shares of 3+5+7", "3@0.05+5@0.15+7@0.8", "sum_model", "power:{}".format, "the sum as {}".format
+    ),
+    "compared": Option(
+        "models are compared up to [Hz]",
+        "400",
+        "similarity_highest_hz",
+        float,
+        "models compared up to {:g} Hz".format,
+    ),
+    "log": Option(
+        f"log10 of eq. 6 in {', '.join(LogarithmOf)}",
+        "mm",
+        "logarithm_of",
+        LogarithmOf,
+        "log10 of the response [{}]".format,
+    ),
+    "exponents": Option(
+        " or ".join(ExponentsBy), "ode45", "exponents_by", ExponentsBy, "exponents by {}".format
+    ),
+    "sweep-amplitude": Option(
+        "of the sweep's base [m]",
+        "5e-6",
+        "sweep_amplitude_m",
+        float,
+        lambda amplitude_m: f"sweep of {1e6 * amplitude_m:g} µm",
+    ),
+    "sweep-falls": Option(
+        "k of the sweep's A0 ~ f^-k", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
+    ),
+    "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "swept {}".format),
+}
 """Settings for `vibench reproduce --with`."""
 
 

@@ -25,7 +25,7 @@ from .errors import (
     MissingLibrary as MissingLibrary,
     RecordingError as RecordingError,
 )
-from .host.beside import Beside as Beside, follow_parent as follow_parent
+from .host.beside import Beside as Beside
 from .host.chosen import ChosenFrom as ChosenFrom
 from .host.extras import (
     naming_its_extra as naming_its_extra,

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from types import MappingProxyType
 
 from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
 from vibench.acquisition.instruments import PlugInKind, plug_in_names
@@ -27,19 +26,17 @@ NOT_INSTALLED = "not installed"
 FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 """Extras that users do not need."""
 USB_DEVICES = Path("/dev/bus/usb")
-VARIABLES: Mapping[str, str] = MappingProxyType(
-    {
-        STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
-        LOCK_VARIABLE: "folder that shows all users of a computer which bench is in use; by default /tmp",
-        TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
-        KEY_VARIABLE: "key file for signing the seals of recordings",
-        "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
-        "MALLOC_MMAP_THRESHOLD_": "size of arrays that background processes return at once on Linux [bytes]; "
-        "4 MiB if absent",
-        "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
-        "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
-    }
-)
+VARIABLES: Mapping[str, str] = {
+    STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
+    LOCK_VARIABLE: "folder that shows all users of a computer which bench is in use; by default /tmp",
+    TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
+    KEY_VARIABLE: "key file for signing the seals of recordings",
+    "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
+    "MALLOC_MMAP_THRESHOLD_": "size of arrays that background processes return at once on Linux [bytes]; "
+    "4 MiB if absent",
+    "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
+    "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
+}
 """The environment variables of vibench and their meaning: docs/installation.md."""
 SECRET = frozenset({TOKEN_VARIABLE})
 

@@ -1,7 +1,6 @@
 """Controllers of measurements with feedback, by kind of excitation."""
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any
 
 from ..instruments import PlugInKind, plug_in
@@ -15,16 +14,14 @@ from .resonance_controller import track_resonance
 from .settling_controller import hold_dwell, hold_sweep
 from .sine_loop import SineLoop, hold_response
 
-CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(
-    {
-        "settled_sine": step_settled,
-        "held_dwell": hold_dwell,
-        "held_sweep": hold_sweep,
-        "resonance_tracking": track_resonance,
-        "held_noise": equalise_noise,
-        "held_response": hold_response,
-    }
-)
+CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = {
+    "settled_sine": step_settled,
+    "held_dwell": hold_dwell,
+    "held_sweep": hold_sweep,
+    "resonance_tracking": track_resonance,
+    "held_noise": equalise_noise,
+    "held_response": hold_response,
+}
 """For each kind: a function of the loop and the plan that returns the controller."""
 
 

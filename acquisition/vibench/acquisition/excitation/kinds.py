@@ -126,9 +126,9 @@ class ExcitationKind:
         return issubclass(self.plan, AbstractFeedback)
 
 
-EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
-    {kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))}
-)
+EXCITATION_KINDS: Mapping[str, ExcitationKind] = {
+    kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))
+}
 """One entry for each plan of the union; the union lists our plans so that types can be checked."""
 _PRESENT_WORDS = {word: kind.word for kind in EXCITATION_KINDS.values() for word in _words(kind.plan)}
 

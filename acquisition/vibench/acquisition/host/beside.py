@@ -1,12 +1,9 @@
 """Helper threads for work that may hang or must end the process, and objects closed by a ``with``."""
 
-import os
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import parent_process
-from multiprocessing.connection import wait
 from threading import Condition, Thread
 from typing import Self
 
@@ -76,19 +73,3 @@ class ClosedOnLeaving(ABC):
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def follow_parent() -> None:
-    """End this process as soon as its parent process has gone.
-
-    Needed for the workers of a pool, which do not notice: each of them holds both ends of the pipe on which
-    it waits. A worker has no state to save.
-    """
-    parent = parent_process()
-    if parent is not None:
-        Thread(target=_end_after, args=(parent.sentinel,), name="follow parent", daemon=True).start()
-
-
-def _end_after(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)

@@ -3,18 +3,15 @@
 import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
-from types import MappingProxyType
 
 from ..errors import ConfigurationError, MissingLibrary
 
-EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "figures": ("matplotlib",),
-        "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
-        "sound": ("sounddevice",),
-        "gui": ("PySide6", "pyqtgraph"),
-    }
-)
+EXTRAS: Mapping[str, tuple[str, ...]] = {
+    "figures": ("matplotlib",),
+    "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
+    "sound": ("sounddevice",),
+    "gui": ("PySide6", "pyqtgraph"),
+}
 """Extra of `pyproject.toml`, with the modules that it installs."""
 
 

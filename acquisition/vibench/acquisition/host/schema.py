@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, cast
 
 from pydantic import BaseModel
@@ -93,16 +92,14 @@ class _Kind:
         return found
 
 
-SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
-    {
-        "campaign": _Kind("vibench.acquisition.plan", "Campaign", _with_defaults),
-        "rig": _Kind("vibench.acquisition.rig", "Rig", _with_a_base),
-        "study": _Kind("vibench.sim.study", "Study", _with_ranges),
-        "map": _Kind("vibench.sim.maps", "Map", _with_a_base),
-        "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
-        "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
-    }
-)
+SCHEMAS: Mapping[str, _Kind] = {
+    "campaign": _Kind("vibench.acquisition.plan", "Campaign", _with_defaults),
+    "rig": _Kind("vibench.acquisition.rig", "Rig", _with_a_base),
+    "study": _Kind("vibench.sim.study", "Study", _with_ranges),
+    "map": _Kind("vibench.sim.maps", "Map", _with_a_base),
+    "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
+    "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
+}
 """Kinds of files by word. Models are loaded by name, because they are in higher packages."""
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from datetime import date
 from enum import StrEnum
 from itertools import product
-from types import MappingProxyType
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat
@@ -250,9 +249,7 @@ UNIT_OF_QUANTITY = {
 """UDUNITS text, by the quantity of a channel."""
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
 """Channels that show the motion of m0; the first one of a rig is used."""
-_TABLES: Mapping[str, str] = MappingProxyType(
-    {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
-)
+_TABLES: Mapping[str, str] = {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
 
 
 def sensor_table(role: str) -> str:

@@ -48,7 +48,7 @@ REACHED = Outcome.REACHED_END.text
 DECIBELS = 20.0 / math.log(10.0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ChainRun(Labelled):
     """One chain under one drive; arrays by cell, counted from the base."""
 
@@ -76,9 +76,9 @@ class ChainRun(Labelled):
     """Mean energy of every cell with its link to the previous cell, shape (cells,)."""
     energy_error_j: Reals
     """Standard error of that mean."""
-    exponent_per_s: float
+    exponent_per_s: float = math.nan
     """Largest Lyapunov exponent; NaN if not requested."""
-    exponent_error_per_s: float
+    exponent_error_per_s: float = math.nan
     time_s: Reals
     """Time axis of the picture, shape (n,)."""
     motion_m: Reals
@@ -88,7 +88,7 @@ class ChainRun(Labelled):
     """Contacts during the picture."""
     impact_cell: NDArray[np.int64]
     outcome: str
-    elapsed_s: float
+    elapsed_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +301,6 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         impact_time_s=run.impacts.times_s[struck],
         impact_cell=run.impacts.cells[struck],
         outcome=run.outcome.text,
-        elapsed_s=0.0,
     )
 
 
@@ -357,14 +356,11 @@ def _lost_run(
         observed_s=observed_s,
         energy_j=unknown,
         energy_error_j=unknown,
-        exponent_per_s=math.nan,
-        exponent_error_per_s=math.nan,
         time_s=nothing,
         motion_m=np.zeros((0, chain.size)),
         impact_time_s=nothing,
         impact_cell=np.zeros(0, np.int64),
         outcome=outcome.text,
-        elapsed_s=0.0,
     )
 
 
@@ -385,14 +381,11 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
         observed_s=run.end_time_s,
         energy_j=energy,
         energy_error_j=error,
-        exponent_per_s=math.nan,
-        exponent_error_per_s=math.nan,
         time_s=np.array([run.time_s[each].mean() for each in stretches]),
         motion_m=np.array(sizes),
         impact_time_s=run.impacts.times_s,
         impact_cell=run.impacts.cells,
         outcome=run.outcome.text,
-        elapsed_s=0.0,
     )
 
 

@@ -7,7 +7,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -286,13 +285,11 @@ class Exporter:
         return tuple(written)
 
 
-EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
-    {
-        Format.CSV: Exporter(write_csv_samples),
-        Format.UFF: Exporter(write_uff, write_functions=write_uff_functions),
-        Format.MAT: Exporter(require=require_small, write_all=write_mat),
-        Format.NEXUS: Exporter(write_nexus),
-        Format.WAV: Exporter(write_wav, require_sound),
-    }
-)
+EXPORTERS: Mapping[Format, Exporter] = {
+    Format.CSV: Exporter(write_csv_samples),
+    Format.UFF: Exporter(write_uff, write_functions=write_uff_functions),
+    Format.MAT: Exporter(require=require_small, write_all=write_mat),
+    Format.NEXUS: Exporter(write_nexus),
+    Format.WAV: Exporter(write_wav, require_sound),
+}
 """Exporters by format. A new format needs a module with its writer, a value above, and a row here."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
@@ -36,13 +35,19 @@ COLLIDING = "#d9d9d9"
 LEVELS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
 """Colours of several levels in one figure, weak to strong, in addition to line styles."""
 LEVEL_STYLES = ("-", "--", "-.", ":", "-", "--")
-SIMULATED_CURVE: Mapping[str, Any] = MappingProxyType(
-    {"color": SIMULATED, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 3.5}
-)
+SIMULATED_CURVE: Mapping[str, Any] = {
+    "color": SIMULATED,
+    "linewidth": 0.8,
+    "linestyle": (0, (4, 2)),
+    "zorder": 3.5,
+}
 """A simulation over the measurement."""
-LINEAR_CURVE: Mapping[str, Any] = MappingProxyType(
-    {"color": LINEAR, "linestyle": "--", "linewidth": 1.0, "label": "without contact"}
-)
+LINEAR_CURVE: Mapping[str, Any] = {
+    "color": LINEAR,
+    "linestyle": "--",
+    "linewidth": 1.0,
+    "label": "without contact",
+}
 
 WIDTH_IN = 7.2
 """Width that fits the text of A4 and a report's column."""
@@ -58,35 +63,33 @@ _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
 
-STYLE: Mapping[Any, Any] = MappingProxyType(
-    {
-        "font.family": "DejaVu Sans",
-        "font.size": 9.0,
-        "axes.labelsize": 9.0,
-        "axes.titlesize": 9.0,
-        "axes.linewidth": 0.7,
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "grid.color": "#e3e3e3",
-        "grid.linewidth": 0.5,
-        "lines.linewidth": 1.2,
-        "lines.markersize": 4.0,
-        "patch.linewidth": 0.0,
-        "legend.fontsize": 8.0,
-        "legend.frameon": False,
-        "xtick.labelsize": 8.0,
-        "ytick.labelsize": 8.0,
-        "xtick.direction": "out",
-        "ytick.direction": "out",
-        "figure.facecolor": "white",
-        "axes.facecolor": "white",
-        "savefig.facecolor": "white",
-        "svg.fonttype": "path",
-        "svg.hashsalt": "vibench",
-        "path.simplify": True,
-        "axes.formatter.useoffset": False,
-    }
-)
+STYLE: Mapping[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    "patch.linewidth": 0.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "figure.facecolor": "white",
+    "axes.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "vibench",
+    "path.simplify": True,
+    "axes.formatter.useoffset": False,
+}
 
 
 @contextmanager

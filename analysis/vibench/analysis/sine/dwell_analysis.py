@@ -55,8 +55,6 @@ class Section:
     """The phase portrait: shape (samples,), over the same stretch."""
     time_s: Reals
     """Time of the points, from the first sample of the record; shape (periods,)."""
-    sd_timing_s: float
-    """Bound on the phase error at the ends of the record."""
 
 
 def stroboscope(
@@ -118,7 +116,6 @@ def stroboscope(
         orbit_displacement_m=displacement.samples[inside],
         orbit_velocity_m_per_s=velocity.samples[inside],
         time_s=positions / sample_rate_hz,
-        sd_timing_s=sine.sd_phase_rad / (2 * np.pi * sine.frequency_hz),
     )
 
 

@@ -196,37 +196,27 @@ class LevelJump:
     """``"up"`` or ``"down"``: direction of the level."""
     before_vpp: float
     after_vpp: float
-    before_m: float
-    """Base amplitude there [m]."""
-    after_m: float
     factor: float
     """Response II after over before."""
 
 
-def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple[LevelJump, ...]:
+def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
     """Find the jumps of a stepped level, in the order of time, but not across a turning point.
 
     A step during which the motion jumps shows a mean of both, so the steps before and after it are
     compared.
     """
-    steps = list(
-        zip(
-            response.direction,
-            response.amplitude_vpp.tolist(),
-            response.drive_amplitude_m.tolist(),
-            response.response_ii.tolist(),
-            strict=True,
-        )
-    )
+    levels, sizes = response.amplitude_vpp.tolist(), response.response_ii.tolist()
+    steps = list(zip(response.direction, levels, sizes, strict=True))
     steady = response.sd_response_ii < _UNSTEADY * response.response_ii
     for place in range(len(steps) - 2, 0, -1):
         (way, *_, before), (_, *_, now), (other, *_, after) = steps[place - 1 : place + 2]
         if not steady[place] and way == other and min(before, after) < now < max(before, after):
             del steps[place]
     found = []
-    for (way, before_vpp, before_m, before), (other, after_vpp, after_m, after) in pairwise(steps):
-        if way == other and before > 0 and not 1 / factor <= after / before <= factor:
-            found.append(LevelJump(way, before_vpp, after_vpp, before_m, after_m, after / before))
+    for (way, before_vpp, before), (other, after_vpp, after) in pairwise(steps):
+        if way == other and before > 0 and not 1 / JUMP_FACTOR <= after / before <= JUMP_FACTOR:
+            found.append(LevelJump(way, before_vpp, after_vpp, after / before))
     return tuple(found)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import hypot
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,14 +17,12 @@ WIDENING = 1.4
 """Widening of scatter if the recording ended by it, see `Budget.widened`."""
 
 
-RESULT_PATTERNS: Mapping[str, str] = MappingProxyType(
-    {
-        "resonance_hz": r"^resonance at .*, frequency$",
-        "transmissibility": r"^transmissibility at ",
-        "response_i": r"\bResponse I\b",
-        "response_ii": r"\bResponse II\b",
-    }
-)
+RESULT_PATTERNS: Mapping[str, str] = {
+    "resonance_hz": r"^resonance at .*, frequency$",
+    "transmissibility": r"^transmissibility at ",
+    "response_i": r"\bResponse I\b",
+    "response_ii": r"\bResponse II\b",
+}
 """Quantities that belong to a result for which a recording may wait, see `vibench.acquisition.plan.Until`."""
 
 

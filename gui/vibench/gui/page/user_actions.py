@@ -1,6 +1,7 @@
 """Commands of keys, menus and buttons; each is implemented once."""
 
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject
 
@@ -36,17 +37,9 @@ class UserActions(QObject):
         if measurement is None:
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
             return
-        if not self._may("arm", EngineState.READY, EngineState.ARMED):
-            return
         folder = self._context.folder
         named = measurement.model_copy(update={"name": free_name(folder, measurement)})
-        self._context.bridge.arm(
-            CampaignRequest(
-                campaign=Campaign(name=named.name, measurements=(named,)),
-                folder=folder,
-                longest_patience_s=self._context.patience_s,
-            )
-        )
+        self._arm(Campaign(name=named.name, measurements=(named,)), folder)
 
     def arm_campaign(
         self,
@@ -58,17 +51,15 @@ class UserActions(QObject):
         if campaign is None:
             self._warn("There is no campaign.", "Open or create one on the Queue page.")
             return
-        if not self._may("arm", EngineState.READY, EngineState.ARMED):
-            return
-        self._context.bridge.arm(
-            CampaignRequest(
-                campaign=campaign,
-                folder=self._context.folder / campaign.name,
-                existing=existing,
-                attendance=attendance,
-                longest_patience_s=self._context.patience_s,
+        folder = self._context.folder / campaign.name
+        self._arm(campaign, folder, existing=existing, attendance=attendance)
+
+    def _arm(self, campaign: Campaign, folder: Path, **options: Any) -> None:
+        if self._may("arm", EngineState.READY, EngineState.ARMED):
+            patience_s = self._context.patience_s
+            self._context.bridge.arm(
+                CampaignRequest(campaign=campaign, folder=folder, longest_patience_s=patience_s, **options)
             )
-        )
 
     def disarm(self) -> None:
         """Disarm."""

@@ -22,9 +22,11 @@ STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
 """Displacements in µm on axes, and elsewhere with a prefix that suits the value."""
-CHOICES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {"m": (AUTOMATIC, "µm", "mm", "m"), "m/s": ("mm/s", "m/s"), "m/s²": ("m/s²", "g")}
-)
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "m": (AUTOMATIC, "µm", "mm", "m"),
+    "m/s": ("mm/s", "m/s"),
+    "m/s²": ("m/s²", "g"),
+}
 """Units to choose from, by SI unit; the first is the default."""
 POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}
 """Powers of ten by prefix; three characters are in use for micro."""

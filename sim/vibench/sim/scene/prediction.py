@@ -155,7 +155,7 @@ class Method(StrEnum):
     """For a force at every p: one adaptive method of order 8 throughout."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ScenePrediction:
     """Responses of one scene, with errors and details. None if not requested or not found.
 
@@ -177,23 +177,23 @@ class ScenePrediction:
     impact_rate_hz: float
     """The same, per second."""
     motion: MotionKind
-    period: int | None
+    period: int | None = None
     """Period of a periodic motion, in drive periods."""
     duration_s: float
     """Time for which the specimen was followed."""
     window_s: float
     """Last part of that time, over which largest values were taken."""
-    settled_s: float | None
+    settled_s: float | None = None
     """Time when the motion was found to be settled; None if the duration was given."""
     ended: str
     """Reason for its end."""
-    integration_error: float | None
+    integration_error: float | None = None
     """Part of the error that a stricter accuracy would reduce."""
-    scatter: float | None
+    scatter: float | None = None
     """Relative standard deviation of Response I between windows, if the motion never repeats."""
-    lyapunov_per_s: float | None
+    lyapunov_per_s: float | None = None
     """Largest Lyapunov exponent [1/s]."""
-    lyapunov_error_per_s: float | None
+    lyapunov_error_per_s: float | None = None
     """Its standard error [1/s]."""
     start: str
     """Name of the initial state: "rest", or the scene's name."""

@@ -6,7 +6,6 @@ needs a type of its own in native/contact.hpp.
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from .hertz import HERTZ, Hertz
 from .hunt_crossley import HUNT_CROSSLEY, HuntCrossley
@@ -18,16 +17,14 @@ from .stops import LawWord, Reference, UnreadableLawError
 
 ContactLaw = Hertz | NoContact | LinearGap | HuntCrossley | RigidStops | PowerLaw
 
-CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
-    {
-        "hertz": HERTZ,
-        "linear": LINEAR,
-        "linear_gap": LINEAR_GAP,
-        "hunt_crossley": HUNT_CROSSLEY,
-        "rigid": RIGID,
-        "power": POWER,
-    }
-)
+CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = {
+    "hertz": HERTZ,
+    "linear": LINEAR,
+    "linear_gap": LINEAR_GAP,
+    "hunt_crossley": HUNT_CROSSLEY,
+    "rigid": RIGID,
+    "power": POWER,
+}
 """Contact laws by the names that the command line and files use."""
 
 

@@ -5,7 +5,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
@@ -31,7 +30,7 @@ REFUSED_S = 1.0
 """Rig time of every disk failure except the first, so that a program that retries sees the disk recover."""
 
 
-GENERATORS: Mapping[int, type[AFG1022]] = MappingProxyType({0x0699: AFG1022, 0x0957: Keysight33500B})
+GENERATORS: Mapping[int, type[AFG1022]] = {0x0699: AFG1022, 0x0957: Keysight33500B}
 """The simulated generators, by vendor number in their USB address."""
 
 
