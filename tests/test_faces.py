@@ -88,7 +88,7 @@ def trespasses(room, package, target, names):
     other = ".".join(target.split(".")[:2])
     if other != package:
         if target not in FOR_PEOPLE + FOR_OUR_PROGRAMS and target.rpartition(".")[0] not in FOR_OUR_PROGRAMS:
-            yield f"{target} is no public API"
+            yield f"{target} is not a public API"
         return
     own = target == room or target.rpartition(".")[0] == room
     private = target.rpartition(".")[2].startswith("_") and not target.endswith("__main__")

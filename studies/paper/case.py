@@ -217,7 +217,7 @@ def parse_option(text: str) -> Alternative:
     name, _, value = (part.strip() for part in text.partition("="))
     if name not in OPTIONS:
         forms = ", ".join(f"{key}={option.example}" for key, option in OPTIONS.items())
-        raise InvalidRequest(f"{text!r} is no option of the paper; give one such as {forms}")
+        raise InvalidRequest(f"{text!r} is not an option of the paper; give one such as {forms}")
     option = OPTIONS[name]
     try:
         found = change(name, option.read(value))

@@ -406,7 +406,7 @@ def faults(case: Case, ending: Ending) -> tuple[str, ...]:
 
 
 def _usual(kind: str, *options: str) -> Case:
-    """Return a measurement without a fault: one that fails is no evidence."""
+    """Return a measurement without a fault: one that fails is not evidence."""
     odd = {"kind": kind, "how": "as usual", "after": 0, "always": True, "seed": 0}
     return Case(
         ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out", *options),

@@ -87,10 +87,10 @@ def test_a_bad_recording_does_not_prevent_analysis_of_the_others(vibench, good, 
     done = vibench("analyse", ".", "--no-simulate", cwd=folder)
     assert done.returncode == 1
     assert done.stderr.strip().count("\n") == 0
-    assert "cut.h5 is no readable HDF5 file" in done.stderr
+    assert "cut.h5 is not a readable HDF5 file" in done.stderr
     assert "Traceback" not in done.stderr
     report = tmp_path / "night[red]_analysis" / "report.html"
-    assert str(report) in done.stdout, "brackets are no markup"
+    assert str(report) in done.stdout, "brackets are not markup"
     assert "good: Noise at " in done.stdout, "what the report says in short stands on the terminal too"
     assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 

@@ -184,7 +184,7 @@ class TestWithoutAnEngine:
     def test_engine_commands_are_refused_for_other_programs(self, script, vibench_here, tmp_path):
         held = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert held.returncode == 1
-        assert "is no engine and cannot be held" in held.stderr
+        assert "is not an engine and cannot be held" in held.stderr
         watched = vibench_here("watch", cwd=tmp_path)
         assert watched.returncode == 1
         assert f"{script.pid} (alone) has no engine" in watched.stderr

@@ -120,7 +120,7 @@ def test_a_number_that_is_not_allowed_is_one_sentence_that_names_it(name, value)
 @pytest.mark.parametrize(
     ("said", "answer"),
     [
-        ("zet=1", "is no option of the paper; give one such as zeta=0.0165"),
+        ("zet=1", "is not an option of the paper; give one such as zeta=0.0165"),
         ("sum=3+4", "Exponents .* are not allowed"),
         ("log=km", "normalised, m, mm, um"),
         ("exponents=rk4", "exact or ode45"),

@@ -96,7 +96,7 @@ def option(
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
 ) -> OptionInfo:
-    """Return an option that is no field of a model; ``name`` if it differs from the parameter."""
+    """Return an option that is not a field of a model; ``name`` if it differs from the parameter."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, min=min)
     return made

@@ -38,7 +38,7 @@ def _shown(each: Any) -> Any:
     return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
-# Neither markup nor emoji: names and paths may hold what looks like some.
+# No markup and no emoji: names and paths may contain text that looks like them.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 

@@ -306,7 +306,7 @@ def session(resource: str) -> tuple[str, int]:
     found = re.fullmatch(r"TCPIP\d*::(.+)::(\d+)::SOCKET", resource)
     if found is None:
         raise ConfigurationError(
-            f"controller.resource = {resource!r} is no address of a board; give TCPIP0::<host>::2350::SOCKET"
+            f"controller.resource = {resource!r} is not a board's address; give TCPIP0::<host>::2350::SOCKET"
         )
     return found[1], int(found[2])
 

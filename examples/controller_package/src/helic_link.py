@@ -150,7 +150,7 @@ class HelicLink:
         told, (crc,) = rest[:-2], struct.unpack("<H", rest[-2:])
         if magic != MAGIC or sequence != asked or crc != binascii.crc_hqx(head[2:] + told, 0xFFFF):
             raise InstrumentError(
-                f"what answers at {self.where} is no HELIC-DAQ board: its frame is damaged. Nothing more was "
+                f"the host at {self.where} is not a HELIC-DAQ board: its frame is damaged. Nothing more was "
                 "sent; correct controller.resource"
             )
         if kind == Ask.ERROR:

@@ -104,7 +104,7 @@ class LineController:
             return kind.model_validate_json(line)
         except (ValueError, RecursionError) as error:  # pydantic's are ValueErrors
             raise InstrumentError(
-                f"what answers at {where} is no controller of loop protocol {request.vibench_loop} "
+                f"the program at {where} is not a controller of loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or give the name of its driver"
             ) from error
 

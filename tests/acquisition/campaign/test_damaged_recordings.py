@@ -324,7 +324,7 @@ def test_an_inconsistent_journal_is_refused_in_a_sentence(bench, folder, damage)
 def test_a_pipe_in_place_of_a_journal_does_not_block(folder):
     (folder / "c.campaign.sqlite").unlink()
     os.mkfifo(folder / "c.campaign.sqlite")
-    with pytest.raises(RecordingError, match="is no file"):
+    with pytest.raises(RecordingError, match="is not a file"):
         read_journal(folder / "c.campaign.sqlite")
 
 

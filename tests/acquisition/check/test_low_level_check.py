@@ -1,4 +1,4 @@
-"""The check at the beginning of each run: what is still fading from before is no fault, what goes on is."""
+"""The check at the beginning of each run: fading vibration is not a fault, lasting vibration is."""
 
 import numpy as np
 import pytest

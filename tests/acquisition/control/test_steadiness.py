@@ -112,7 +112,7 @@ def test_too_few_periods_are_unsettled():
     ("drives", "share", "period"), [(2, 0.1, 2), (3, 0.002, 3), (2, 0.0, 1), (3, 0.0, 1)]
 )
 def test_periods_are_counted_in_drive_periods(drives, share, period):
-    """Orders that are no multiples of the drive's tell whether the motion is as long as it was looked at."""
+    """Orders that are not multiples of the drive's tell whether the motion is as long as it was looked at."""
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
     seen[:, 1] += share

@@ -131,7 +131,9 @@ class TestDefaults:
 class TestRefusals:
     def test_a_bench_given_for_a_campaign_has_its_keys_refused_in_one_clause(self):
         bench = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml"
-        with pytest.raises(ConfigurationError, match="specimen, virtual are no known keys: check") as refused:
+        with pytest.raises(
+            ConfigurationError, match="specimen, virtual are not known keys: check"
+        ) as refused:
             load_campaign(bench)
         assert str(refused.value).count("no known key") == 1
 

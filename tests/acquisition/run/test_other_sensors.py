@@ -271,7 +271,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
 def test_a_channel_without_a_mass_gives_no_response(tmp_path):
     path = measured(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
-    with pytest.raises(UnusableData, match="base_force is no channel that shows the motion of a mass"):
+    with pytest.raises(UnusableData, match="base_force is not a channel that shows the motion of a mass"):
         analyse(path, response="base_force")
 
 

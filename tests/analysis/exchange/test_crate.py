@@ -72,7 +72,7 @@ def test_an_invalid_deposit_is_refused(folder, tmp_path):
             folder, tmp_path / "x.zip", CrateFacts(LICENCE, organisation_url="https://example.org"), {}
         )
     wrong = CrateFacts(LICENCE, organisation="Institute", organisation_url="example")
-    with pytest.raises(InvalidRequest, match="'example' is no address of an organisation"):
+    with pytest.raises(InvalidRequest, match="'example' is not the address of an organisation"):
         pack_folder(folder, tmp_path / "x.zip", wrong, {})
     with pytest.raises(NotEnoughData, match="no recording"):
         pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE), {})

@@ -217,7 +217,7 @@ def test_indistinguishable_causes_are_named_together(true):
 
 
 def test_sensor_uncertainty_widens_dependent_intervals(true):
-    """One per cent of sensitivity is no contradiction where the calibrations are no better than that."""
+    """One per cent of sensitivity is not a contradiction where the calibrations are no better than that."""
     off = measured(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
     allowed = fit_specimen(off, NOMINAL, scale_sd=0.01)
     assert allowed.fits

@@ -114,7 +114,7 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analysed, drif
     assert found.distortion_share < 3 * found.noise_share
     (remark,) = [each.text for each in analysis.checks if each.what == "Drift"]
     assert named in remark
-    assert ("gain" in remark) == (named == "gain"), "a mode that moves is no drift of a gain"
+    assert ("gain" in remark) == (named == "gain"), "a mode that moves is not a drift of a gain"
     caption = distortion_caption(analysis.response.periodic)
     assert "drift" in caption
     assert ("distortion at most" in caption) == (named != "gain")

@@ -24,7 +24,7 @@ def accelerations(velocity):
 
 
 def displacements(velocity):
-    """Integrate by the FFT; the mean velocity is no motion of a specimen on a table."""
+    """Integrate by the FFT; the mean velocity is not a motion of a specimen on a table."""
     whole = np.concatenate((velocity, velocity[::-1]))
     lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
     lines[0] = np.inf

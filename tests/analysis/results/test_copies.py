@@ -1,4 +1,4 @@
-"""A copy of a recording under another name is no second measurement."""
+"""A copy of a recording under another name is not a second measurement."""
 
 import shutil
 

@@ -100,7 +100,7 @@ def test_a_tracked_resonance_is_analysed_and_stated(analysed):
     assert sentence.startswith("Phase resonance at 266.")
     assert "natural frequency 266.1" in sentence
     said = findings(CampaignResults("run", (Result(analysis, None),), ()))
-    assert list(said) == [f"run: {sentence}"], "it is no stepped sine"
+    assert list(said) == [f"run: {sentence}"], "it is not a stepped sine"
     drawn = stepped_sine_figure(analysis, None, TRACKED_RESONANCE)
     assert drawn.title == "Tracked resonance, around 266.2 Hz"
     assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"

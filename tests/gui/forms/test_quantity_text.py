@@ -103,7 +103,7 @@ def test_a_value_a_thousand_times_larger_must_be_confirmed(qtbot, field):
     assert "Return" in edit.complaint
     type_text(qtbot, edit, "7 mm", Qt.Key.Key_Tab)
     edit.clearFocus()
-    assert edit.value() == 5e-6, "to leave the field is no yes"
+    assert edit.value() == 5e-6, "leaving the field does not confirm"
     assert type_text(qtbot, edit, "8 mm") == 5e-6, "another value is asked about again"
     assert type_text(qtbot, edit, "8 mm") == 8e-3
     assert edit.complaint == ""

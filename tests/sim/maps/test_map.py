@@ -30,7 +30,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
             "frequency_hz, amplitude_m, gap_m",
         ),
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m varies the start"),
-        ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is no power of 2"),
+        ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is not a power of 2"),
         (
             {"frequency_hz": FREQUENCIES, "gap_m": GAPS, "model": "linear"},
             "gap_m varies, and under the contact",
@@ -49,7 +49,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
         (
             {"x_m": {"start": -1e308, "stop": 1e308, "points": 3}},
-            r"3 points from -1e\+308 to 1e\+308 are no different numbers; give fewer points",
+            r"3 points from -1e\+308 to 1e\+308 are not different numbers; give fewer points",
         ),
         ({"x_m": {"start": 1.0, "stop": 1.0 + 1e-15, "points": 9}}, "9 points from 1.0 to 1.0000000000000"),
         ({"frequency_hz": FREQUENCIES, "chain": ("up", "up")}, "names a direction twice"),

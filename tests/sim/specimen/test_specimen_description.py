@@ -128,7 +128,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("name =", "nam ="), "nam is no key of a specimen|name is missing"),
+        (("name =", "nam ="), "nam is not a key of a specimen|name is missing"),
         (("6e-3, 2e-3, 2e-3", "6e-3, 2e-3"), "masses_kg"),
         (("6e-3,", "-6e-3,"), "masses_kg.0 = -0.006"),
         (("2e4,", '"stiff",'), "stiffnesses_n_per_m.0 = 'stiff'"),
@@ -152,7 +152,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
         (("hertz_stiffness", "[sources]\nmass = 'mine'\n[hertz"), "is not valid TOML"),
         (
             ("hertz_stiffness = 4.9e9", "hertz_stiffness = 4.9e9\nsources = { mass = 'x' }"),
-            "'mass', which is no key",
+            "'mass', which is not a key",
         ),
     ],
 )

@@ -221,7 +221,11 @@ def test_a_short_read_of_a_study_does_not_end_it(small, tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "said"),
-    [(None, "does not exist, or is no file"), (b"", "is no readable HDF5"), (b"text", "is no readable HDF5")],
+    [
+        (None, "does not exist, or is not a file"),
+        (b"", "is not a readable HDF5"),
+        (b"text", "is not a readable HDF5"),
+    ],
 )
 def test_a_file_without_a_study_is_refused_in_one_sentence(tmp_path, content, said):
     path = tmp_path / "a.h5"

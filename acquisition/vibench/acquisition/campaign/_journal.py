@@ -321,7 +321,9 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     Raises RecordingError when there is no journal, or it is not one.
     """
     if not path.is_file():
-        raise RecordingError(f"{path} does not exist, or is no file; give the path of a campaign's journal.")
+        raise RecordingError(
+            f"{path} does not exist, or is not a file; give the path of a campaign's journal."
+        )
     with sentences(path), closing(opened_to_look(path)) as connection:
         require_version(path, connection)
         return points_of(connection)

@@ -20,7 +20,7 @@ _WIDER = np.linspace(-0.25, 0.25, 15)
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
 """The same for a super- or subharmonic, whose first half-width is known only roughly."""
 _SURE_RAD = radians(12.0)
-"""Unexplained drift of the phase with the same weight as a half-width that has changed by e."""
+"""Unexplained drift of the phase that counts as much as a change of the half-width by a factor of e."""
 _STEEPER = 0.5
 """Largest relative growth of a backbone's bend from level to level."""
 _EXPLAINED_RAD = radians(3.0)

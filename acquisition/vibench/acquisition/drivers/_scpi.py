@@ -143,8 +143,8 @@ class ScpiInstrument:
             entry = _QUEUE_ENTRY.fullmatch(reply)
             if entry is None:
                 raise InstrumentError(
-                    f"{self.name} answered SYST:ERR? with {reply!r}, which is no entry of an error queue; "
-                    "check the cable, and try again"
+                    f"{self.name} answered SYST:ERR? with {reply!r}, which is not an entry of an error "
+                    "queue; check the cable, and try again"
                 )
             if int(entry[1]) == 0:
                 return tuple(found)

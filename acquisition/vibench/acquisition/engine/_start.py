@@ -170,7 +170,7 @@ def stop_engine(
     EngineGone
         When the process has ended, or when it could neither be told nor anything be put down.
     EngineError
-        When a hold is asked of a program that is no engine.
+        When a hold is asked of a program that is not an engine.
     """
     level = chosen(StopLevel, level)
     reason = reason.encode(
@@ -179,8 +179,8 @@ def stop_engine(
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(
-                f"process {engine.pid} ({engine.what}) is no engine and cannot be held. It goes on; stop it: "
-                "ramp, abort or off"
+                f"process {engine.pid} ({engine.what}) is not an engine and cannot be held. It continues; "
+                "stop it: ramp, abort or off"
             )
         _tell(engine, level, reason)
         return StopDelivery.TOLD

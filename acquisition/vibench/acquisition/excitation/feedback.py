@@ -10,9 +10,9 @@ from ..host.toml_file import FrozenModel
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
-"""Smaller displacements than any sensor shows, or larger than any shaker's stroke, are a wrong unit [m]."""
+"""Displacement [m]; a value below all sensors or above every shaker's stroke has a wrong unit."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
-"""Likewise; no shaker reaches ten thousand times gravity [m/s2]."""
+"""Acceleration [m/s2]; no shaker reaches ten thousand times gravity."""
 
 
 class Settling(FrozenModel):

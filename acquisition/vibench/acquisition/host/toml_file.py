@@ -112,7 +112,7 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
         details,
         "extra_forbidden",
         "is not a known key: check its spelling and unit suffix, or remove it",
-        "are no known keys: check their spelling and unit suffixes, or give another file",
+        "are not known keys: check their spelling and unit suffixes, or give another file",
     )
     other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
     if len(other) > MOST_CLAUSES:
@@ -142,9 +142,7 @@ def _faults(error: ValidationError, content: object) -> list[Any]:
 
 
 def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
-    """Yield the faults of the nearest type, by the keys of the file; a single type is one that the file
-    names.
-    """
+    """Return the faults of the type whose keys are nearest to the file's."""
     if len(kinds) == 1:
         return (each for each, _ in kinds[0])
     return (by_keys for _, by_keys in max(kinds, key=_nearness))

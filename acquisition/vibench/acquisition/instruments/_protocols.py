@@ -335,7 +335,7 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
         )
     if not np.isfinite(block.volts).all():
         raise InstrumentError(
-            f"the converter handed over samples that are no numbers, from sample {block.first_sample} on; "
+            f"the converter handed over samples that are not numbers, from sample {block.first_sample} on; "
             "its driver must hand over volts, or raise DataLost"
         )
     if unknown := {each.channel for each in block.overloads} - set(digitizer.roles):

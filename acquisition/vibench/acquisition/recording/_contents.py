@@ -45,7 +45,7 @@ def _iso_date(text: str) -> str:
 def _names(text: str) -> str:
     for name in text.split():
         if len(name) > ROLE_WIDTH or not ROLE_PATTERN.fullmatch(name):
-            raise ValueError(f"{name[:ROLE_WIDTH]!r} is no name of a channel")
+            raise ValueError(f"{name[:ROLE_WIDTH]!r} is not a name of a channel")
     return text
 
 

@@ -99,7 +99,7 @@ class DiskTrouble:
     def meet(self) -> None:
         """Apply the current fault; raises OSError (ENOSPC) when the disk is full."""
         with self._changed:
-            # A slow disk takes time, but a healed one continues at once.
+            # Wait for a slow disk; stop waiting as soon as the fault ends.
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
             is_refused = self._refusals > 0
             self._refusals -= is_refused

@@ -213,7 +213,7 @@ def read_text_dataset(group: h5py.Group, name: str) -> str:
     """Return the text of a scalar dataset; raises ValueError if it is something else."""
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
-        raise ValueError(f"{group.name}/{name} is no text")
+        raise ValueError(f"{group.name}/{name} is not a text")
     return decode(dataset[()])
 
 

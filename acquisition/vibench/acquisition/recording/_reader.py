@@ -65,7 +65,7 @@ def open_hdf5(path: Path) -> h5py.File:
             ) from error
         require_reachable(str(path), error)
         raise RecordingError(
-            f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"
+            f"{path} is not a readable HDF5 file ({error}). It was cut short, or is something else;"
             " copy it again from where it was recorded."
         ) from error
     try:
@@ -96,7 +96,7 @@ def _require_file(path: Path) -> None:
             f" Open {part.name} to look at it, or recover it."
         )
     raise RecordingError(
-        f"{path} does not exist, or is no file. Check its name; vibench catalogue FOLDER lists recordings."
+        f"{path} does not exist, or is not a file. Check its name; vibench catalogue FOLDER lists recordings."
     )
 
 
@@ -483,7 +483,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
         or dataset.ndim != 1
         or dataset.dtype != np.dtype(layout.COUNT_DTYPE)
     ):
-        raise RecordingError(f"the channel {role!r} is no row of counts")
+        raise RecordingError(f"the channel {role!r} is not a row of counts")
     if len(dataset) < samples or (growth is Growth.FINISHED and len(dataset) != samples):
         raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, and the recording {samples}")
     if dataset.chunks is not None and dataset.id.get_num_chunks() != -(-len(dataset) // dataset.chunks[0]):

@@ -95,14 +95,14 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
         raise RecordingError(f"the results cannot be read ({error})") from error
     for name, group in found.items():
         if not isinstance(group, h5py.Group):
-            raise RecordingError(f"{name!r} among the results is no result")
+            raise RecordingError(f"{name!r} among the results is not a result")
     return found
 
 
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
     """Return every result of a recording, by name.
 
-    Raises RecordingError when one was changed after sealing, or is no result.
+    Raises RecordingError when one was changed after sealing, or is not a result.
     """
     found = {}
     for name, group in result_groups(file).items():
@@ -203,7 +203,7 @@ def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):
-            raise RecordingError(f"the axes of {name!r} are no names")
+            raise RecordingError(f"the axes of {name!r} are not names")
         return axes
     scales = [each for each in group if read_attributes(group[each]).get("CLASS") == "DIMENSION_SCALE"]
     if name in scales:

@@ -116,7 +116,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
         or len(dataset) > table.capacity + 1  # a recovery adds its own event
     ):
         raise RecordingError(
-            f"the column {column.name} of the table {table.name} is no column of {column.dtype} of at most "
+            f"the column {column.name} of the table {table.name} is not one of {column.dtype} of at most "
             f"{table.capacity + 1} rows"
         )
     return dataset
@@ -126,7 +126,7 @@ def first_number(group: h5py.Group, name: str) -> int:
     """Return the whole number of a dataset with one element; raises RecordingError for anything else."""
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
-        raise RecordingError(f"{group.name}/{name} is no whole number")
+        raise RecordingError(f"{group.name}/{name} is not a whole number")
     return int(dataset[0])
 
 
@@ -140,7 +140,7 @@ def ending(file: h5py.File) -> tuple[RecordingState, str]:
 def _text(file: h5py.File, name: str) -> str:
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "S":
-        raise RecordingError(f"/{name} is no text")
+        raise RecordingError(f"/{name} is not a text")
     return decode(dataset[0])
 
 

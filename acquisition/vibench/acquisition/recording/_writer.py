@@ -47,7 +47,7 @@ class CountScale:
     def counts(self, volts: Samples) -> Counts:
         """Convert a block to counts, shape (channels, samples); exact if the converter's step is known.
 
-        Raises RecordingError when the volts are no multiples of the step, or outside what an int32 holds (NaN
+        Raises RecordingError when the volts are not multiples of the step, or do not fit into an int32 (NaN
         included).
         """
         scaled = (np.asarray(volts, dtype=np.float64) - self._zero_v) / self._step_v
@@ -176,7 +176,7 @@ class RecordingWriter:
 
         Samples missing between this block and the last are marked as a gap and read as NaN.
 
-        Raises RecordingError when the block does not fit (shape, order, volts that are no counts, end of the
+        Raises RecordingError when the block does not fit (shape, order, volts that are not counts, end of the
         room), or the disk has failed. What was committed is kept.
         """
         self._check(block)

@@ -220,7 +220,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet, replacing an older one; raises ConfigurationError when the file is no sheet."""
+    """Save a sheet, replacing an older one; raises ConfigurationError when the file is not a sheet."""
     if path.exists():
         load_knob_sheet(path)
     knobs = "".join(

@@ -55,7 +55,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     points
         Shape (n, dimensions).
     apart
-        Theiler's window: points less than this many steps apart in time are no neighbours, since one
+        Theiler's window: points less than this many steps apart in time are not neighbours, since one
         is merely the other a little later (Theiler, Phys. Rev. A 34 (1986) 2427).
     last
         Only points before this index are used, so that both can be followed beyond it.
@@ -180,7 +180,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # Initially a difference rotates into the stretching direction, which is no part of the line.
+    # Initially a difference rotates into the stretching direction, which is not part of the line.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -342,7 +342,7 @@ def prediction_error(series: Reals) -> float:
     or fewer delays, more chaos with impacts stayed undecided.
     """
     pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
-    # Pasts with values in common are no neighbours.
+    # Pasts with values in common are not neighbours.
     index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
     has = nearest.any(axis=1)
     foretold = np.sum(next_values[index[has]] * nearest[has], axis=1) / np.sum(nearest[has], axis=1)

@@ -173,11 +173,11 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 
 
 _LEAST_RISE_DB = 3.0
-"""Least height of a peak above the valley beside it ..."""
+"""Least height of a peak above the valley beside it [dB]."""
 _LEAST_RISE_SD = 8.0
-"""... and in standard deviations: the range of a thousand points of noise is 6.5."""
+"""Least height in standard deviations: the range of a thousand points of noise is 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""A peak with this many others within this many half widths is no mode: chaotic motion has many peaks."""
+"""A peak with this many others within this many half widths is not a mode: chaotic motion has many peaks."""
 _CROWD_RISE = 0.3
 """Others are counted from this share of the required height."""
 _USUAL_HALF_WIDTH = 0.01

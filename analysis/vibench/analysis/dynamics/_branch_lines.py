@@ -45,7 +45,7 @@ class BranchLine(Labelled):
     response_i: Reals
     """Largest |x|, |y|, |z| and |p| over the drive amplitude, shape (n, 4)."""
     response_ii: Reals
-    """Amplitude at the drive frequency over the drive amplitude, likewise."""
+    """Amplitude at the drive frequency over the drive amplitude, shape (n, 4)."""
     states: Reals
     """x, y, z, vx, vy, vz at the drive's time zero, shape (n, 6) [m, m/s]."""
     multiplier_real: Reals

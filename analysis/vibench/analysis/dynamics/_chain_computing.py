@@ -43,7 +43,7 @@ LINES = 800
 MOST_SHOWN = 4
 """Number of cells of one chain to draw."""
 ABOVE_BANDS = 1.15
-"""... up to this many times the highest band."""
+"""Highest frequency of the transmissibility, relative to the highest band."""
 REACHED = Outcome.REACHED_END.text
 DECIBELS = 20.0 / math.log(10.0)
 

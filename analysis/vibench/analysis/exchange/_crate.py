@@ -76,7 +76,7 @@ def pack_folder(
     NotEnoughData
         When the folder holds no recording.
     InvalidRequest
-        When the licence or the organisation's page is no address, a link leads out of the folder, or the
+        When the licence or the organisation's page is not an address, a link leads out of the folder, or the
         zip exists or cannot be written.
     """
     _require_addresses(facts)
@@ -107,7 +107,7 @@ def pack_folder(
 def _require_addresses(facts: CrateFacts) -> None:
     if not facts.licence.startswith(_SCHEMES):
         raise InvalidRequest(
-            f"{facts.licence!r} is no address of a licence; nothing was packed, give one like "
+            f"{facts.licence!r} is not the address of a licence; nothing was packed, give one like "
             "https://creativecommons.org/licenses/by/4.0/"
         )
     if facts.organisation_url and not facts.organisation:
@@ -117,8 +117,8 @@ def _require_addresses(facts: CrateFacts) -> None:
         )
     if facts.organisation_url and not facts.organisation_url.startswith(_SCHEMES):
         raise InvalidRequest(
-            f"{facts.organisation_url!r} is no address of an organisation; nothing was packed, give one like "
-            "https://ror.org/03yrm5c26"
+            f"{facts.organisation_url!r} is not the address of an organisation; nothing was packed, give one "
+            "like https://ror.org/03yrm5c26"
         )
 
 

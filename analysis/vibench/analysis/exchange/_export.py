@@ -34,7 +34,9 @@ def require_unused(path: Path) -> None:
     if path.exists():
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():
-        raise InvalidRequest(f"{path.parent} is no folder; make it, or choose another place for {path.name}")
+        raise InvalidRequest(
+            f"{path.parent} is not a folder; make it, or choose another place for {path.name}"
+        )
 
 
 @contextmanager

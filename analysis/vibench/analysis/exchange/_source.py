@@ -82,7 +82,7 @@ def opened_source(path: Path) -> Iterator[Source]:
     damaged, or contains no channel.
     """
     if not path.is_file():
-        raise InvalidRequest(f"{path} does not exist, or is no file; give the path of a file to import")
+        raise InvalidRequest(f"{path} does not exist, or is not a file; give the path of a file to import")
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InvalidRequest(

@@ -218,7 +218,7 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
 
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
-    """Locate the numbers and skip them; None if they are no samples over time."""
+    """Locate the numbers and skip them; None if they are not samples over time."""
     ordinate, count, spacing = (_whole(header[6][at : at + 10]) for at in (0, 10, 20))
     if count < 0:
         raise ValueError(f"a dataset of {count} numbers")
@@ -280,7 +280,7 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
         rate_bounds_hz=None if increment is None else rate_bounds(increment, DIGITS * increment, unit),
         start_s=start * second if start is not None and second is not None else None,
         start_error_s=DIGITS * abs(start) * second if start is not None and second is not None else 0.0,
-        time_trouble=f"states its start in {unit!r}, which is no unit of time"
+        time_trouble=f"states its start in {unit!r}, which is not a unit of time"
         if start and second is None
         else "",
     )

@@ -71,7 +71,7 @@ def branches_figure(
             "Periodic motions; solid: stable, dashed: unstable. Motions of more than one drive period are "
             f"in other colours. {diagram.cost_sentence} {diagram.request.sentence}"
             f"{diagram.holding_sentence and ' '}{diagram.holding_sentence} Chaotic and "
-            "quasi-periodic motions are no branches: where no solid line is, look for them."
+            "quasi-periodic motions are not branches: where no solid line is, look for them."
         ),
         figure=figure,
         tables=branch_tables(diagram),

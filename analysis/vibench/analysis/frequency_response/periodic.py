@@ -160,7 +160,7 @@ class Scatter(StrEnum):
 
 @dataclass(frozen=True)
 class Drift:
-    """Common changes of all lines between realisations, which are no distortion."""
+    """Common changes of all lines between realisations, which are not distortion."""
 
     OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1", "common_share": "1"}
 

@@ -41,7 +41,7 @@ _USUAL_HZ = 300.0
 _LARGEST_SD_UNRESOLVED = 0.1
 """Accept an unresolved peak only if line or damping is known to 10 %: else it is a ripple on a broad one."""
 _BACKGROUND_DEGREES = (1, 2, 3)
-"""Degrees tried in turn: near broad peaks, neighbours are no straight line."""
+"""Degrees tried in turn: near broad peaks, neighbours do not lie on a straight line."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
 """Relative uncertainty of damping above which a peak is a ripple of noisy lines and no resonance."""
 

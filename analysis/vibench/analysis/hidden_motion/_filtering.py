@@ -16,7 +16,7 @@ from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_ta
 _DIFFUSION_OF_GAP = 7e-6
 """Model error of each mass: displacement relative to the gap per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""... and speed relative to the gap times the highest natural frequency."""
+"""Model error of each mass: speed relative to the gap times the highest natural frequency."""
 _DRIFT_M_PER_S2 = 1e-3
 """Drift of the accelerometer's slow error in the root of a second."""
 _ACCELERATION_EXCESS = 1.5

@@ -182,7 +182,7 @@ _PATIENCE = 2.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
 """Time between two attempts for a motion that does not fit [s]."""
 _CLIPPED = 25.0
-"""Clipping of squared innovations, so that one late impact is no change."""
+"""Clipping of squared innovations, so that one late impact is not a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
 _APART = 3.0
 """Difference of two parameters that counts as a change, in root-sum-square half widths."""
@@ -424,7 +424,7 @@ class LiveTwin:
         if not is_out and squares.size < self._block // 4:
             return
         self._level = np.inf if is_out else float(squares.mean())
-        # Before any parameter is known, a wrong description is no change.
+        # Before any parameter is known, a wrong description is not a change.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             said.append(

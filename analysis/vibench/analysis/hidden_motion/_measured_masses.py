@@ -64,7 +64,7 @@ class MeasuredMass:
 
     channel: str
     velocity: Reals
-    """Shape (samples,) [m/s]; NaN where it is not known."""
+    """Measured velocity [m/s], shape (samples,); NaN where it is not known."""
     noise: float
     """Rms [m/s]."""
     _sums: Reals = field(default_factory=lambda: np.zeros(5))

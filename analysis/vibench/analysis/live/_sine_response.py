@@ -38,7 +38,7 @@ def _hann(samples: int) -> Reals:
 
 
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
-    """Find the sine in a short stretch of the drive, shape (samples,); None if it is no sine.
+    """Find the sine in a short stretch of the drive, shape (samples,); None if it is not a sine.
 
     Between two lines of a Hann spectrum the ratio of the two largest gives the place exactly
     (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
@@ -92,7 +92,7 @@ _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
 """Length of the stretch in which the drive frequency is searched: five periods of 10 Hz."""
 _STRETCH_PERIODS = 25
-"""... and at least 0.1 s of motion without the disturbed ends."""
+"""Drive periods of motion without the disturbed ends; at least 0.1 s."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9

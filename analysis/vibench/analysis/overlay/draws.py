@@ -424,7 +424,7 @@ def stretch_draws(
 
     At the end of the recording the stretch ends slightly earlier.
 
-    Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is no velocity,
+    Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is not a velocity,
     because the noise of an integrated channel is not white.
     """
     if VELOCITY not in recording.roles:

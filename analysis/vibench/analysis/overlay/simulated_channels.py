@@ -20,7 +20,7 @@ from ..signals.quantity import Quantity, converted_signal
 LOWEST_PART = 0.25
 """High-pass relative to the lowest played frequency, against drift by double integration."""
 HIGHEST_PART = 0.33
-"""... and low-pass relative to the sample rate, within the converter's pass band."""
+"""Low-pass relative to the sample rate, within the converter's pass band."""
 
 
 @dataclass(frozen=True, eq=False)

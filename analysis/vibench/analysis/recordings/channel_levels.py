@@ -178,7 +178,7 @@ def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
 
 
 _CLIPPED_SHARE = 0.2
-"""A sine that just fills its range spends 3 % of its time within a thousandth of it; this is no sine."""
+"""A sine that just fills its range spends 3 % of its time within a thousandth of it; this is not a sine."""
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:

@@ -102,7 +102,7 @@ class ResponseChannel:
         found = self.response or response_role(self.recording)
         if self.response is not None and self.response not in response_roles(self.recording):
             raise UnusableData(
-                f"{self.response} is no channel that shows the motion of a mass; the recording has "
+                f"{self.response} is not a channel that shows the motion of a mass; the recording has "
                 f"{', '.join(response_roles(self.recording)) or 'none'}"
             )
         if found is None:

@@ -94,7 +94,7 @@ def recorded_response(path: Path) -> RecordedLevel:
     """Return the drive level of a stepped sine or a sweep and its measured Response I, as a line on a map.
 
     Raises NotEnoughData when the recording is of another kind, or of one frequency; RecordingError when the
-    file is no recording.
+    file is not a recording.
     """
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [

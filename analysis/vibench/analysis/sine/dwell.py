@@ -32,7 +32,7 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of the residual motion to the vibrometer noise that counts as noise only."""
 _SILENT = 3.0
-"""... and to the noise in the silence, which is shorter than the ring time of a mode."""
+"""Largest ratio of the residual motion to the noise in the silence, which is shorter than a mode rings."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence that may still be noise.
 
@@ -188,7 +188,7 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
 _LOWEST_ORDER = 0.1
 """High-pass for displacement relative to the drive frequency, above drift and hum."""
 _BAND_ABOVE = 0.33
-"""... and low-pass relative to the sample rate."""
+"""Low-pass relative to the sample rate."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
@@ -238,7 +238,7 @@ class DwellResponse(Labelled):
     noise_bias_i: float
     """Expected bias by noise; NaN if the noise is unknown."""
     noise_error_i: float
-    """RMS error by noise, including the bias; NaN likewise."""
+    """RMS error by noise, including the bias; NaN if the noise is unknown."""
     noise_source: str
     """Source of that noise, or the reason why it is unknown."""
     rest_bias_i: float

@@ -28,7 +28,7 @@ from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_bef
 _LOWEST_ORDER = 0.1
 """High-pass for both signals relative to the drive frequency."""
 BAND_ABOVE = 0.25
-"""... and low-pass relative to the sample rate; its edge ends within the band of the interpolation."""
+"""Low-pass relative to the sample rate; its edge ends within the band of the interpolation."""
 
 
 _CLEAR_MOTION = 0.8

@@ -63,8 +63,8 @@ def jumps(
     """Find the jumps of a response against time.
 
     At each interval straight lines are fitted to the logarithm of the response before and after. A jump is
-    a local maximum of their difference of at least 1.5 dB and 8 standard errors that is no resonance: those
-    of a linear specimen are steep, and in a fast sweep they ring. Its place maximises the likelihood; its
+    a local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear
+    specimen are excluded: they are steep, and ring in a fast sweep. Its place maximises the likelihood; its
     bounds come from the likelihood ratio.
 
     Parameters
@@ -255,7 +255,7 @@ class SteppedLevelAnalysis(SteppedSineAnalysis):
 _POINTS = 1000
 _APART_DB = 1.5
 _SMOOTHED_POINTS = 21
-"""Averaging width relative to the band: the scatter of chaos is no hysteresis."""
+"""Averaging width relative to the band: the scatter of chaos is not hysteresis."""
 _PER_BEL_DB = 20.0
 
 

@@ -109,7 +109,7 @@ _SAMPLES_PER_CYCLE = 24
 _BAND_BELOW = 0.25
 """High-pass for displacement relative to the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
-"""... and low-pass relative to the decimated rate, within the flat band of the decimation."""
+"""Low-pass relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
 """Upper limit of the linear motion relative to the highest drive frequency, above order 5."""
 _STEADY_POINTS = 10_001

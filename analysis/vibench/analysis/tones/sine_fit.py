@@ -53,7 +53,9 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
         At most this many.
     """
     if spectrum.window is not Window.HANN:
-        raise InvalidRequest(f"peaks are placed in Hann spectra only; this one is {spectrum.window.value}")
+        raise InvalidRequest(
+            f"only peaks of Hann spectra can be located; this one is {spectrum.window.value}"
+        )
     amplitude = spectrum.amplitude
     first = max(2, int(np.ceil(low_hz / spectrum.spacing_hz)))
     last = min(amplitude.size - 3, int(np.floor(high_hz / spectrum.spacing_hz)))

@@ -27,9 +27,9 @@ _FEWEST_DRAWS = 5
 _UNTOLD = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
 """Chance in a maximum, and in a sweep's results from a tenth of a second."""
 _ENDS = 2
-"""Intervals at either end of a sweep, where the largest value is no peak: it depends on where they begin."""
+"""Intervals at either end of a sweep; a largest value there is not a peak, since it depends on the ends."""
 _PEAKED = 1.05
-"""Response I over Response II above which a step is no sine."""
+"""Response I over Response II above which a step is not a sine."""
 _FEWEST_PERIODS = 20.0
 """Fewest periods of the drive in a part: its maximum is then one of many turns."""
 

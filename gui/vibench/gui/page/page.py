@@ -58,7 +58,7 @@ def file_kind(path: Path) -> FileKind:
         raise ConfigurationError(f"{path} cannot be read ({error}); {allowed}") from error
     found = next((kind for key, kind in _TABLES.items() if key in keys), None)
     if found is None:
-        raise ConfigurationError(f"{path} is no test, campaign or hardware configuration; {allowed}")
+        raise ConfigurationError(f"{path} is not a test, campaign or hardware configuration; {allowed}")
     return found
 
 

@@ -40,7 +40,7 @@ from ..widgets.units import UNITS
 def whole_path(folder: str) -> str:
     """Return an absolute path, which does not depend on the working directory."""
     if not Path(folder).expanduser().is_absolute():
-        raise ValueError(f"{folder!r} is no whole path; give one such as {Path.home() / 'vibench'}")
+        raise ValueError(f"{folder!r} is not a whole path; give one such as {Path.home() / 'vibench'}")
     return folder
 
 

@@ -126,7 +126,7 @@ class Interval:
 
     length_s: float
     periods: int
-    """Drive periods in it; 0 if it is no whole number of them."""
+    """Drive periods in it; 0 if it is not a whole number of them."""
 
     def count_in(self, duration_s: float) -> int:
         """Return the number of intervals in a duration."""

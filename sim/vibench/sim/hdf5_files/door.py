@@ -181,7 +181,7 @@ def _require_chunks(dataset: h5py.Dataset, settings: h5py.h5p.PropDCID, size_byt
     for number in range(settings.get_nfilters()):
         code = settings.get_filter(number)[0]
         if code not in OWN_FILTERS:
-            raise UnsafeHdf5(f"{dataset.name} is packed by filter {code}, which is no part of HDF5")
+            raise UnsafeHdf5(f"{dataset.name} is packed by filter {code}, which is not part of HDF5")
     chunk_bytes = math.prod(settings.get_chunk()) * dataset.dtype.itemsize
     if chunk_bytes > LARGEST_CHUNK_BYTES:
         raise UnsafeHdf5(f"{dataset.name} has chunks of {chunk_bytes} bytes")

@@ -192,7 +192,7 @@ class Range(FrozenModel):
             is_ascending = np.all(np.diff(self.values) > 0.0)
         if not is_ascending:
             raise ValueError(
-                f"{self.points} points from {self.start!r} to {self.stop!r} are no different numbers; give "
+                f"{self.points} points from {self.start!r} to {self.stop!r} are not different numbers; give "
                 "fewer points, or ends that lie less close together and less far apart"
             )
         return self
@@ -309,7 +309,7 @@ class Map(GridPlan):
         if self.chain and any(each in START for each in self.varied):
             raise ValueError(f"a chain takes its starts from its neighbours, and {names[0]} varies the start")
         if self.coarse is not None and self.coarse & (self.coarse - 1):
-            raise ValueError(f"coarse = {self.coarse} is no power of 2; give 2, 4, 8, 16, 32 or 64")
+            raise ValueError(f"coarse = {self.coarse} is not a power of 2; give 2, 4, 8, 16, 32 or 64")
         if self.window_periods >= self.periods:
             raise ValueError(
                 f"window_periods = {self.window_periods} does not fit {self.periods} periods; give fewer"

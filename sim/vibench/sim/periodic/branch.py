@@ -73,7 +73,7 @@ class Branch:
     """Largest magnitude over a period of every displacement (x, y, z) and of p, over the drive amplitude,
     shape (m, n + 1)."""
     response_ii: Floats
-    """Amplitude of the component at the drive frequency, likewise."""
+    """Amplitude of the component at the drive frequency over the drive amplitude, shape (m, n + 1)."""
     states: Floats
     """Displacements and velocities at the drive's time zero, shape (m, 2 n)."""
     multipliers: Complex

@@ -124,7 +124,7 @@ def phase_resonance_branch(
 
     Returns the branch over amplitude, with the frequency and the multipliers of each motion; it may turn
     back. Raises ValueError when there is no damping, no mode in the band has this phase, or several do, no
-    motion is found at the lower level, it already reaches the stops, or `of` is no word of
+    motion is found at the lower level, it already reaches the stops, or `of` is not a word of
     `PhaseReference`.
 
     Parameters

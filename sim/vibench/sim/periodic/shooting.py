@@ -186,7 +186,7 @@ class PeriodicOrbit:
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
-    """Amplitude at the drive frequency, likewise."""
+    """Amplitude at the drive frequency over the drive amplitude, shape (4,)."""
     outcome: ShootingEnd
 
     @property

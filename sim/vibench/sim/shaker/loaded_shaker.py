@@ -288,7 +288,7 @@ class LoadedShaker:
         if good < count:
             raise MotionFailed(
                 f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
-                "or a contact made no progress. Lower the drive, or check it for values that are no numbers"
+                "or a contact made no progress. Lower the drive, or check it for values that are not numbers"
             )
 
 

@@ -204,7 +204,7 @@ class SpecimenDescription(_Described):
                 raise ValueError(f"{' and '.join(pair)} say the same, and {have} given; give one of them")
         unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
         if unknown:
-            raise ValueError(f"sources names {unknown[0]!r}, which is no key of a specimen")
+            raise ValueError(f"sources names {unknown[0]!r}, which is not a key of a specimen")
         try:
             with np.errstate(all="ignore"):
                 moves = self.specimen().natural_frequencies_hz
@@ -396,7 +396,7 @@ def _complaint(specimen: str, error: ValidationError) -> str:
         case "missing":
             fault = f"{key} is missing"
         case "extra_forbidden":
-            fault = f"{first['loc'][-1]} is no key of a specimen; there are {', '.join(sorted(_KEYS))}"
+            fault = f"{first['loc'][-1]} is not a key of a specimen; there are {', '.join(sorted(_KEYS))}"
         case _ if key:
             fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
         case _:

@@ -193,7 +193,7 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 class FileStore:
     """Store in a study's file; a context manager that closes it.
 
-    Raises StudyError when the file is another study's, is being written by another run, or is no study's
+    Raises StudyError when the file is another study's, is being written by another run, or is not a study's
     file.
     """
 
@@ -282,7 +282,7 @@ class FileStore:
     def _refused(self, error: OSError) -> StudyError:
         return StudyError(
             f"The disk refused {self._path}: {error.strerror}. What was kept before is safe;"
-            " make room or mend the disk, and resume."
+            " make room or repair the disk, and resume."
         )
 
 

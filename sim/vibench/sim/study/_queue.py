@@ -230,10 +230,10 @@ class Points(Protocol):
         """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return what is kept of a prediction."""
+        """Return the values of a prediction that the file stores."""
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return what is kept of a scene that could not be computed."""
+        """Return the values that the file stores for a failed scene."""
 
 
 def run_points(

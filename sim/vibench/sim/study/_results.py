@@ -104,7 +104,7 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     if not path.is_file():
-        raise StudyError(f"{path} does not exist, or is no file; give the path of a {kind.called}'s file.")
+        raise StudyError(f"{path} does not exist, or is not a file; give the path of a {kind.called}'s file.")
     try:
         # With HDF5's usual lock, which the writer's allows: a process that has the file open elsewhere, in
         # xarray for example, cannot open it with another one.
@@ -117,7 +117,7 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
                 f"{path} could not be read ({said}). The file may be intact: check the disk, and try again."
             ) from error
         raise StudyError(
-            f"{path} is no readable HDF5 file ({error}); give the path of a {kind.called}'s file."
+            f"{path} is not a readable HDF5 file ({error}); give the path of a {kind.called}'s file."
         ) from error
     with file:
         _require_ours(path, file, kind)
@@ -202,7 +202,7 @@ class GridResults(Generic[Plan]):
         }
         if name not in columns:
             raise InvalidStudy(
-                f"{name!r} is no quantity of a {self.plan.called}; there are {', '.join(columns)}."
+                f"{name!r} is not a quantity of a {self.plan.called}; there are {', '.join(columns)}."
             )
         column = columns[name]
         rows = self.arrays[name].astype(np.float64)
@@ -223,7 +223,9 @@ class GridResults(Generic[Plan]):
         unknown = sorted(fixed.keys() - {axis.name for axis in self.axes})
         if unknown:
             names = ", ".join(axis.name for axis in self.axes)
-            raise InvalidStudy(f"{unknown[0]!r} is no axis of this {self.plan.called}; there are {names}.")
+            raise InvalidStudy(
+                f"{unknown[0]!r} is not an axis of this {self.plan.called}; there are {names}."
+            )
         return tuple(
             _index(axis, fixed[axis.name]) if axis.name in fixed else slice(None) for axis in self.axes
         )
@@ -269,7 +271,7 @@ class StudyResults(GridResults[Study]):
 def open_study(path: Path | str) -> StudyResults:
     """Read a study's file, finished or growing.
 
-    Raises StudyError when it is no study's file, or another version's.
+    Raises StudyError when it is not a study's file, or another version's.
     """
     path = Path(path)
     study = read_plan(path, Study)

@@ -222,8 +222,8 @@ def _require_address(address: str) -> None:
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(
-            f"{address!r} is no address to listen on; nothing was started, give HOST:PORT with a port up to "
-            f"{LAST_PORT}, as 127.0.0.1:31763; port 0 takes a free one"
+            f"{address!r} is not an address to listen on; nothing was started, give HOST:PORT with a port up "
+            f"to {LAST_PORT}, as 127.0.0.1:31763; port 0 takes a free one"
         )
 
 

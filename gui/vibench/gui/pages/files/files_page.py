@@ -251,7 +251,7 @@ class FilesPage(Page):
         if os.path.isdir(folder):  # noqa: PTH112
             self._go_to(folder)
         else:
-            said = f"{folder} is no folder.", "The list is unchanged.", "Type or choose another folder."
+            said = f"{folder} is not a folder.", "The list is unchanged.", "Type or choose another folder."
             self.context.say(Notice(NoticeKind.WARNING, *said))
             self._folder_line.setText(str(self._folder))
 

@@ -120,7 +120,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         try:
             points = read_journal(path)
         except RecordingError:
-            # A file of this name from another program is no campaign.
+            # A file of this name from another program is not a campaign.
             continue
         files = frozenset(path.parent / each.file for each in points if each.file)
         name = path.name.removesuffix(JOURNAL_SUFFIX)
