@@ -26,6 +26,13 @@ def generator(plugged):
     opened.close()
 
 
+@pytest.fixture
+def playing(generator):
+    generator.load_sine(260.0, 0.1)
+    generator.start()
+    return generator
+
+
 def largest_peak_v(states):
     return max(abs(state.offset_v) + state.amplitude_vpp / 2 for state in states)
 
@@ -131,19 +138,15 @@ class TestPlaying:
         generator.set_frequency(261.0)
         assert plugged.log.messages == ["SOUR1:FREQ 261.000000", "SYST:ERR?", "SOUR1:FREQ?"]
 
-    def test_start_turns_on_and_stop_turns_off_and_may_be_repeated(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_start_turns_on_and_stop_turns_off_and_may_be_repeated(self, plugged, playing):
         assert plugged.is_on
-        generator.stop()
-        generator.stop()
+        playing.stop()
+        playing.stop()
         assert not plugged.is_on
 
-    def test_frequency_and_amplitude_change_while_it_plays(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
-        generator.set_frequency(260.1)
-        generator.set_amplitude(0.2)
+    def test_frequency_and_amplitude_change_while_it_plays(self, plugged, playing):
+        playing.set_frequency(260.1)
+        playing.set_amplitude(0.2)
         state = plugged.instrument.settings(1)
         assert plugged.is_on
         assert (state.frequency_hz, state.amplitude_vpp) == (260.1, 0.2)
@@ -250,13 +253,11 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_silently_replaced_setting_is_a_fault_and_silences(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_a_silently_replaced_setting_is_a_fault_and_silences(self, plugged, playing):
         # Somebody turns to 10 ohm at the panel: 10 Vpp is now out of range, and silently becomes 1 Vpp.
         plugged.instrument.execute(b"OUTP1:IMP 10")
         with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
-            generator.set_amplitude(10.0)
+            playing.set_amplitude(10.0)
         assert not plugged.is_on
         assert "The output was switched off." in caught.value.__notes__
 
@@ -282,12 +283,10 @@ class TestFaults:
         with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):
             generator.load_waveform(SINE, 1.0, 0.1)
 
-    def test_a_corrupted_answer_is_an_error_and_silences(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_a_corrupted_answer_is_an_error_and_silences(self, plugged, playing):
         plugged.instrument.corrupt_next_reply()
         with pytest.raises(InstrumentError, match=r"answered SYST:ERR\?"):
-            generator.set_frequency(261.0)
+            playing.set_frequency(261.0)
         assert not plugged.is_on
 
     def test_after_a_fault_the_next_sine_starts_from_a_known_state(self, plugged, generator):
@@ -302,50 +301,40 @@ class TestFaults:
         assert plugged.is_on
         assert plugged.instrument.settings(1).frequency_hz == 262.0
 
-    def test_a_late_answer_is_an_error_and_silences(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_a_late_answer_is_an_error_and_silences(self, plugged, playing):
         plugged.instrument.delay_next_reply(10.0)
         with pytest.raises(InstrumentError, match=r"did not answer"):
-            generator.set_frequency(261.0)
+            playing.set_frequency(261.0)
         assert not plugged.is_on
 
-    def test_a_pulled_cable_advises_the_operator_to_switch_the_amplifier_off(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_a_pulled_cable_advises_the_operator_to_switch_the_amplifier_off(self, plugged, playing):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*Turn the amplifier"):
-            generator.set_amplitude(0.2)
+            playing.set_amplitude(0.2)
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"):
-            generator.stop()
+            playing.stop()
 
-    def test_a_short_disconnection_ends_in_silence(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_a_short_disconnection_ends_in_silence(self, plugged, playing):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost):
-            generator.set_amplitude(0.2)
+            playing.set_amplitude(0.2)
         assert plugged.is_on
         plugged.usb.plug_cable()
-        generator.stop()
+        playing.stop()
         assert not plugged.is_on
 
-    def test_closing_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
+    def test_closing_a_lost_instrument_raises_and_a_later_stop_works(self, plugged, playing):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost):
-            generator.close()
+            playing.close()
         plugged.usb.plug_cable()
-        generator.stop()
+        playing.stop()
         assert not plugged.is_on
 
-    def test_closing_silences_and_may_be_repeated(self, plugged, generator):
-        generator.load_sine(260.0, 0.1)
-        generator.start()
-        generator.close()
-        generator.stop()
-        generator.close()
+    def test_closing_silences_and_may_be_repeated(self, plugged, playing):
+        playing.close()
+        playing.stop()
+        playing.close()
         assert not plugged.is_on
 
     def test_a_failure_while_opening_leaves_silence_and_a_free_instrument(self, plugged):

@@ -70,6 +70,12 @@ def upto(run, state):
     return next(progress for progress in run if progress.state is state)
 
 
+def run_upto(state, *given, **options):
+    run = run_of(*given, **options)
+    upto(run, state)
+    return run
+
+
 def assert_silent_and_finished(bench, state):
     assert not bench.world.is_on
     assert not bench.world.is_sampling
@@ -80,8 +86,10 @@ def assert_silent_and_finished(bench, state):
     assert len(order) - order[::-1].index("stop") <= order.index("recorder.finish")
 
 
-def assert_ended_without_a_jump(bench):
+def assert_ended_without_a_jump(bench, state=RunState.RECORDING):
     """While the output was on, no amplitude setting was more than one stair below the last."""
+    if state is RunState.CHECKING:
+        return
     settings = [value for _, value in bench.world.amplitudes()]
     top = max(settings)
     largest_stair = top * np.pi / 2 / 10 * 1.05
@@ -240,15 +248,13 @@ class TestSweepsAndSteps:
 class TestEveryWayOut:
     @every_state
     def test_a_cancel_ramps_down(self, bench, tmp_path, state):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         run.cancel("the operator pressed stop")
         play(run)
         assert run.outcome.state is run.state is RunState.STOPPED
         assert bench.recorder.ending == (RecordingState.STOPPED, "the operator pressed stop")
         assert_silent_and_finished(bench, RecordingState.STOPPED)
-        if state is not RunState.CHECKING:
-            assert_ended_without_a_jump(bench)
+        assert_ended_without_a_jump(bench, state)
 
     def test_a_cancel_takes_effect_within_a_block(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
@@ -259,8 +265,7 @@ class TestEveryWayOut:
         assert rest[-1].elapsed_s - shown.elapsed_s == pytest.approx(DWELL.ramp_s + LISTEN_S, abs=1e-3)
 
     def test_a_cancelled_segment_stays_incomplete(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.cancel()
         play(run)
         assert bench.recorder.segments[-1]["label"] == "dwell"
@@ -281,16 +286,14 @@ class TestEveryWayOut:
 
     @every_state
     def test_an_exceeded_limit_ramps_down_and_is_named(self, bench, tmp_path, state):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
             play(run)
         assert run.state is RunState.FAILED
         assert "base acceleration" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.FAILED)
-        if state is not RunState.CHECKING:
-            assert_ended_without_a_jump(bench)
+        assert_ended_without_a_jump(bench, state)
 
     @every_state
     @pytest.mark.parametrize(
@@ -303,21 +306,18 @@ class TestEveryWayOut:
         ],
     )
     def test_a_failure_silences_the_drive_and_records_the_reason(self, bench, tmp_path, state, call, fault):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         bench.world.faults[call] = [lambda: fault("it broke")]
         with pytest.raises(fault, match="it broke"):
             play(run)
         assert run.state is RunState.FAILED
         assert "it broke" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.FAILED)
-        if state is not RunState.CHECKING:
-            assert_ended_without_a_jump(bench)
+        assert_ended_without_a_jump(bench, state)
 
     @every_state
     def test_a_lost_generator_still_receives_a_stop_command(self, bench, tmp_path, state):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         for name in ("set_amplitude", "set_frequency", "load_sine"):
             bench.world.permanent[name] = lambda: InstrumentLost("no answer")
         with pytest.raises(InstrumentLost, match="no answer"):
@@ -326,8 +326,7 @@ class TestEveryWayOut:
 
     @every_state
     def test_a_generator_that_does_not_stop_raises_an_alarm(self, bench, tmp_path, state):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         bench.world.permanent["stop"] = lambda: InstrumentLost("THE OUTPUT MAY STILL BE ON")
         with pytest.raises(InstrumentLost, match="MAY STILL BE ON"):
             play(run)
@@ -338,8 +337,7 @@ class TestEveryWayOut:
     @every_state
     @pytest.mark.parametrize("call", ["digitizer.read", "set_amplitude"])
     def test_a_keyboard_interrupt_inside_a_driver_silences(self, bench, tmp_path, state, call):
-        run = run_of(bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, bench, tmp_path)
         bench.world.faults[call] = [KeyboardInterrupt]
         with pytest.raises(KeyboardInterrupt):
             play(run)
@@ -353,8 +351,7 @@ class TestEveryWayOut:
         assert run.state is RunState.STOPPED
         assert "left it" in bench.recorder.ending[1]
         assert_silent_and_finished(bench, RecordingState.STOPPED)
-        if state is not RunState.CHECKING:
-            assert_ended_without_a_jump(bench)
+        assert_ended_without_a_jump(bench, state)
 
     @every_state
     def test_an_exception_in_an_observer_ends_the_run(self, bench, tmp_path, state):
@@ -377,16 +374,14 @@ class TestEveryWayOut:
 
     def test_the_first_of_two_failures_is_reported(self, bench, tmp_path):
         bench.world.permanent["digitizer.stop"] = lambda: InstrumentLost("cannot stop")
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         bench.world.faults["digitizer.read"] = [lambda: DataLost("a hole")]
         with pytest.raises(DataLost, match="a hole"):
             play(run)
         assert bench.recorder.ending[1] == "DataLost: a hole; then: cannot stop"
 
     def test_a_limit_passed_while_ramping_down_does_not_stop_the_ramp(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.cancel()
         bench.world.background_m_per_s2 = 1000.0
         play(run)
@@ -397,8 +392,7 @@ class TestEveryWayOut:
 class TestStopLevels:
     def ended(self, bench, tmp_path, *levels):
         """Stop a recording at each level, a block after the other; the blocks after the first wish."""
-        run = run_of(bench, tmp_path, SLOW)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path, SLOW)
         shown = []
         for level in levels:
             run.switch.ask(StopRequest(Cause.OPERATOR, level, f"{level} pressed"))
@@ -420,8 +414,7 @@ class TestStopLevels:
         assert_ended_without_a_jump(bench)
 
     def test_off_switches_the_output_off_before_the_next_read(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
         before = len(bench.world.calls)
         play(run)
@@ -452,8 +445,7 @@ class TestStopLevels:
 
     def test_samples_that_wait_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
         """A busy computer reads five times as fast as real time, and ten seconds are unread."""
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         convert, read = bench.world.convert, bench.digitizer.read
         unread = 10 * round(bench.digitizer.sample_rate_hz)
         convert(unread)
@@ -473,8 +465,7 @@ class TestStopLevels:
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
     def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         bench.world.stays_on = True
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
         with pytest.raises(InstrumentError, match="THE OUTPUT MAY STILL BE ON"):
@@ -484,8 +475,7 @@ class TestStopLevels:
 
     def test_mains_hum_does_not_count_as_drive(self, bench, tmp_path):
         bench.world.hum_v = 0.012
-        run = run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": LOUD}))
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path, DWELL.model_copy(update={"excitation": LOUD}))
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
         play(run)
         assert "measured silence" in next(
@@ -507,8 +497,7 @@ class TestStopLevels:
         assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2 + 0.3) * RATE)
 
     def test_limits_are_monitored_during_a_hold(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.hold()
         next(iter(run))
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
@@ -517,8 +506,7 @@ class TestStopLevels:
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
     def test_a_stop_ends_a_hold(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.hold()
         next(iter(run))
         run.cancel("enough")
@@ -528,8 +516,7 @@ class TestStopLevels:
 
     @pytest.mark.thorough
     def test_a_hold_ends_after_its_longest_time(self, bench, tmp_path):
-        run = run_of(bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
         run.switch.hold()
         play(run)
         assert run.outcome.state is RunState.STOPPED
@@ -616,8 +603,7 @@ class TestOverloads:
 
     def test_an_overload_ends_the_run_when_the_plan_says_so(self, bench, tmp_path):
         strict = DWELL.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
-        run = run_of(bench, tmp_path, strict)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, bench, tmp_path, strict)
         bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
             play(run)

@@ -47,6 +47,12 @@ def upto(run, state):
     return next(progress for progress in run if progress.state is state)
 
 
+def run_upto(state, *given, **options):
+    run = run_of(*given, **options)
+    upto(run, state)
+    return run
+
+
 def drive(bench):
     return bench.recorder.channel(0) * bench.channels[0].units_per_volt
 
@@ -136,8 +142,7 @@ class TestThePlanIsCarriedOut:
         assert_silent_and_finished(streaming_bench, RecordingState.COMPLETE)
 
     def test_only_the_check_level_is_written_before_the_check_passes(self, streaming_bench, tmp_path):
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, RunState.ARMED)
+        run = run_upto(RunState.ARMED, streaming_bench, tmp_path)
         assert np.max(np.abs(streaming_bench.world.streamed)) <= 0.5 * 0.02
         run.close()
 
@@ -182,8 +187,7 @@ class TestEveryWayOut:
 
     @every_state
     def test_an_exceeded_limit_fades_out_and_is_named(self, streaming_bench, tmp_path, state):
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
             play(run)
@@ -192,8 +196,7 @@ class TestEveryWayOut:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     def test_a_hold_ramps_a_stream_down_with_a_reason(self, streaming_bench, tmp_path):
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, streaming_bench, tmp_path)
         run.switch.hold()
         play(run)
         assert run.outcome.state is RunState.STOPPED
@@ -202,8 +205,7 @@ class TestEveryWayOut:
 
     @heard_state
     def test_off_discards_written_samples(self, streaming_bench, tmp_path, state):
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, streaming_bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
         (listened,) = play(run)  # to what is there after the cut: silence
         assert listened.amplitude_vpp == 0.0
@@ -211,8 +213,7 @@ class TestEveryWayOut:
 
     def test_an_overload_fades_when_the_plan_says_so(self, streaming_bench, tmp_path):
         strict = NOISE.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
-        run = run_of(streaming_bench, tmp_path, strict)
-        upto(run, RunState.RECORDING)
+        run = run_upto(RunState.RECORDING, streaming_bench, tmp_path, strict)
         streaming_bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
             play(run)
@@ -231,8 +232,7 @@ class TestEveryWayOut:
         self, streaming_bench, tmp_path, state, call, fault
     ):
         world = streaming_bench.world
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, streaming_bench, tmp_path)
         world.faults[call] = [lambda: fault("it broke")]
         with pytest.raises(fault, match="it broke"):
             play(run)
@@ -253,8 +253,7 @@ class TestEveryWayOut:
     @heard_state
     def test_an_output_that_refuses_samples_is_stopped_at_once(self, streaming_bench, tmp_path, state):
         world = streaming_bench.world
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, streaming_bench, tmp_path)
         world.permanent["write"] = lambda: DataLost("the output ran out of samples")
         with pytest.raises(DataLost, match="ran out"):
             play(run)
@@ -262,8 +261,7 @@ class TestEveryWayOut:
 
     @heard_state
     def test_an_output_that_does_not_stop_raises_an_alarm(self, streaming_bench, tmp_path, state):
-        run = run_of(streaming_bench, tmp_path)
-        upto(run, state)
+        run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.permanent["output.stop"] = lambda: InstrumentLost("MAY STILL BE PLAYING")
         with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING"):
             play(run)
