@@ -167,7 +167,7 @@ def _gaps(axes: Axes, motion: HiddenMotion) -> None:
     for side, label, color in ((-1.0, "lower", style.PREDICTED), (1.0, "upper", style.MEASURED)):
         here = measured[(free.sides == side) & ~np.isnan(measured)]
         if here.size:
-            axes.hist(_MICRO * here, bins=_BINS, histtype="step", color=color, label=label)
+            axes.hist(_MICRO * here, bins=_BINS, histtype="step", linewidth=1.0, color=color, label=label)
     for gap, dashes in zip(motion.gaps_m, ("--", "-"), strict=True):
         if np.isfinite(gap):
             axes.axvline(_MICRO * gap, color=style.SIMULATED, linestyle=dashes, linewidth=1.0)

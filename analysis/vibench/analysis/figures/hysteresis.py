@@ -4,7 +4,7 @@ import numpy as np
 
 from ..sine.jumps import Hysteresis, Jump, hysteresis
 from ..sine.sweep_analysis import SweepAnalysis
-from ..tables import table
+from ..tables import columns, table
 from . import style
 
 _HEIGHT_IN = 3.4
@@ -38,20 +38,13 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
         axes.set_ylabel("Response II\n|x at f| / A0")
         style.legend_above(figure, [axes])
     name = f"hysteresis_{up.facts.name}_{down.facts.name}"
+    content = columns(found, "frequency_hz response_ii_up=up response_ii_down=down")
     return style.DrawnFigure(
         name=name,
         title=f"Up against down, {up.excitation.amplitude_vpp:g} Vpp",
         caption=_caption(up, down, found),
         figure=figure,
-        tables=(
-            table(
-                name,
-                frequency_hz=found.frequency_hz,
-                response_ii_up=found.up,
-                response_ii_down=found.down,
-                differs=found.differs.astype(np.int64),
-            ),
-        ),
+        tables=(table(name, **content, differs=found.differs.astype(np.int64)),),
     )
 
 

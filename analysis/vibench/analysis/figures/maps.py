@@ -137,7 +137,8 @@ def _draw_classes(axes: Axes, results: MapResults) -> None:
     )
     known = [k for k in range(len(MOTION_CLASSES)) if np.any(classes == k)]
     handles = [
-        Patch(facecolor=MOTION_CLASSES[k][1], edgecolor="#9a9a9a", label=MOTION_CLASSES[k][0]) for k in known
+        Patch(facecolor=MOTION_CLASSES[k][1], edgecolor="#9a9a9a", linewidth=1.0, label=MOTION_CLASSES[k][0])
+        for k in known
     ]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5)
 

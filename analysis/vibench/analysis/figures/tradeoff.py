@@ -39,15 +39,9 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
             for method, (colour, line, more) in looks.items():
                 own = sorted((each for each in points if each.method == method), key=lambda each: each.time_s)
-                axes.plot(
-                    [each.time_s for each in own],
-                    [max(each.error, _LEAST) for each in own],
-                    color=colour,
-                    linestyle=line,
-                    marker=("os^" if all(each.is_stated for each in own) else "x+1")[more % 3],
-                    markersize=4,
-                    label=method,
-                )
+                marker = ("os^" if all(each.is_stated for each in own) else "x+1")[more % 3]
+                time_s, error = [each.time_s for each in own], [max(each.error, _LEAST) for each in own]
+                axes.plot(time_s, error, linestyle=line, marker=marker, color=colour, label=method)
             chosen = [(each.time_s, max(each.error, _LEAST)) for each in points if each.is_chosen]
             ring = {"color": style.BOUNDS, "marker": "o", "markersize": 11, "fillstyle": "none"}
             axes.plot(*np.array(chosen).T, linestyle="none", **ring)

@@ -24,13 +24,18 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
         for number, each in enumerate(rising):
             found = view.shown(each.response.frequency_response)
             level = each.response.base_level.rms_acceleration
+            label = f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)"
+            line, colour = (
+                style.LEVEL_STYLES[number % len(style.LEVELS)],
+                style.LEVELS[number % len(style.LEVELS)],
+            )
             axes.plot(
                 found.frequency_hz,
                 view.drawn(found.magnitude),
-                color=style.LEVELS[number % len(style.LEVELS)],
-                linestyle=style.LEVEL_STYLES[number % len(style.LEVEL_STYLES)],
+                line,
+                color=colour,
                 linewidth=1.0,
-                label=f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)",
+                label=label,
             )
         if view.scale is MagnitudeScale.LOG:
             style.magnitude_axis(axes)
