@@ -157,7 +157,7 @@ def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(stranger, kin
     assert ("ZeroDivisionError: firmware 1.02" in said) is (does is raises)
 
 
-@pytest.mark.parametrize(("does", "words"), [(not_a_number, "no numbers"), (fewer_rows, "of shape")])
+@pytest.mark.parametrize(("does", "words"), [(not_a_number, "not numbers"), (fewer_rows, "of shape")])
 def test_invalid_samples_end_check_and_run_with_a_sentence(stranger, does, words, tmp_path):
     path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", does))
     with open_bench(path) as bench:

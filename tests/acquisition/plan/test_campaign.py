@@ -135,7 +135,7 @@ class TestRefusals:
             ConfigurationError, match="specimen, virtual are not known keys: check"
         ) as refused:
             load_campaign(bench)
-        assert str(refused.value).count("no known key") == 1
+        assert str(refused.value).count("not known key") == 1
 
     def test_the_file_the_key_and_what_is_allowed_are_named(self, tmp_path):
         text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "5000")

@@ -124,7 +124,7 @@ def without_segments(path):
         (missing, "does not exist"),
         (interrupted, r"a\.h5\.part does: it is being recorded, or was interrupted"),
         (empty, "is empty"),
-        (text, "no readable HDF5 file"),
+        (text, "is not a readable HDF5 file"),
         (cut_short, "cut short"),
         (another_hdf5, "no recording of vibench"),
         (newer, "format version 2.*reads version 1.*Update"),

@@ -65,7 +65,7 @@ def test_a_crate_is_never_overwritten(folder, crate):
 
 
 def test_an_invalid_deposit_is_refused(folder, tmp_path):
-    with pytest.raises(InvalidRequest, match="no address of a licence"):
+    with pytest.raises(InvalidRequest, match="is not the address of a licence"):
         pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
     with pytest.raises(InvalidRequest, match="without a name"):
         pack_folder(

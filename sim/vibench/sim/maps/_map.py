@@ -315,7 +315,7 @@ class Map(GridPlan):
                 f"window_periods = {self.window_periods} does not fit {self.periods} periods; give fewer"
             )
         if self.grid.size > MOST_POINTS:
-            raise ValueError(f"{self.grid.size} points were requested; a map has at most {MOST_POINTS}")
+            raise ValueError(f"{self.grid.size} points were requested; a map holds at most {MOST_POINTS}")
         for corner in (0, self.grid.size - 1):
             self.scene(self.grid.place(corner))
         for quantity in self.varied:

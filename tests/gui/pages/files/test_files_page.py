@@ -180,7 +180,7 @@ def test_a_recording_without_overview_can_be_opened(opened):
 def test_a_broken_file_shows_the_reason_and_a_remedy(page, opened, folder, qtbot):
     with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
-    assert "no readable HDF5 file" in said.args[0].what
+    assert "is not a readable HDF5 file" in said.args[0].what
     assert page.time_histories.plots == ()
     assert len(opened("whole.h5").time_histories.plots) == 3
 
