@@ -28,5 +28,5 @@ class Link:
 )
 def test_a_line_that_is_no_report_is_one_error(line):
     config = ControllerConfig(rate_hz=10_240, latency_s=3e-4, limit_v=2, source="test")
-    with pytest.raises(InstrumentError, match="no controller of loop protocol"):
+    with pytest.raises(InstrumentError, match="is not a controller of loop protocol"):
         LineController(Link(line), config)
