@@ -65,8 +65,8 @@ def _draw_rates(
 ) -> None:
     apart = np.array([[each.rate - each.low, each.high - each.rate] for each in found]).T
     at, rates = np.arange(len(found)) + 0.06 * place, [100 * each.rate for each in found]
-    look = {"color": colour, "label": f"n = {model.removeprefix('power:')}"}
-    axes.errorbar(at, rates, 100 * np.maximum(apart, 0.0), fmt=f"o{line}", capsize=2, **look)
+    reach, label = 100 * np.maximum(apart, 0.0), f"n = {model.removeprefix('power:')}"
+    axes.errorbar(at, rates, reach, fmt=f"o{line}", capsize=2, color=colour, label=label)
 
 
 def definition(options: FigureOptions) -> str:
