@@ -15,7 +15,7 @@ from vibench.sim.engine.scene import collision_structure, power_structure, scene
 ROOT = Path(__file__).resolve().parents[3]
 FUZZ = Path(__file__).parent / "fuzz_interface.py"
 SANITIZED = (
-    *("g++", "-std=c++20", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off"),
+    *("g++", "-std=c++20", "-O0", "-g1", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off"),
     *("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"),
 )
 PROGRAM = """
@@ -36,7 +36,7 @@ def output_of(*command, **environment):
 
 @pytest.fixture(scope="module")
 def sanitized(tmp_path_factory):
-    """The engine with its program of tests as one library, which takes two minutes to compile."""
+    """The engine with its program of tests as one library; without optimisation it compiles soonest."""
     library = tmp_path_factory.mktemp("engine") / "sanitized.so"
     output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "test_engine.cpp", "-o", library)
     return library
