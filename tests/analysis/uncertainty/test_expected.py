@@ -100,7 +100,7 @@ def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alon
     """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
     first, second = expected_uncertainty(dwell(260, 0.05), RIG)
     assert first.after(5.0) is None
-    assert "Response I: not known beforehand, for noise in the motion lifts" in first.sentence
+    assert "Response I: not known beforehand, for noise in the motion raises" in first.sentence
     assert 1e-6 < second.after(5.0) < 1e-3
 
 
