@@ -131,6 +131,7 @@ def test_a_stop_of_a_held_run_keeps_it_and_ends_silent(vibench_here, tmp_path, l
         assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 32))) < SILENT_V
 
 
+@pytest.mark.thorough
 def test_a_stalled_run_is_reported_as_failed(vibench_here, tmp_path, monkeypatch):
     runs = "".join(RUN.format(name=name, duration_s=LONG_S, ramp_s=0.3) for name in ("first", "second"))
     (tmp_path / "c.toml").write_text(f'name = "c"\n{runs}')

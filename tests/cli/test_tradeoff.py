@@ -37,6 +37,7 @@ def test_an_impossible_scene_is_refused_in_one_sentence(vibench_here, tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_without_a_scene_the_four_cases_of_the_paper_are_measured(vibench_here, tmp_path):
     ran = vibench_here("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

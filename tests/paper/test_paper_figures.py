@@ -53,6 +53,7 @@ def test_a_figure_comes_in_every_format_with_its_numbers(solved, number, tmp_pat
     assert str(number) in found.title
 
 
+@pytest.mark.thorough
 def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solved):
     weak, *_, strong = drawn(solved, 3).tables
     f = numbers(weak, "frequency_hz")

@@ -67,7 +67,12 @@ def simulated_period(frequency_hz, amplitude_m, longest=8):
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency_hz", "amplitude_m", "period"),
-    [(260.0, 1e-6, 1), (74.0, 30e-6, 2), (70.0, 40e-6, 3), (260.0, 5e-6, 0)],
+    [
+        (260.0, 1e-6, 1),
+        (74.0, 30e-6, 2),
+        pytest.param(70.0, 40e-6, 3, marks=pytest.mark.slow),
+        (260.0, 5e-6, 0),
+    ],
 )
 def test_the_measured_period_matches_the_simulation(carried_out, frequency_hz, amplitude_m, period):
     assert simulated_period(frequency_hz, amplitude_m) == period
@@ -136,7 +141,10 @@ ABOVE = (277.0, 281.0, 285.0, 290.0, 295.0, 300.0, 310.0, 320.0, 330.0, 340.0)
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequencies_hz", "direction", "between_hz"),
-    [(BELOW, Direction.UP, (250.0, 260.0)), (ABOVE, Direction.DOWN, (272.0, 285.0))],
+    [
+        (BELOW, Direction.UP, (250.0, 260.0)),
+        pytest.param(ABOVE, Direction.DOWN, (272.0, 285.0), marks=pytest.mark.slow),
+    ],
 )
 def test_a_sweep_jumps_where_its_linear_branch_first_touches_the_stops(
     carried_out, frequencies_hz, direction, between_hz
@@ -305,7 +313,9 @@ def test_a_subharmonic_resonance_is_found_by_twice_its_phase(
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("subharmonic", "start_hz"), [(2, 192), (3, 290)])
+@pytest.mark.parametrize(
+    ("subharmonic", "start_hz"), [(2, 192), pytest.param(3, 290, marks=pytest.mark.slow)]
+)
 def test_no_subharmonic_is_found_in_a_period_one_motion(carried_out, subharmonic, start_hz):
     """Noise at half the drive has some phase, and one of thirty degrees' tolerance was met by it."""
     plan = other_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)

@@ -214,6 +214,7 @@ def test_feedback_without_a_sensor_on_m0_is_refused_before_anything_plays(tmp_pa
         )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_a_sensor_on_m2_is_analysed_and_reported(tmp_path):
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
     path = measured(
@@ -240,6 +241,7 @@ def test_a_sensor_on_m2_is_analysed_and_reported(tmp_path):
     assert re.findall(r".{30}\bm0\b(?! velocity).{20}", shown) == []
 
 
+@pytest.mark.thorough
 def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     """The paper's campaign, shortened: noise, sweep and chaotic dwell."""
     noise = {"band_start_hz": 60, "band_stop_hz": 560, "repetition_hz": 2, "realisations": 3, "periods": 2}
@@ -275,6 +277,7 @@ def test_a_channel_without_a_mass_gives_no_response(tmp_path):
         analyse(path, response="base_force")
 
 
+@pytest.mark.thorough
 @ON_M0
 def test_feedback_tracks_the_same_resonance_with_an_accelerometer_or_a_probe(role, tmp_path):
     """It refused rigs without a vibrometer; the closed form has the frequency."""

@@ -46,7 +46,7 @@ def dwell(frequency_hz, amplitude_vpp=WEAK_VPP, duration_s=3.0):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("frequency_hz", [95.0, 260.0])
+@pytest.mark.parametrize("frequency_hz", [95.0, pytest.param(260.0, marks=pytest.mark.slow)])
 def test_bounds_of_response_i_hold_in_bench_noise(frequency_hz, tmp_path):
     held = []
     for noise_v, seed in product(AMPLIFIER_NOISE_V, range(1, 7)):

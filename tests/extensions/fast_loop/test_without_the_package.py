@@ -89,6 +89,7 @@ def test_nothing_is_measured(run, given, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_an_old_recording_is_reported_by_command_and_report(run, recording, tmp_path):
     told = run("-m", "vibench.cli", "analyse", recording, "--json")
     assert told.returncode == 1

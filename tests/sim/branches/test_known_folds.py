@@ -31,7 +31,12 @@ def test_over_frequency_the_hardening_specimen_folds_at_98_296_and_116_296_hz():
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency", "lower_um", "upper_um"),
-    [(103.0, 1.80, 9.35), (106.0, 2.10, 14.1), (112.0, 2.63, 24.5), (285.0, 9.32, 17.3)],
+    [
+        (103.0, 1.80, 9.35),
+        pytest.param(106.0, 2.10, 14.1, marks=pytest.mark.slow),
+        pytest.param(112.0, 2.63, 24.5, marks=pytest.mark.slow),
+        (285.0, 9.32, 17.3),
+    ],
 )
 def test_over_level_it_folds_at_both_ends_of_its_unstable_stretch(frequency, lower_um, upper_um):
     found = folds(hardening(), AmplitudePath(frequency), 0.3e-6 * lower_um, 1.3e-6 * upper_um)
