@@ -443,6 +443,17 @@ class TestStopLevels:
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "measured silence" in said
 
+    def test_off_switches_the_output_off_before_the_converter_is_asked(self, bench, tmp_path, monkeypatch):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        was_on = []
+        waiting = property(lambda _: was_on.append(bench.world.is_on) or 0)
+        monkeypatch.setattr(type(bench.digitizer), "waiting_samples", waiting)
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
+        play(run)
+        assert was_on
+        assert not any(was_on)
+
     def test_samples_that_wait_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
         """A busy computer reads five times as fast as real time, and ten seconds are unread."""
         run = run_upto(RunState.RECORDING, bench, tmp_path)

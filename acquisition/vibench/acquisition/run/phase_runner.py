@@ -342,10 +342,12 @@ class PhaseRunner:
         """
         self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
-        self.loop.cut()
         self._silence.begin(self.loop.samples)
         if self._drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
+        if level is StopLevel.OFF:
+            self._drive.cut()  # before the converter is asked, which may not answer
+        self.loop.cut()
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level)):
                 yield from self._recorded(self.loop.pass_time(wait_s))
