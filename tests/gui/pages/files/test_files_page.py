@@ -120,10 +120,10 @@ def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "Length") == "10 s"
 
 
-def test_a_recording_without_its_seal_gets_a_warning(opened):
+def test_a_recording_without_its_seal_gets_a_warning(opened, wait_for):
     page = opened("old.h5")
     assert "seal gone" in cell(page, "old", "Verdict")
-    assert page._facts.sentence.startswith("✖ seal gone: its seal is gone")
+    wait_for(lambda: page._facts.sentence.startswith("✖ seal gone: its seal is gone"))
 
 
 def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_path, wait_for):
