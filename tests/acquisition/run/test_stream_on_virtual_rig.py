@@ -1,6 +1,5 @@
 """Streamed noise on the whole path: plan, unmodified nidaqmx, a simulated USB-4431, the file."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,9 +111,7 @@ def test_the_output_is_silent_between_check_and_ramp(streamed):
 
 
 def test_the_check_at_low_level_plays_through_the_output(streamed):
-    measured, expected = re.search(r"drive (\S+) V \((\S+) V expected\)", streamed.log).groups()
-    assert float(expected) == pytest.approx(0.01993, rel=1e-3)
-    assert float(measured) == pytest.approx(float(expected), rel=1e-3)
+    assert "drive 0.01993 V (0.01993 V expected)" in streamed.log
     check = streamed.drive_v[streamed.segments["check"]]
     assert np.max(np.abs(check)) == pytest.approx(0.01 * 2.0 * TERMINAL, rel=0.02)
     assert streamed.state is RecordingState.COMPLETE

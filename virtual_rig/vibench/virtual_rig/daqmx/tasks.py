@@ -303,6 +303,8 @@ class Task:
         if self._awaited_terminal:
             self.rig.arm(self._awaited_terminal, self._begin)
             return
+        # Without a task, the rig is updated rarely. Not in _begin: tasks of one trigger start at one time.
+        self.rig.pace.pass_time(self.rig, 0.0)
         try:
             self._begin()
         except AcquisitionError:  # the simulated world lacks a capability of the device
@@ -317,7 +319,6 @@ class Task:
         return self.buffer
 
     def _begin(self) -> None:
-        self.rig.pace.pass_time(self.rig, 0.0)  # without a task, the rig is updated rarely
         if self.inputs:
             self.acquisition = self._acquire()
             self.rig.run_acquisition(self.acquisition)
