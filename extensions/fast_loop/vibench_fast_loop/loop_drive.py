@@ -1,6 +1,6 @@
 """A real-time controller as a drive: sends programs, and requests reports while it plays."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.excitation.steps import Play, Tone
@@ -70,8 +70,8 @@ class LoopDrive:
             self._play(phase.play, phase.duration_s if phase.state is RunState.RAMPING_UP else None)
         yield from self._talking(phase.duration_s)
 
-    def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Ramp down."""
+    def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
+        """Ramp down by the controller's clock."""
         self._silence(ramp_s)
         yield from self._talking(ramp_s)
 

@@ -19,6 +19,7 @@ from vibench.acquisition import (
 from vibench.acquisition.errors import DataLost, InstrumentError
 from vibench.acquisition.plan import (
     CHECK_S,
+    FEWEST_STAIRS,
     Dwell,
     InRunLimits,
     Measurement,
@@ -29,6 +30,7 @@ from vibench.acquisition.plan import (
     StreamedNoise,
     WhiteNoise,
     shortest_ramp_s,
+    stairs,
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.run.acquisition_loop import BLOCK_S
@@ -474,6 +476,28 @@ class TestStopLevels:
         # The block in which the stop is seen, then the ramp.
         assert took_s <= BLOCK_S / 5 + shortest_ramp_s(bench.rig)
         assert_silent_and_finished(bench, RecordingState.STOPPED)
+
+    @pytest.mark.parametrize("reading_s", [0.0, 0.03, 0.1])
+    def test_a_ramp_takes_its_time_on_a_computer_that_reads_slowly(
+        self, bench, tmp_path, monkeypatch, reading_s
+    ):
+        run = run_upto(RunState.RECORDING, bench, tmp_path)
+        convert, read, rate_hz = bench.world.convert, bench.digitizer.read, bench.digitizer.sample_rate_hz
+
+        def read_slowly(samples):
+            convert(round(reading_s * rate_hz))
+            return read(samples)
+
+        monkeypatch.setattr(bench.digitizer, "read", read_slowly)
+        began, stopped = len(bench.world.amplitudes()), bench.world.samples
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.RAMP, "ramp"))
+        play(run)
+        loud = np.flatnonzero(np.abs(bench.recorder.channel(0)) > SILENT_V)
+        took_s = (loud[-1] - stopped) / rate_hz
+        assert took_s <= BLOCK_S + reading_s + max(DWELL.ramp_s + reading_s, FEWEST_STAIRS * reading_s)
+        settings = [value for _, value in bench.world.amplitudes()[began:]]
+        assert FEWEST_STAIRS <= len(settings) <= stairs(DWELL)
+        assert np.min(np.diff([AMPLITUDE_VPP, *settings])) >= -0.36 * AMPLITUDE_VPP
 
     def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)

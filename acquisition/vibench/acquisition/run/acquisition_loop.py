@@ -47,6 +47,10 @@ class AcquisitionLoop:
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self.samples))
 
+    def time_s(self) -> float:
+        """Return the time by which everything so far was to be read or has passed [s]."""
+        return self._due_s
+
     @property
     def waiting_s(self) -> float:
         """Return the age of the last sample read [s]."""

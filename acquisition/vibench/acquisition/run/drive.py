@@ -1,6 +1,6 @@
 """Signal source of a run: a function generator, or an analogue output for non-repeating signals."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
 
 from ..bench.bench import Bench
@@ -56,8 +56,11 @@ class Drive(Protocol):
     def can_hold(self) -> bool:
         """Whether the signal continues without further commands."""
 
-    def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`."""
+    def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
+        """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.
+
+        ``clock_s`` returns the time [s], which advances further than asked where reading is slow.
+        """
 
     def cut(self) -> None:
         """Switch off at once without a ramp. Legal at any time."""

@@ -1,7 +1,7 @@
 """A function generator as a drive: one command for each change, and a ramp as a staircase of amplitudes."""
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from itertools import takewhile
 
@@ -131,9 +131,17 @@ class GeneratorDrive:
                     self._generator.trigger()
                 yield from self._pieces(phase.duration_s)
 
-    def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Ramp down from the current level in as many steps as time allows; yield the length of each [s]."""
-        yield from self._ramp(0.0, ramp_s, self._stairs_within(ramp_s))
+    def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
+        """Ramp down from the current level in as many steps as time allows; yield the length of each [s].
+
+        Stairs whose time has passed already are left out, up to the largest of a slow generator.
+        """
+        top, count, began_s, stair = self._level, self._stairs_within(ramp_s), clock_s(), 0
+        while stair < count:
+            passed = int(count * (clock_s() - began_s) / ramp_s)
+            stair = min(count, max(stair + 1, min(passed, stair + count // FEWEST_STAIRS)))
+            self._set_level(top * half_cosine(1 - stair / count))
+            yield from self._pieces(max(0.0, began_s + ramp_s * stair / count - clock_s()))
 
     def cut(self) -> None:
         """Turn the output off at once."""

@@ -349,7 +349,7 @@ class PhaseRunner:
             self._drive.cut()  # before the converter is asked, which may not answer
         self.loop.cut()
         while level is not StopLevel.OFF and self._drive.is_playing:
-            for wait_s in self._drive.ramp_down(ramp_s(level)):
+            for wait_s in self._drive.ramp_down(ramp_s(level), self.loop.time_s):
                 yield from self._recorded(self.loop.pass_time(wait_s))
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level

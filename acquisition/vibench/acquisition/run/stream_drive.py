@@ -1,6 +1,6 @@
 """An analogue output as a drive: samples are written ahead, and reading is the clock."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
@@ -191,8 +191,8 @@ class StreamDrive:
         self._is_playing = True
         yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
 
-    def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Play the written samples, then fade; yield as in `perform`."""
+    def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
+        """Play the written samples, then fade by the device's clock; yield as in `perform`."""
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)
