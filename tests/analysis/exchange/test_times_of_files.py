@@ -330,12 +330,40 @@ def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, no
         assert [each.flat_tops for each in channel_levels(recording)] == [(), (), ()]
 
 
-def test_falling_times_are_refused(tmp_path):
-    meaning = dwell_at(tmp_path / "a.csv", *np.random.default_rng(1).standard_normal((3, 9000)))
-    heading, *rows = (tmp_path / "a.csv").read_text().splitlines()
-    (tmp_path / "a.csv").write_text("\n".join((heading, *reversed(rows))))
-    with pytest.raises(InvalidRequest, match="sort its rows by time"):
-        import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")
+@pytest.mark.parametrize("order", ["falling", "shuffled", "not a number"])
+@pytest.mark.parametrize("heading", ["time [s]", "Zeit", "t (s)"])
+def test_times_that_do_not_rise_are_refused(tmp_path, order, heading):
+    times = np.arange(SAMPLES) / RATE_HZ
+    shown = {
+        "falling": times[::-1],
+        "shuffled": np.random.default_rng(3).permutation(times),
+        "not a number": np.full(SAMPLES, np.nan),
+    }[order]
+    rows = (f"{t:.7f};{x:.9g};{2 * x:.9g}\n" for t, x in zip(shown, motion(times), strict=True))
+    (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))
+    with pytest.raises(InvalidRequest, match="times that do not rise; sort its rows by time"):
+        import_recording(tmp_path / "a.csv", mapped("csv", RATE_HZ), tmp_path / "made.h5")
+
+
+@pytest.mark.parametrize("first", [0.0, 7.3, 1.7e9])
+@pytest.mark.parametrize(
+    ("rate_hz", "digits"),
+    [(1024, 3), (980, 3), (4900, 4), (5120, 4), (9600, 4), (9980, 4), (51_200, 5), (96_000, 5)],
+)
+def test_rounded_times_are_no_lost_samples(tmp_path, rate_hz, digits, first):
+    """One interval in 20 or fewer differs from the others, by one unit of the last digit."""
+    times = np.arange(3 * rate_hz) / rate_hz
+    rows = (
+        f"{first + t:.{digits}f};{x:.9g};{2 * x:.9g}\n" for t, x in zip(times, motion(times), strict=True)
+    )
+    (tmp_path / "a.csv").write_text("time [s];a;b\n" + "".join(rows))
+    with pytest.raises(InvalidRequest, match="does not say its sample rate exactly"):
+        import_recording(tmp_path / "a.csv", mapped("csv", None), tmp_path / "made.h5")
+    with open_recording(
+        import_recording(tmp_path / "a.csv", mapped("csv", rate_hz), tmp_path / "made.h5")
+    ) as made:
+        assert made.sample_rate_hz == rate_hz
+        assert not made.gaps
 
 
 def restarted_tdms(path, more, at):

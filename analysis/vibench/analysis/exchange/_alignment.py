@@ -51,6 +51,10 @@ _PLACED = 0.1
 """Tolerance on any even axis, in addition to rounding."""
 _OFF, _MANY_OFF = 0.25, 0.05
 """Share of intervals and their relative deviation from the median that show too few digits."""
+_LEAST_ROUNDED = 10
+"""Least differing intervals to recognize rounding; fewer could be lost samples at even distances."""
+_ROUNDED_SPREAD = 1.05
+"""Largest deviation of rounded times from a line, in last digits."""
 _COARSE_SPREAD = 1.25
 """Largest deviation of coarse times from a line, in last digits; more shows missing samples."""
 _RISING = 0.9
@@ -133,8 +137,10 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or said in _NO_UNITS else None
     is_named = found is not None and said in SECONDS
-    if is_named and _begin(-first) is not None:
-        trouble = "has times that fall; sort its rows by time"
+    # Times that are all the same were rounded too much to contradict anything. A bare "t" may be a torque.
+    is_clear = found is not None and bool(channel.unit or found["unit"] or len(found[0]) > 1)
+    if is_named and is_clear and scan is None and np.ptp(first) != 0:
+        trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
     if scan is None or not (is_named or (first.size >= _LEAST_RISING and not scan.is_coarse)):
         return None
@@ -219,11 +225,30 @@ def _begin(block: Reals) -> "_Scan | None":
         return None
     typical = float(np.median(rising))
     is_near = np.abs(intervals / typical - 1) <= _OFF
-    is_coarse = np.count_nonzero(~is_near) > _MANY_OFF * intervals.size + 1
-    if is_coarse:
-        return _Scan(float(block[-1] - block[0]) / intervals.size, float(np.quantile(rising, 0.01)))
+    mean = float(block[-1] - block[0]) / intervals.size
+    if np.count_nonzero(~is_near) > _MANY_OFF * intervals.size + 1:
+        return _Scan(mean, float(np.quantile(rising, 0.01)))
+    if digit := _last_digit(block, intervals[~is_near] - typical):
+        return _Scan(mean, digit)
     near = intervals[is_near]
     return _Scan(float(np.mean(near)), min(float(np.ptp(near)) / 2, 0.8 * _OFF * typical))
+
+
+def _last_digit(block: Reals, off: Reals) -> float:
+    """Return the last decimal digit of evenly spaced times whose rounding explains all intervals; 0 if none.
+
+    An interval of 1.04 digits looks like one digit, and one lost sample in 25. Lost samples move the times
+    after them away from a line; rounding does so by half a digit at most.
+    """
+    if off.size < _LEAST_ROUNDED:
+        return 0.0
+    step = float(np.min(np.abs(off)))
+    digit = 10.0 ** round(np.log10(step))
+    place = np.arange(block.size) / block.size
+    apart = block - block[0]
+    apart = apart - np.polyval(np.polyfit(place, apart, 1), place)
+    is_rounded = abs(step / digit - 1) < _ROUNDED_SPREAD - 1 and np.ptp(apart) < _ROUNDED_SPREAD * digit
+    return digit if is_rounded else 0.0
 
 
 class _Scan:
@@ -269,9 +294,14 @@ class _Scan:
         """Return the time axis."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
-        slope, offset = np.polyfit(places / span, distance, 1) if np.ptp(places) else (0.0, 0.0)
+        slope, offset = 0.0, float(np.mean(distance))
+        if np.ptp(places):
+            fitted = np.polyfit(places / span, distance, 1)
+            # A line through the few extremes of a short file may be worse than the one through its ends.
+            if np.ptp(distance - fitted[0] * places / span) < np.ptp(distance):
+                slope, offset = float(fitted[0]), float(fitted[1])
         off = distance - slope * places / span - offset
-        spread, interval = float(np.ptp(off)), self._interval + float(slope) / span
+        spread, interval = float(np.ptp(off)), self._interval + slope / span
         allowed = (
             _COARSE_SPREAD * self._rounding if self.is_coarse else 2 * _PLACED * interval + self._rounding
         )
@@ -286,7 +316,7 @@ class _Scan:
             before, place = self._last or (self._start, 1)
             interval = (before - self._start) / place if place else interval
         uncertainty = 0.0 if is_exact else spread / span
-        start = self._start if is_exact else self._start + float(offset)
+        start = self._start if is_exact else self._start + offset
         rounding = 2 * self._rounding / self._samples**0.5
         return TimeAxis(start, interval, uncertainty, rounding, tuple(self._runs), trouble)
 
