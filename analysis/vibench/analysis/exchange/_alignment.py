@@ -137,9 +137,8 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or said in _NO_UNITS else None
     is_named = found is not None and said in SECONDS
-    # Times that are all the same were rounded too much to contradict anything. A bare "t" may be a torque.
-    is_clear = found is not None and bool(channel.unit or found["unit"] or len(found[0]) > 1)
-    if is_named and is_clear and scan is None and np.ptp(first) != 0:
+    # Times that are all the same were rounded too much to contradict anything.
+    if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
     if scan is None or not (is_named or (first.size >= _LEAST_RISING and not scan.is_coarse)):
@@ -154,6 +153,14 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     # Numbers under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
     return replace(axis, unit=channel.unit if said in SECONDS else "", uncertainty=uncertainty)
+
+
+def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
+    """Return whether a column under a name of times has times in any order; a bare "t" may be a torque."""
+    if found is not None and (channel.unit or found["unit"] or len(found[0]) > 1):
+        return True
+    in_order = _begin(np.sort(first))
+    return in_order is not None and not in_order.is_coarse
 
 
 @dataclass(frozen=True)
