@@ -1,11 +1,10 @@
 """Estimate the hidden motion of m1 against m2, and its impacts, from base acceleration and m0's velocity.
 
 Two methods run side by side: one without a contact model, and an extended Kalman filter that also finds
-gaps, m1, c1 and the contact law. Every number has an uncertainty. Whatever is undetermined is reported with
-the reason. Equations and figures:
-docs/hidden-motion.md.
+gaps, m1, c1 and the contact law. Every result has an uncertainty, or the reason why the data do not
+determine it. Equations and figures: docs/hidden-motion.md.
 
-The paper's specimen collides under a sine of 5 um; its m0 is watched with a little noise:
+In this example the paper's specimen collides under a sine of 5 um, and the velocity of m0 has a little noise:
 
 >>> import numpy as np
 >>> from vibench.analysis.hidden_motion import Numbers, hidden_motion_in_samples

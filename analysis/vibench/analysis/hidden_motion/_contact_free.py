@@ -23,21 +23,21 @@ _MISFIT = 3.0
 """Largest mean squared innovation of a valid block."""
 FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
 _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
-"""Closed shares in turn while parameters are fitted; the first tolerate an m1 that is 5 % wrong."""
+"""Values of `closed_share` in successive fits; the first ones tolerate an m1 that is 5 % wrong."""
 _FIT_STRETCH_S = 0.12
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
 _LEAST_OF_MEDIAN = 0.07
-"""Least impulse relative to the usual one; smaller ones may be residuals of neighbours."""
+"""Smallest accepted impulse relative to the median; smaller ones may be residuals of neighbouring impacts."""
 _LEAST_P_OF_MEDIAN = 0.9
-"""Relative distance from the usual position of impacts, beyond which a force comes from no stop."""
+"""Smallest |p| of an impact relative to the median; at smaller |p|, a force cannot come from a stop."""
 _DEPTH_POWER = 0.8
-"""Depth of a Hertz collision over its impulse: d ~ v^(4/5), and J ~ v."""
+"""Power of the impulse to which the depth of a Hertz collision is proportional: d ~ v^(4/5) and J ~ v."""
 _LAW_UNKNOWN = 0.15
-"""Error of a gap by another contact law, relative to the mean depth."""
+"""Error of a gap if the contact law is not Hertz's, relative to the mean depth."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
-"""Least range of the depths of 90 % of impacts over their mean, to fit a line."""
+"""Smallest range of the middle 90 % of depths, relative to their mean, for which a line is fitted."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
 """Largest scatter of |p| at the impacts of a valid block, relative to the gap."""
@@ -45,7 +45,7 @@ _WORST_SCATTER_OF_GAP = 0.1
 
 @dataclass(frozen=True, eq=False)
 class FreeImpacts(Labelled):
-    """Impacts from the estimated contact force, one row each."""
+    """Impacts found in the estimated contact force; every array has one value per impact."""
 
     OWN_UNITS: ClassVar = {
         "impulses": "N s",
@@ -60,7 +60,7 @@ class FreeImpacts(Labelled):
     sides: Reals
     """-1 at the lower stop, +1 at the upper one."""
     impulses: Reals
-    """On m1, as a magnitude [N s]."""
+    """Magnitude of the impulse on m1 [N s]."""
     p: Reals
     """Relative displacement in the middle of the contact [m]."""
     p_sd: Reals
@@ -71,12 +71,12 @@ class FreeImpacts(Labelled):
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion(Labelled):
-    """A whole motion without a contact model."""
+    """Motion of a stretch, estimated without a contact model."""
 
     OWN_UNITS: ClassVar = {"p": "m", "p_sd": "m"}
 
     p: Samples
-    """[m], NaN if undetermined; shape (samples,)."""
+    """Relative displacement y - z [m], NaN where undetermined; shape (samples,)."""
     p_sd: Samples
     impacts: FreeImpacts
     share_told: float
@@ -106,7 +106,7 @@ def free_motion(
     for _, begin, stop in _blocks(motion):
         end = min(stop, begin + round(_BLOCK_S * motion.sample_rate_hz))
         here = (impacts.samples >= begin) & (impacts.samples < end) & ~np.isnan(line.residuals)
-        # p lies at a stop during an impact, which shows the error of the whole block.
+        # During an impact p lies at a stop, so the scatter of p there shows the error of the whole block.
         scatter = float(np.sqrt(np.mean(line.residuals[here] ** 2))) if here.any() else 0.0
         sd[begin:end] = np.hypot(sd[begin:end], scatter)
         if scatter > _WORST_SCATTER_OF_GAP * min(model.gaps_m):
@@ -115,7 +115,7 @@ def free_motion(
 
 
 def _at_stops(rows: Reals) -> Flags:
-    """Return which windows contain impacts."""
+    """Return which rows are impacts at a stop."""
     kept = np.zeros(len(rows), dtype=np.bool_)
     if not len(rows):
         return kept
@@ -129,7 +129,7 @@ def _at_stops(rows: Reals) -> Flags:
 
 
 def _blocks(motion: PreparedMotion) -> Iterator[tuple[int, int, int]]:
-    """First sample to filter, first and last to keep, of blocks that overlap."""
+    """Yield overlapping blocks: first sample to filter, first to keep, and end of the filtered samples."""
     block, overlap = (round(each * motion.sample_rate_hz) for each in (_BLOCK_S, _OVERLAP_S))
     for begin in range(0, motion.samples, block):
         end = min(begin + block + overlap, motion.samples)
@@ -143,7 +143,7 @@ def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
 
 
 def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
-    """Return an impact for every window with a significant impulse, shape (impacts, 7)."""
+    """Return one impact for every window with an impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
     # The force is held over the step before a sample, so its centre is half a sample earlier.
@@ -194,17 +194,17 @@ class FreeGap:
 
     value_m: float
     sd_m: float
-    """Standard deviation by scatter of the impacts and by other contact laws than Hertz's."""
+    """Standard deviation from the scatter of impacts and the unknown contact law."""
     impacts: int
 
 
 @dataclass(frozen=True, eq=False)
 class _GapLine:
-    """Line of |p| at the centre of contacts over the impulse."""
+    """Straight line fitted to |p| at the centre of contacts over the impulse to the power 0.8."""
 
     gaps: tuple[FreeGap | None, FreeGap | None]
     residuals: Reals
-    """Residuals of every impact, NaN on a side with too few [m]."""
+    """Residual of every impact [m], NaN on a side with too few impacts."""
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
@@ -217,10 +217,10 @@ def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
 
 
 def free_loss(impacts: FreeImpacts) -> float | None:
-    """Return the loss of the stops [s/m] from the speeds before and after impacts; None for too few.
+    """Return the loss of the stops [s/m] from speeds before and after impacts; None if there are too few.
 
-    Hunt and Crossley's stops with little loss return 1 - 2/3 loss speed of the approach. This starts a
-    search, since both extrapolated speeds are a few per cent low.
+    For a small loss of Hunt and Crossley's law, speed after / speed before = 1 - 2/3 loss * speed before.
+    The result only starts a search, since both extrapolated speeds are a few per cent low.
     """
     before, after = impacts.rate_before, impacts.rate_after
     good = (before > np.median(before)) & (after > 0.0) if before.size else before > 0.0
@@ -266,7 +266,7 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
 
 
 def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Return the deviation of values from the median of their side; NaN without a side."""
+    """Return the deviation of each value from the median of its side; NaN for values on neither side."""
     apart = np.full(values.size, np.nan)
     for each in sides:
         apart[each] = values[each] - np.median(values[each])
@@ -294,14 +294,14 @@ class FreeNumbers:
     """m1, c1 and linear parameters, found without a contact model."""
 
     tracked: TrackedSpecimen
-    """The specimen with both."""
+    """The specimen with these parameters."""
     sd: Reals
     """Relative standard deviations in the order of `FITTED`."""
     misfit: float
 
 
 def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeNumbers:
-    """Fit m1, c1, k0, k2, c0 and c2 to flights by Gauss-Newton on the innovations. ¶
+    """Fit m1, c1, k0, k2, c0 and c2 to flights by Gauss-Newton on the innovations.
 
     Raises NotEnoughData when no stretch is long enough.
     """
@@ -349,7 +349,7 @@ def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
 
 
 def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:
-    """Return the normalised innovations of stretches with fixed windows."""
+    """Return the normalised innovations of stretches, with the contact windows of ``latent``."""
     model = motion_model(tracked, motion).without_stops
     begin = round(_RESIDUAL_START_S * motion.sample_rate_hz)
     parts = []
@@ -363,12 +363,12 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
 
 _COLUMNS = 7
 _MOST_STEPS = 400
-"""Longest contact of a collision [samples]; in longer ones m1 rests on the stop."""
+"""Longest contact of a collision [samples]; in longer contacts m1 rests on the stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class Collisions(Labelled):
-    """Contacts of m1 with its stops in the order of time, arrays of one value each."""
+    """Contacts of m1 with its stops in the order of time; every array has one value per contact."""
 
     OWN_UNITS: ClassVar = {"impulses": "N s", "speeds_before": "m s-1", "speeds_after": "m s-1"}
 
@@ -378,9 +378,9 @@ class Collisions(Labelled):
     sides: Reals
     """-1 at the lower stop, +1 at the upper one."""
     impulses: Reals
-    """On m1, as a magnitude [N s]."""
+    """Magnitude of the impulse on m1 [N s]."""
     penetrations_m: Reals
-    """Largest."""
+    """Largest penetration during each contact."""
     speeds_before: Reals
     speeds_after: Reals
     """Speeds of p, towards and away from the stop [m/s]."""

@@ -1,7 +1,7 @@
 """Estimate gaps, m1, springs, dampers and contact law while the motion is tracked.
 
-The parameters are constant states of the filter. It starts with a much larger noise of the channels, so
-that wrong parameters do not lose the track, and reduces it as they converge.
+The parameters are constant states of the filter. At first the filter assumes a larger velocity noise, so
+that it keeps the track with wrong parameters; after 0.1 s of tracked motion it uses the true noise.
 """
 
 import math
@@ -29,7 +29,7 @@ from ._tracking import acquire
 from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m, step_tables
 
 _WANDER = 0.02
-"""Random walk per block relative to the prior standard deviation, against early overconfidence."""
+"""Random walk of parameters per block, relative to their prior sd; it prevents early overconfidence."""
 REBUILT_S = 0.05
 """Interval after which the tables are computed for the current parameters [s]."""
 _LOST = (
@@ -37,9 +37,9 @@ _LOST = (
     "described (m0, m2, k1, kind of contact) may be wrong"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
-"""Schedule: length of tracked motion, and factor of the velocity variance until then."""
+"""Pairs: length of tracked motion [s], and the factor on the velocity variance until then."""
 _LEAST_OF_START = 0.05
-"""Lower limit of a parameter relative to its start; only the loss may be negative."""
+"""Lower limit of a parameter relative to its start value; only the loss may be negative."""
 _FURTHEST = 8.0
 """Deviation from the description at which the search stops, in prior standard deviations."""
 
@@ -59,10 +59,10 @@ class Estimate:
     covariance: Reals
     """Covariance by the filter in units of the prior, shape (parameters, parameters)."""
     wandered: float
-    """Variance added to each parameter by its random walk, in the same units."""
+    """Variance that the random walk added to each parameter, in units of the prior."""
     followed_s: float
     innovation_level: float
-    """Mean squared normalised innovation of the last part at the true noise; 1 for a good model."""
+    """Mean squared normalised innovation at the end, with the true noise; 1 for a good model."""
 
 
 def estimate(
@@ -72,9 +72,9 @@ def estimate(
     first: int,
     stop: int,
 ) -> Estimate | str:
-    """Find parameters between two samples of a motion; return a sentence if they are undetermined.
+    """Find parameters between two samples of a motion; return the reason as a sentence if that fails.
 
-    ``relative_sd`` names them and gives their prior relative to ``start``.
+    ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
     """
     return _Search(start, motion, relative_sd).over(first, stop)
 
@@ -92,7 +92,7 @@ class _Search:
         self._prior_sd = np.array(list(relative_sd.values())) * scale
         self._deviation = np.array([SEARCHES[each].step for each in wanted]) * scale
         self._least = np.where(np.array(wanted) == Hidden.LOSS, -np.inf, _LEAST_OF_START * self._nominal)
-        # In units of the prior standard deviations: forces and gaps differ by six powers of ten.
+        # The covariance is in units of the prior, because forces and gaps differ by six powers of ten.
         self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
         self._followed, self._level = 0, math.nan
 
@@ -199,21 +199,20 @@ class _Search:
         )
 
 
-# Start of a search without a contact model, if the description does not work as one.
-#
-# m1, springs and dampers from flights, gaps from positions of impacts, loss from their speeds.
+# Start values without a contact model, if the motion cannot be tracked with the description: m1, springs and
+# dampers follow from the flights, gaps from the positions of impacts, the loss from speeds at impacts.
 
 _TELLING_LOSS = 0.15
-"""Least loss [s/m] for which these speeds are better than a description."""
+"""Smallest loss [s/m] for which speeds at impacts are more accurate than the description."""
 _LAW_UNKNOWN = 0.3
-"""Relative error of a depth by the described law, which may be wrong."""
+"""Relative error of a depth computed with the described law, which may be wrong."""
 _FREE_S = 3.0
 
 
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return a start without a contact model and its prior; a sentence if there is none."""
+    """Return start values found without a contact model, and their prior or the reason for having none."""
     rate = motion.sample_rate_hz
     numbers = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
@@ -247,7 +246,7 @@ def search_start(
 
 
 def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
-    """Leave out the gap of a side on which no stop is described."""
+    """Return ``near`` without the gap of a side that has no stop in the description."""
     return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 
 

@@ -1,4 +1,4 @@
-"""Runs of the filter and of the smoother over stretches of a prepared motion, as values."""
+"""Run the filter and the smoother over stretches of a prepared motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -14,13 +14,13 @@ from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 
 _DIFFUSION_OF_GAP = 7e-6
-"""Model error of each mass: displacement relative to the gap per root millisecond."""
+"""Model error of each mass: random displacement relative to the gap, per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""Model error of each mass: speed relative to the gap times the highest natural frequency."""
+"""The same for random speed, relative to the gap times the highest natural frequency [rad/s]."""
 _DRIFT_M_PER_S2 = 1e-3
-"""Drift of the accelerometer's slow error in the root of a second."""
+"""Random walk of the accelerometer's slow error per root second."""
 _ACCELERATION_EXCESS = 1.5
-"""Ratio of the variance of an acceleration between samples to that of one, by linear interpolation."""
+"""Variance of an acceleration interpolated linearly between samples, relative to that of a sample."""
 _IMPULSE_SHARE = 0.003
 """Relative model error of a collision's impulse."""
 _SMOOTHING_S = 8e-3
@@ -29,7 +29,7 @@ LOSS_LIMIT = 8.0
 """Largest mean squared normalised innovation of a track; about 1 is good."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
-"""Kind of a step without a stop."""
+"""Kind of a step without contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class MotionModel:
     specimen: Specimen
     tables: StepTables
     step_noise: Reals
-    """Q of one sample, shape (8, 8)."""
+    """Process noise Q of one sample, shape (8, 8)."""
     velocity_variance: float
 
     @property
@@ -51,7 +51,7 @@ class MotionModel:
 
     @property
     def gaps_m(self) -> tuple[float, float]:
-        """At negative and at positive p."""
+        """Gaps at negative and at positive p."""
         return float(self.tables.stop[0]), float(self.tables.stop[1])
 
 
@@ -95,10 +95,10 @@ class FilterState:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """Predictions of a run of the filter, before each sample was used."""
+    """Predictions of the filter for each sample, before that sample was used."""
 
     first: int
-    """Number in the motion of the first sample."""
+    """Index of the first sample in the motion."""
     states: Reals
     covariances: Reals
     innovations: Reals
@@ -177,7 +177,7 @@ def move_filter(
 ) -> int:
     """Advance ``at`` by up to ``count`` samples; return how many were done before a loss.
 
-    Tables after the first have one parameter changed by its deviation.
+    Each table after the first has one parameter changed by its deviation.
     """
     engine, first = native_engine(), tables[0]
     work = engine.new(
@@ -214,7 +214,7 @@ class Smoothed:
 
     first: int
     states: Reals
-    """Shape (samples, 8)."""
+    """States, shape (samples, 8)."""
     variances: Reals
     """Variances of p and of its rate, shape (samples, 2)."""
     forces: Reals

@@ -14,14 +14,14 @@ from ._tracking_model import STATES, VX, W, X, Y, Z, equations, exact_flow
 
 AHEAD_S = 0.04
 LEARNT_S = 0.15
-"""Length of motion for the model of the base [s]."""
+"""Length of motion to which the model of the base is fitted [s]."""
 _HARMONICS = 3
 _YIELDING = (X, VX, W)
 """States that act on the base: the specimen pushes the table through k0 and c0."""
 _BIN_S = 1e-3
 _WITHIN = 0.68
 _FEWEST, _MOST = 5, 40
-"""Number of newest forecasts used for the error."""
+"""Smallest and largest number of newest forecasts from which the error is found."""
 _NOT_MEASURED = 1e30
 """Variance of a missing sample."""
 
@@ -35,13 +35,13 @@ class Forecast(Labelled):
     first: int
     """Index of the first sample in the recording."""
     p: Reals
-    """[m]"""
+    """Relative displacement [m]."""
     error: Reals
-    """Error that 68 % of recent forecasts did not exceed at the same horizon [m]; NaN without any."""
+    """Error that 68 % of recent forecasts did not exceed at this horizon [m]; NaN if they are too few."""
 
 
 class Forecaster:
-    """Makes forecasts, and compares them with the track."""
+    """Forecasts of p, and their observed errors."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._bin = max(1, round(_BIN_S * sample_rate_hz))
@@ -88,7 +88,7 @@ class Forecaster:
         return np.asarray(np.repeat(np.maximum.accumulate(usual), self._bin))
 
     def compare(self, first: int, p: Reals) -> None:
-        """Compare forecasts with the track from sample ``first``, NaN where it was lost."""
+        """Compare forecasts with the tracked ``p`` from sample ``first`` on, NaN where the track was lost."""
         while self._pending and self._pending[0][0] + self._count <= first + p.size:
             begin, told = self._pending.popleft()
             if begin < first:
@@ -104,7 +104,7 @@ def _tones(turns: Reals) -> Reals:
 
 
 def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> MotionModel:
-    """Add the reaction of the specimen on the base, as found in the recording."""
+    """Return the model with the fitted reaction of the specimen on the base."""
     a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
     a[:, _YIELDING] += np.outer(base, weights)
     tables = model.tables

@@ -1,8 +1,7 @@
 """Parameters of a specimen from a colliding motion, with bounds.
 
-If the motion can be tracked with the description, it is only refined. Otherwise a start is found without a
-contact model: m1, springs and dampers from flights, gaps from impacts. Then all are found
-by tracking.
+If the motion can be tracked with the described parameters, these are only refined. Otherwise start values are
+found without a contact model: m1, springs and dampers from flights, gaps from impacts. Tracking refines them.
 """
 
 from collections.abc import Mapping
@@ -23,28 +22,28 @@ from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
-"""Length of each restart [s]."""
+"""Length of motion in each restart [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Number of restarts; in a short motion they overlap and differ by their starts."""
+"""Number of restarts; in a short motion their stretches overlap and only their start values differ."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
-"""Largest mean squared innovation of a description that is only refined."""
+"""Mean squared innovation of a track up to which the described parameters are only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts of gaps found without a contact model, in standard deviations, tried if no track holds."""
 _TOLD = 0.5
-"""Ratio to the standard deviation of the description above which the data add no information."""
+"""Largest standard deviation of a determined parameter, relative to that of the description."""
 _WIDE = 3.0
-"""Prior standard deviations of a description that replace a narrow prior."""
+"""Standard deviation of the wide prior that replaces a narrow one, relative to that of the description."""
 _FAR = 3.0
-"""Ratio to the narrow prior above which the search hardly determined a parameter."""
+"""Largest standard deviation of a determined parameter, relative to the narrow prior."""
 _SETTLED = 1.0
-"""Largest distance of a value from the start of the filter, in narrow priors."""
+"""Largest distance between a value without and with the narrow prior, in standard deviations of it."""
 _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
-"""Relative error of squared frequencies by the converter clock (50 ppm), which no recording shows."""
+"""Relative error of squared frequencies due to the converter clock (50 ppm), invisible in recordings."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
@@ -54,7 +53,7 @@ _ONE_SIDED_SD = {
 """Systematic error [SI] if m1 strikes one stop only: on 15 random dwells all gaps were 0.4 to 7 nm too
 small, for an unknown reason."""
 _STARTS_APART = 0.3
-"""Spread of the starts in prior standard deviations, so that memory of them shows as scatter."""
+"""Shift of start values in prior standard deviations, so that their influence shows as scatter."""
 
 
 _SHOWN = {
@@ -89,7 +88,7 @@ class FoundParameter:
     value: float
     low: float
     high: float
-    """95 % bounds from the scatter of restarts and their own uncertainties."""
+    """95 % bounds from the scatter of restarts and the uncertainty of each."""
     described: float
     not_determined: str = ""
     """Reason for a missing value; otherwise empty."""
@@ -205,7 +204,7 @@ def _refine(
 def _restarts(
     motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> list[Estimate] | str:
-    """Search several parts of a motion from different starts; return a sentence if too few held."""
+    """Search several parts of a motion from different starts; return a reason if too few kept their track."""
     stretches = _stretches(motion)
     good: list[Estimate] = []
     refused = ""
@@ -235,18 +234,18 @@ class _Combined:
     half: Reals
     """Half width of the bounds."""
     sd: Reals
-    """Standard deviation by the filter or by scatter."""
+    """Larger of the filter's standard deviation and the scatter of restarts."""
     assumed: Reals
-    """Standard deviation of a description."""
+    """Standard deviation of the description."""
     beyond: Reals
-    """Distance of the values from the filter's start."""
+    """Distance of the values from those with the narrow prior."""
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
     """Return the mean of restarts and its half width, from the larger of scatter and claimed uncertainty.
 
-    Restarts over the same samples are not independent, so their scatter shows the memory of their starts.
-    Larger scatter than claimed shows a wrong model, and is uncertain for few values.
+    Restarts over the same samples are not independent: their scatter shows the influence of start values.
+    A scatter above the claimed uncertainty shows a wrong model, and is itself uncertain for few restarts.
     """
     wanted = found[0].wanted
     centre = np.array([value_of(described, each) for each in wanted])
@@ -269,7 +268,7 @@ def combine(found: list[Estimate], described: TrackedSpecimen, independent: floa
 def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
     """Replace the narrow prior by a wide one; return values, claimed and likely variances.
 
-    The filter needs a narrow prior to keep its track. Weakly determined parameters would stay at the
+    The filter needs a narrow prior to keep its track. With it, weakly determined parameters would stay at the
     description, with bounds as narrow as the prior. In units of that prior the information of the motion is
     J = P^-1 - 1.
     """
@@ -304,7 +303,7 @@ def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) ->
 
 
 def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
-    """Return the parameters without values, with the reason ``why`` they are not the specimen's."""
+    """Return the parameters without their values, and ``why`` as the reason."""
     nan = float("nan")
     parameters = tuple(
         each if each.not_determined else replace(each, value=nan, low=nan, high=nan, not_determined=why)

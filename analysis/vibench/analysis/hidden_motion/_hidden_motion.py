@@ -35,9 +35,9 @@ from ._tracking_model import TrackedSpecimen, tracked_specimen
 
 MICRO = 1e6
 _LEAST_HELD = 0.95
-"""Least tracked share of the motion with correct parameters."""
+"""Smallest tracked share of a motion if the parameters are correct."""
 _HIGHEST_LEVEL = 1.25
-"""Largest mean squared innovation in flight with correct parameters; 0.8 to 1.1 are usual."""
+"""Largest mean squared innovation in flight if the parameters are correct; 0.8 to 1.1 are usual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class TrackedMotion(Labelled):
     p: Samples
     """Relative displacement y - z, shape (samples,) [m]."""
     rate: Samples
-    """"""
+    """Rate of p [m/s]."""
     p_sd: Samples
     """Standard deviation of p [m]."""
     collisions: Collisions
@@ -87,7 +87,7 @@ class HiddenMotion(Labelled):
     free_gaps: tuple[FreeGap | None, FreeGap | None]
     """Lower and upper gap without a contact model."""
     mass_checks: tuple[MassCheck, ...] = ()
-    """The track against sensors on m1 and m2, if recorded."""
+    """Checks of the track against sensors on m1 and m2, if recorded."""
 
     @property
     def time_s(self) -> Reals:
@@ -101,7 +101,7 @@ class HiddenMotion(Labelled):
 
     @property
     def is_confirmed(self) -> bool:
-        """Return whether the parameters were given or found; otherwise results have no bounds."""
+        """Return whether parameters were given or found, and no sensor refutes them; if not, omit bounds."""
         if any(each.confirms is False for each in self.mass_checks):
             return False
         return self.found is None or any(each.is_determined for each in self.found.parameters)
@@ -152,7 +152,7 @@ class HiddenMotion(Labelled):
 
 
 def finite(value: float) -> float | None:
-    """Return None for what JSON cannot hold."""
+    """Return the value, or None if it is not finite: JSON has no such numbers."""
     return value if np.isfinite(value) else None
 
 
@@ -166,17 +166,16 @@ def hidden_motion(
 ) -> HiddenMotion:
     """Estimate the relative motion of m1 and its collisions from base acceleration and m0's velocity.
 
-    Without a contact model, the force on m1 is an unknown and follows from the linear parameters. For
-    tracking, an extended Kalman filter and smoother use the seven relative states and the error of the
-    accelerometer, with exact flight. docs/hidden-motion.md has the
-    equations.
+    The method without a contact model estimates the force on m1 as an unknown, from the linear parameters.
+    Tracking uses an extended Kalman filter and a smoother with seven states of the motion and the error of
+    the accelerometer; flight is computed exactly. Equations: docs/hidden-motion.md.
 
     Parameters
     ----------
     recording
-        Any, with base acceleration and m0's velocity; sampled at 10 kHz or more, 51.2 kHz for its law.
+        Any with base acceleration and m0's velocity, at 10 kHz or more; finding the law needs 51.2 kHz.
     specimen
-        Description; m0, m2 and k1 are taken as exact, all else within some per cent. By default from the
+        Description; m0, m2 and k1 must be exact, the rest within some per cent. By default that in the
         recording.
     start_s, stop_s
         Stretch of the recording [s]; by default all of it.
@@ -235,7 +234,7 @@ def hidden_motion_in_samples(
     UnusableData
         When samples are not finite, or the rate is too low.
     NotEnoughData
-        When there are too few.
+        When there are too few samples.
     """
     acceleration, velocity = (np.asarray(each, dtype=np.float64) for each in (base_acceleration, m0_velocity))
     if acceleration.shape != velocity.shape or acceleration.ndim != 1:
@@ -257,7 +256,7 @@ def hidden_motion_of(
     observer: Observer = ignore_progress,
     masses: Sequence[MeasuredMass] = (),
 ) -> HiddenMotion:
-    """Apply both methods to a prepared motion, and check the track by sensors on other ``masses``."""
+    """Apply both methods to a prepared motion, and check the track by the sensors of ``masses``."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
     followed = _tracked_motion(motion, tracked, found, lambda sample: on_read(sample, motion.samples), masses)
@@ -356,7 +355,7 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
 
 
 def _gap_sd(found: FoundSpecimen | None) -> float:
-    """Return the uncertainty of p by that of the gaps, a quarter of the width of their bounds."""
+    """Return the standard deviation of p due to the gaps: a quarter of the width of their bounds."""
     if found is None:
         return 0.0
     gaps = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
@@ -403,7 +402,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     for parameter in motion.parameters:
         label, said, described = parameter.row
         if parameter.is_determined:
-            # A symbol keeps its case.
+            # Symbols such as m1 stay in lower case.
             begun = label if label[-1].isdigit() else f"{label[0].upper()}{label[1:]}"
             yield f"{begun}: {said} (described as {described})."
         else:

@@ -17,7 +17,7 @@ from ._parameters import Numbers
 LONGEST_VIEW_S = 2.0
 """Longest duration of a picture [s], computed in about one second."""
 _NUMBERS_SHOWN = 3
-"""Gaps and m1."""
+"""Number of shown parameters: both gaps and m1."""
 _LEAD_S = 0.15
 """Margin before and after the picture [s], to start a track and smooth its end."""
 
@@ -43,9 +43,9 @@ class HiddenView(Labelled):
     request: HiddenViewRequest
     time_s: Reals
     p: Samples
-    """Tracked, NaN without a track [m]."""
+    """Relative displacement by the tracked method, NaN without a track [m]."""
     free_p: Samples
-    """Without a contact model [m]."""
+    """Relative displacement without a contact model [m]."""
     stops_m: tuple[float, float]
     """Positions of the lower and the upper stop."""
     sentence: str

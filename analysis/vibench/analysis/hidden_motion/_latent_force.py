@@ -3,8 +3,8 @@
 Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum
 of m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held
 over each sample. In flight the force is zero: windows around its peaks are found first, then the force is
-set to zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858), so that the double integral
-of the second relation does not drift.
+set to zero elsewhere (switched variance, Rogers and Friis, arXiv 2303.03858). This keeps the double integral
+of the second relation from drifting.
 """
 
 from dataclasses import dataclass
@@ -23,17 +23,17 @@ _WINDOW_S = 6e-5
 """Half width of a window around a peak [s]."""
 _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
-"""Least peak relative to the first guess of the force."""
+"""Smallest peak relative to the first guess of the force."""
 CLOSED_SHARE = 3e-4
 """Standard deviation of the force between impacts, relative to the first guess."""
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
-"""Squared normalised innovation of an overlooked impact."""
+"""Squared normalised innovation above which an impact was overlooked."""
 _MEDIAN_OF_SQUARE = 0.455
-"""Median of square of a normal variable's square."""
+"""Median of the square of a standard normal variable."""
 _RERUNS = 3
 _START_UP_S = 4e-3
-"""Start-up time of the filter whose innovations are ignored [s]."""
+"""Start-up time of the filter, in which innovations are ignored [s]."""
 _START_SD = (1e-4, 0.3, 1.0, 0.5)
 """Initial standard deviations of displacements, velocities, W and B."""
 
@@ -47,7 +47,7 @@ class LatentMotion:
     is_open: Flags
     """Samples with a possible contact force."""
     is_dark: Flags
-    """Samples in drop-outs among these."""
+    """Open samples in or near drop-outs."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""
@@ -58,10 +58,10 @@ def latent_motion(
 ) -> LatentMotion:
     """Smooth ``count`` samples after sample ``first`` without a contact law.
 
-    A larger ``closed_share`` allows a force between impacts for wrong parameters of the specimen.
+    A larger ``closed_share`` allows more force between impacts, which tolerates wrong specimen parameters.
     """
     free = model.without_stops
-    # Guess the size of the force: m1 times the rms acceleration of m0.
+    # Guess the size of the force: m1 times three times the rms acceleration of m0.
     velocity = motion.velocity[first : first + count + 1].astype(np.float64)
     smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
     rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
@@ -88,7 +88,7 @@ def latent_motion(
 
 
 def latent_start(first: int) -> FilterState:
-    """Return the initial state after an unknown sample."""
+    """Return a wide initial state at sample ``first``, of which nothing is known."""
     place, rate, base, error = _START_SD
     return FilterState(first, np.zeros(STATES), np.diag([place**2] * 3 + [rate**2] * 3 + [base**2, error**2]))
 
@@ -119,7 +119,7 @@ def _start_up(sample_rate_hz: float, count: int) -> int:
 
 
 def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
-    """Open a window where an innovation shows a force just before."""
+    """Open a window just before every innovation that shows an overlooked impact."""
     squared = run.squared
     # Wrong parameters raise innovations everywhere; only outliers are impacts.
     usual = max(1.0, float(np.nanmedian(squared)) / _MEDIAN_OF_SQUARE)
@@ -132,7 +132,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
 
 
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
-    """Return the mean square force of each window, as in expectation maximisation."""
+    """Return the force variance: the mean square of each window, as in expectation maximisation."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
     begins, ends = edges[::2], edges[1::2]
     squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))

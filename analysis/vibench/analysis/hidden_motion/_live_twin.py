@@ -1,8 +1,8 @@
-"""Hidden motion during a measurement, with the same filter.
+"""Hidden motion during a measurement, with the filter that is also used afterwards.
 
 Correction filters (`_sensor_correction`) delay the motion by a third of a millisecond. A sample is used six
-samples later, when drop-outs are known. The
-accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
+samples later, when drop-outs are known. The filter also corrects the accelerometer's AC coupling. No
+function waits or sleeps.
 """
 
 import hashlib
@@ -45,9 +45,9 @@ from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 
 BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
-"""Mean time between false alarms, at least [s]."""
+"""Smallest mean time between false alarms [s]."""
 OUT_BY_CHANCE = 0.01
-"""Largest share of blocks outside without a change."""
+"""Largest share of blocks that are outside without a change."""
 _OUT_WHEN_CHANGED = 0.5
 _OUT_ADDS = math.log(_OUT_WHEN_CHANGED / OUT_BY_CHANCE)
 _IN_ADDS = math.log((1.0 - _OUT_WHEN_CHANGED) / (1.0 - OUT_BY_CHANCE))
@@ -55,7 +55,7 @@ THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
 """Number of blocks to learn the usual level."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is outside above this multiple of the usual level and this number of deviations."""
+"""A block is outside above this multiple of the usual level and this number of standard deviations."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
@@ -89,7 +89,7 @@ class Baseline(FrozenModel):
     numbers: Mapping[Hidden, KnownNumber]
     """Parameters found from collisions."""
     levels: Mapping[str, Level]
-    """Levels by excitation."""
+    """Usual levels, keyed by excitation."""
 
 
 def baseline_path(rig: Rig, specimen: Specimen) -> Path:
@@ -124,7 +124,7 @@ class ChangeWatch:
         self.has_changed = False
 
     def take(self, level: float) -> bool:
-        """Add a block, infinite without a track; return whether to raise the alarm."""
+        """Add the level of a block, infinite without a track; return whether to raise the alarm."""
         if self.usual is None:
             if math.isfinite(level):
                 self._learnt.append(level)
@@ -156,13 +156,13 @@ class LiveMotion(Labelled):
 
     state: LiveState
     why: str
-    """Reason if it is not tracked."""
+    """Reason if the motion is not tracked."""
     first: int
-    """Number in the recording of the first sample of ``p``."""
+    """Index in the recording of the first sample of ``p``."""
     p: Reals
     """Relative displacement, NaN without a track [m]."""
     forecast: Forecast | None
-    """Under a sine only."""
+    """Forecast of p; only under a sine."""
     gaps_m: tuple[float, float]
     level: float
     """Level of the last block; 1 if only noise remains."""
@@ -178,14 +178,14 @@ _LOOKED_S = 0.25
 _FIND_S = 2.4
 """Length of motion for finding parameters [s]."""
 _PATIENCE = 2.0
-"""Factor of the waiting time after a failed search."""
+"""Factor by which the waiting time grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
-"""Time between two attempts for a motion that does not fit [s]."""
+"""First and longest time between two attempts for a motion that does not fit [s]."""
 _CLIPPED = 25.0
-"""Clipping of squared innovations, so that one late impact is not a change."""
+"""Upper limit of squared innovations, so that one late impact does not count as a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
 _APART = 3.0
-"""Difference of two parameters that counts as a change, in root-sum-square half widths."""
+"""Change of a parameter that is reported, relative to the root sum square of both half widths."""
 
 
 class LiveTwin:
@@ -203,23 +203,23 @@ class LiveTwin:
         specimen: Specimen | None = None,
         known: dict[Hidden, KnownNumber] | None = None,
     ) -> None:
-        """Begin.
+        """Begin without samples.
 
-        Raises InvalidRequest when its stops cannot be tracked; UnusableData when the bench lacks one of the
-        two channels.
+        Raises InvalidRequest when the specimen's stops cannot be tracked; UnusableData when the bench lacks
+        one of the two channels.
 
         Parameters
         ----------
         rig
             The bench with its sensors, and the default specimen.
         sample_rate_hz
-            Of both channels.
+            Sample rate of both channels.
         executor
             Runs the search for parameters (one second of computing) during tracking.
         specimen
             Description of the specimen.
         known
-            Parameters of its baseline, which replace the described ones.
+            Parameters of the specimen's baseline, which replace the described ones.
         """
         channels = {each.role.value: each for each in channels_of(rig)}
         require_channels(rig.name, tuple(channels))
@@ -309,7 +309,7 @@ class LiveTwin:
         Parameters
         ----------
         first_sample
-            Index of the first one in the recording.
+            Index in the recording of the first sample.
         acceleration, velocity
             Acceleration of the base [m/s2] and velocity of m0 [m/s], shape (samples,).
         frequency_hz
@@ -357,7 +357,7 @@ class LiveTwin:
             self._at.sample -= surplus
 
     def _follow(self, said: list[str]) -> None:
-        """Track up to the newest sample, in blocks of the test for changes."""
+        """Track up to the newest sample, and test every complete block for changes."""
         motion = self._motion
         while True:
             if self._at is None:
@@ -376,7 +376,7 @@ class LiveTwin:
         first = motion.samples - 2 - window
         if first < self._looked:
             return
-        # A third of the window is new, so its middle third, where a track starts, is new too.
+        # The next attempt is a third of a window later, so its middle third, where a track starts, is new.
         self._looked = first + max(window // 3, self._pause)
         part = slice(max(0, motion.samples - round(_NOISE_S * self._rate)), None)
         if motion.samples < 2 * window:
@@ -432,13 +432,13 @@ class LiveTwin:
                 f"numbers (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
-            # A running search uses samples from before the change.
+            # Drop a running search, because it uses samples from before the change.
             self._finding = None
             self._wait = round(_FIND_S * self._rate)
             self._find_at = self.next_sample + self._wait
 
     def _find(self, said: list[str]) -> None:
-        """Start a search for gaps and masses in the stored motion, beside tracking."""
+        """Take a finished search for gaps and masses; start the next one in parallel with tracking."""
         if self._finding is not None and self._finding.done():
             finding, self._finding = self._finding, None
             self._take_found(finding.result(), said)

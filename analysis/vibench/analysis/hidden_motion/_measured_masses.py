@@ -1,4 +1,4 @@
-"""Check of a track by sensors on m1 or m2, whose motion the track contains."""
+"""Check of a track by sensors on m1 or m2."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,26 +19,26 @@ from ._tracking_model import VY, VZ, W
 
 _RATES = {"m1": VY, "m2": VZ}
 _MOST_EXCESS = 1.25
-"""Largest mean square of the deviation over its expected one, as for the innovations of a track."""
+"""Largest ratio of the mean squared deviation to the expected one, as for a track's innovations."""
 _ALLOWED = 0.02
-"""Part of a motion that coupling, alignment and further modes of a sensor's place may change."""
+"""Allowed relative deviation due to mounting, alignment and local modes at the sensor."""
 _MOST_EXPECTED = 0.2
-"""Largest expected deviation with a verdict; blows are noise to an accelerometer on a mass that collides."""
+"""Largest expected deviation for a verdict; for an accelerometer on a colliding mass, blows are noise."""
 _MOST_SCALE = 0.05
-"""Largest deviation of the scale from 1, some per cent for the calibrations of both sensors."""
+"""Largest deviation of the scale from 1: both calibrations may be wrong by some per cent."""
 
 
 @dataclass(frozen=True)
 class MassCheck:
-    """Measured velocity of a mass against the track."""
+    """Comparison of a mass's measured velocity with the track."""
 
     channel: str
     scale: float
-    """Measured over tracked velocity."""
+    """Ratio of measured to tracked velocity."""
     unexplained: float
-    """Part of the measured velocity that the track leaves, as rms."""
+    """Part of the measured velocity that the track does not explain (rms)."""
     expected: float
-    """Part that noise, the track's uncertainty and the sensor's place may leave."""
+    """Unexplained part to be expected from noise, the track's uncertainty and the sensor's mounting."""
 
     @property
     def confirms(self) -> bool | None:
@@ -60,23 +60,23 @@ class MassCheck:
 
 @dataclass
 class MeasuredMass:
-    """A sensor on m1 or m2 over the samples of a motion; adds up the pieces of a track."""
+    """A sensor on m1 or m2 over the samples of a motion, compared with the pieces of a track."""
 
     channel: str
     velocity: Reals
     """Measured velocity [m/s], shape (samples,); NaN where it is not known."""
     noise: float
-    """Rms [m/s]."""
+    """Rms noise [m/s]."""
     _sums: Reals = field(default_factory=lambda: np.zeros(5))
 
     def add(self, piece: TrackedPiece) -> None:
-        """Compare with a piece outside of collisions, at which a converter's filter rings."""
+        """Add a piece, without the samples near collisions, where a converter's filter rings."""
         measured = self.velocity[piece.first : piece.stop]
         touched = maximum_filter1d(piece.smoothed.touched.astype(np.uint8), 2 * HALF_LENGTH + 1)
         used = np.isfinite(measured) & (touched == 0)
         places = [_RATES[self.channel[:2]], W]
         tracked = piece.smoothed.states[used][:, places].sum(axis=1)
-        # Before a sample is used; the smoother knows the states better.
+        # This is the variance of the filter's predictions; the smoother's is smaller.
         variance = piece.run.covariances[used][:, places][:, :, places].sum(axis=(1, 2))
         measured = measured[used]
         self._sums += (

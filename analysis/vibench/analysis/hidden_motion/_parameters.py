@@ -24,7 +24,7 @@ class Hidden(StrEnum):
     EXPONENT = "contact_exponent"
     LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
-    """Mean gap of both sides, which statistics determine better than either."""
+    """Mean gap of both sides, which statistics determine better than either gap."""
 
 
 class Search(NamedTuple):
@@ -37,7 +37,7 @@ class Search(NamedTuple):
     near: float
     """Prior standard deviation about a description that can be tracked."""
     least_sd: float = 0.0
-    """Prior standard deviation about a value found without a contact model."""
+    """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
     """Ratio of actual errors to the filter's standard deviation; the random walk makes it smaller than 1.
     Found on 31 random rigs; the slow tests check others."""

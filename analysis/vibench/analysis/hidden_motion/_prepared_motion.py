@@ -1,4 +1,4 @@
-"""Motion of base and m0 corrected for their sensors, with its noise."""
+"""Motion of base and m0 corrected for their sensors, and the noise of both channels."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -14,18 +14,18 @@ from ..signals.arrays import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
-"""Band relative to the sample rate without motion but within the converter's pass band."""
+"""Bands, relative to the sample rate, in the converter's pass band but above any motion."""
 _SEGMENT = 1024
 _MOST_SEGMENTS = 4096
-"""Samples for estimating noise, spread over a long motion: 80 s at 51.2 kS/s."""
+"""Most segments for estimating noise, spread over a long motion: 80 s at 51.2 kS/s."""
 _PIECE = 1 << 19
 """Samples corrected at once."""
 _LEAST_NOISE = 1e-6
 """Least noise relative to the signal, because a filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
-"""Median over mean of a periodogram's line of white noise, exponentially distributed."""
+"""Median over mean of a periodogram line of white noise, which is exponentially distributed."""
 _DARK_MARGIN = 8
-"""Samples on each side of a drop-out with a weight above 1 % in a corrected sample."""
+"""Samples on each side of a drop-out that the correction filter mixes with it (weight above 1 %)."""
 LOWEST_RATE_HZ = 10_000.0
 """Lowest sample rate [Hz] at which collisions of 0.05 ms are visible."""
 
@@ -37,9 +37,9 @@ class ChannelNoise:
     OWN_UNITS: ClassVar = {"acceleration": "m s-2", "velocity": "m s-1"}
 
     acceleration: float
-    """[m/s2]"""
+    """Noise of the base acceleration [m/s2]."""
     velocity: float
-    """[m/s]"""
+    """Noise of m0's velocity [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class PreparedMotion:
     sample_rate_hz: float
     coupling_rad_per_s: float
     first_sample: int
-    """Number in the recording of the first sample here."""
+    """Index in the recording of the first sample."""
     noise: ChannelNoise
 
     @property

@@ -13,12 +13,12 @@ from ..recordings.channels import SensedChannel, sensor_gain
 from ..signals.arrays import Complexes, Reals
 
 HALF_LENGTH = 16
-"""Samples on each side for a corrected one: a third of a millisecond at 51.2 kS/s."""
+"""Samples on each side that a corrected sample needs: a third of a millisecond at 51.2 kS/s."""
 _EXACT_BAND = 0.42
-"""Fraction of the sample rate up to which the correction is fitted; a converter passes 0.45."""
+"""Fraction of the sample rate up to which the correction is fitted; converters pass up to 0.45."""
 _FIT_POINTS = 400
 _REST_WEIGHT = 1e-3
-"""Weight above the band, which only limits the gain."""
+"""Weight of the fit above this band; it only limits the gain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class SensorCorrection:
     """Filters for both channels, and the AC coupling for the tracker."""
 
     acceleration: Reals
-    """Weights, shape (2 HALF_LENGTH + 1,); corrected for linear interpolation between samples as well."""
+    """Weights, shape (2 HALF_LENGTH + 1,), which also compensate for linear interpolation of samples."""
     velocity: Reals
     coupling_rad_per_s: float
     """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""

@@ -26,18 +26,18 @@ ACQUISITION_S = 0.06
 _WORST_MISFIT = 3.0
 """Largest misfit of an acquisition that may start a track."""
 _ACQUIRED_EXCESS = 4.0
-"""Factor on the acquired covariance, because the filter uses the same samples again."""
+"""Factor on the covariance after acquisition, because the filter uses the same samples again."""
 _FLIGHT_MARGIN_S = 8e-5
-"""Least length of flight on each side of the first sample [s]."""
+"""Shortest flight on each side of the first sample of a track [s]."""
 _PIECE_S = 0.25
-"""Samples filtered and smoothed at once."""
+"""Length filtered and smoothed at once [s]."""
 _OVERLAP_S = 0.02
-"""Samples filtered beyond a piece so that its end is smoothed too, several memory times."""
+"""Length filtered beyond a piece, so that its end is smoothed too [s]; several times the filter's memory."""
 _GOOD = 2.5
-"""Largest mean squared innovation over `_LOOK_S` of the valid part of a lost track."""
+"""Largest mean squared innovation over `_LOOK_S` in the valid part of a lost track."""
 _LOOK_S = 4e-3
 _WORST_SD_OF_GAP = 0.1
-"""Largest standard deviation of a track relative to the gap."""
+"""Largest standard deviation of p at the start of a track, relative to the gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,12 @@ class TrackedPiece:
 
     @property
     def first(self) -> int:
-        """Number in the motion of the first sample."""
+        """Index of the first sample in the motion."""
         return self.smoothed.first
 
     @property
     def stop(self) -> int:
-        """One past the last."""
+        """Index after the last sample."""
         return self.first + int(self.smoothed.states.shape[0])
 
 
@@ -190,7 +190,7 @@ def _join_runs(one: Filtered, other: Filtered) -> Filtered:
 
 
 def reliable_samples(run: Filtered, sample_rate_hz: float) -> int:
-    """Return the number of valid samples before a loss, where innovations were last good."""
+    """Return the number of samples in a lost run up to the last good innovations."""
     squared = run.squared
     used = ~np.isnan(squared)
     width = max(1, round(_LOOK_S * sample_rate_hz))

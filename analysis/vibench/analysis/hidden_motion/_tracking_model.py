@@ -31,7 +31,7 @@ class TrackedSpecimen:
 
     specimen: Specimen
     force_at_1um_n: float
-    """f, without a parallel spring of the law."""
+    """f; a parallel spring of the law is not included."""
     exponent: float
     loss_s_per_m: float
     """chi; a search may find a negative value within its bounds."""
@@ -43,7 +43,7 @@ class TrackedSpecimen:
 
 
 def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
-    """Take a specimen as described; raises InvalidRequest when its contact law has no stops that yield."""
+    """Return a described specimen for tracking; raises InvalidRequest when its stops do not yield."""
     match specimen.contact:
         case RigidStops() | PowerLaw():
             raise InvalidRequest(
@@ -62,9 +62,9 @@ class StepTables:
     """Tables of a specimen for the filter."""
 
     flow: Reals
-    """Shape (8, 10): state, acceleration and its rise -> state one sample later, without stops."""
+    """Map from state, acceleration and its rise to the state a sample later, without stops; shape (8, 10)."""
     small_flow: Reals
-    """The same for one small step."""
+    """The same map for one small step."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
@@ -98,7 +98,7 @@ def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Rea
 
 
 def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
-    """Return the one-step map from state, input and its linear rise, shape (n, n + 2)."""
+    """Return the map of one step from state, input and the input's linear rise, shape (n, n + 2)."""
     n = len(a)
     joint = np.zeros((n + 2, n + 2))
     joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s
