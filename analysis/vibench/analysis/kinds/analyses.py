@@ -28,4 +28,4 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
     },
     PlugInKind.ANALYSIS,
 )
-"""Analyses by the kind of a plan; families in the order in which a report shows them."""
+"""Analyses, keyed by the kind of excitation; families are in the order of a report."""

@@ -1,4 +1,4 @@
-"""What a result is, and what must be known of a kind of excitation to get one."""
+"""Result of an analysis, and the functions that a kind of excitation needs for it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ SteppedSineResult: TypeAlias = Result[SteppedSineAnalysis, SteppedSineOverlay]
 
 @dataclass(frozen=True)
 class AnalysisKind(Generic[P, A, L]):
-    """How recordings of one kind of excitation are analysed: plan, analysis and overlay belong together."""
+    """Functions that analyse recordings of one kind of excitation."""
 
     family: str
     """Name of the results in JSON; kinds with equal results share it."""
@@ -64,4 +64,4 @@ class AnalysisKind(Generic[P, A, L]):
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
     """Return uncertainty budgets of the main results."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()
-    """Sorts the results of a family, weak to strong; without it they stay in the order given."""
+    """Return the key that sorts the results of a family, weak to strong; by default they are not sorted."""

@@ -70,7 +70,7 @@ def _noise(
 
 
 def _estimate_for_draws(analysis: NoiseAnalysis) -> Estimate:
-    """Return the estimate for draws: their drive is the recorded one, whose periods were measured with it."""
+    """Return the estimator for draws; they have the recorded drive, so its repetitions are known."""
     found = analysis.response
     if found.periodic is None or found.left_out:
         return repeated_response

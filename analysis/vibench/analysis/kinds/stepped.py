@@ -41,7 +41,7 @@ def stepped_analysis(
     label: SegmentLabel = SegmentLabel.STEP,
     result: type[SteppedSineAnalysis] = SteppedSineAnalysis,
 ) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
-    """Return the analysis of a kind that records step after step, with a label for the kind."""
+    """Return the analysis of a kind that records each step in a segment called ``label``."""
 
     def analyse(
         facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest

@@ -29,7 +29,7 @@ from .analysis_kind import AnalysisKind
 def _analyse(
     facts: RecordingFacts, channels: Channels, plan: Sweep, _: FrequencyResponseRequest
 ) -> SweepAnalysis:
-    # The linear run predicts m0 alone; collisions of another mass are found without it.
+    # The linear simulation predicts only m0; for a sensor on another mass, collisions are found without it.
     specimen = known_specimen(facts.bench) if facts.mass == "m0" else None
     response, picture = measured_sweep(channels, plan, specimen)
     colliding = collisions(response)
