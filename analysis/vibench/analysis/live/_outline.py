@@ -1,9 +1,8 @@
-"""Outline of a signal for drawing, also when a column of the picture is shorter than a period.
+"""Outline of a signal for drawing.
 
-Plain extremes per column would beat with the period there: the outline of a steady sine would look like a
-comb. Each column therefore takes the extremes of a whole period around it. Where a period spans many
-columns, the waveform is drawn; where a column contains a whole period, its extremes are. No extreme is ever
-lost.
+If a column of the picture is shorter than a period, its extremes beat with the period: the outline of a
+steady sine would look like a comb. Such a column takes the extremes of a whole period around it. If a period
+spans many columns, the waveform is drawn; if a column contains a whole period, its own extremes are drawn.
 """
 
 from collections.abc import Callable, Sequence
@@ -99,7 +98,7 @@ def zigzag(low: Reals, high: Reals) -> Reals:
 LEGIBLE_COLUMNS = 6.0
 """Periods of at least this many columns are drawn as a waveform."""
 _MARGIN = 1.25
-"""Number of periods around a column, since the period of a sweep changes."""
+"""Number of periods over which a column takes extremes; above 1, as the period of a sweep changes."""
 _CLEAR = 0.25
 """Hysteresis of zero crossings, as a share of the typical amplitude."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
@@ -107,7 +106,7 @@ _BLOCKS, _LEAST_COLUMNS = 32, 24
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
-    """Reduce signals to their edges, column by column; shapes and columns are those of `envelope`.
+    """Reduce signals to lower and upper edges, column by column, with the columns of `envelope`.
 
     Parameters
     ----------
@@ -132,7 +131,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
-    """Return the period at each column, in columns; 1 where the edges stay unchanged."""
+    """Return the number of columns whose extremes each column takes; 1 leaves its edges unchanged."""
     low, high = edges
     count = low.size
     blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))
@@ -146,7 +145,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Assign the period of each stretch [columns] to its columns; the longer one wins at borders."""
+    """Return the reach of each column: the longest period [columns] of its stretch and both neighbours."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")
@@ -218,7 +217,7 @@ class Picture:
     time_s: Reals
     """Left edge of each column, since the first sample, shape (columns,)."""
     low: Samples
-    """Shape (channels, columns), in the channels' units; NaN where all samples were lost."""
+    """Lower edges, shape (channels, columns), in the channels' units; NaN where all samples were lost."""
     high: Samples
     samples_per_column: float
     """Samples per column; 1 if the samples themselves are shown."""

@@ -27,7 +27,7 @@ class Portrait(Labelled):
     drive_hz: float
     orbit_displacement_m: Reals
     orbit_velocity_m_per_s: Reals
-    """Shape (samples,)."""
+    """Displacement and velocity of the orbit, shape (samples,)."""
     strobe_displacement_m: Reals
     strobe_velocity_m_per_s: Reals
     """Points at the maxima of the drive, a cosine; shape (periods,)."""
@@ -51,7 +51,7 @@ def portrait(
     window
         Samples in physical units, about `portrait_samples` of them.
     delay_s
-        By how much the response channel lags the drive channel.
+        Lag of the response channel behind the drive channel.
     quantity
         Quantity of the response's channel.
     """
@@ -109,10 +109,10 @@ class PoincareSection:
 
     @property
     def displacement_m(self) -> Reals:
-        """Shape (points,)."""
+        """Displacement of the points, shape (points,)."""
         return self._displacement_m
 
     @property
     def velocity_m_per_s(self) -> Reals:
-        """Shape (points,)."""
+        """Velocity of the points, shape (points,)."""
         return self._velocity_m_per_s

@@ -15,13 +15,13 @@ class RingWindow:
     """Consecutive samples that end with the newest."""
 
     first_sample: int
-    """Number of the first sample since the start of the run."""
+    """Index of the first sample since the start of the run."""
     values: Values
     """Shape (channels, samples); a view that the next samples overwrite; lost samples are NaN."""
 
     @property
     def stop_sample(self) -> int:
-        """One past the newest."""
+        """Index after the newest sample."""
         return self.first_sample + int(self.values.shape[1])
 
 
@@ -40,7 +40,7 @@ class Ring:
         self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)
         self._begun: int | None = None
         self.next_sample = 0
-        """Number of the next sample."""
+        """Index of the next sample."""
 
     @property
     def held(self) -> int:
@@ -70,7 +70,7 @@ class Ring:
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
-        """Return the samples from a number on, as far as they are still available."""
+        """Return the samples from an index on, as far as they are still available."""
         return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

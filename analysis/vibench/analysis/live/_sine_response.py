@@ -14,11 +14,11 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Least share of the power in the strongest line and its neighbours if the drive is a sine."""
+"""Smallest share of the power that a sine has in its strongest line and the neighbours."""
 _NEIGHBOURS = 3
 """Lines on each side that belong to a sine under a Hann window, also if its frequency changes slowly."""
 _LEAST_LINE = 4
-"""Least number of periods, so that the line is clear of the offset's line."""
+"""Fewest periods in a stretch, so that the sine's line is clear of the offset's."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class DriveTone:
     """Sine in a short stretch of the drive."""
 
     frequency_hz: float
-    """Frequency, for a sweep in the middle of the stretch."""
+    """Frequency; that of a sweep in the middle of the stretch."""
     amplitude: float
     """Peak [unit of the channel]."""
 
@@ -40,7 +40,7 @@ def _hann(samples: int) -> Reals:
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
     """Find the sine in a short stretch of the drive, shape (samples,); None if it is not a sine.
 
-    Between two lines of a Hann spectrum the ratio of the two largest gives the place exactly
+    The ratio of the two largest lines of a Hann spectrum gives the exact frequency between them
     (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
     """
     if drive.size < 2 * _LEAST_LINE:
@@ -96,9 +96,9 @@ _STRETCH_PERIODS = 25
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Share of its amplitude that the drive keeps along a stretch, unless it is ramped down."""
+"""Smallest ratio of the drive's amplitudes at the end and start of a stretch; less means a ramp down."""
 _STEEPEST_POWER = 2
-"""The voltage of a sweep follows at most the square of its frequency (constant displacement)."""
+"""Largest power of the frequency that the voltage of a sweep follows (constant displacement)."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class SinePoint:
     """A0, amplitude of the base displacement at the drive frequency."""
     lower: float
     upper: float
-    """Largest and smallest response velocity [m/s]."""
+    """Smallest and largest response velocity [m/s]."""
     response_i: float
     """Largest abs(x) over A0."""
     response_ii: float
@@ -179,7 +179,7 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
 
 
 def _point(stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity) -> SinePoint | None:
-    """Return frequency, amplitudes and extremes of one stretch, since they change together in a sweep."""
+    """Return a point with all quantities from one stretch, since they change together in a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz

@@ -36,9 +36,9 @@ class SpectrumSettings:
     """Settings of the averages."""
 
     segment_samples: int = 8192
-    """At 51.2 kS/s: lines 6.25 Hz apart."""
+    """Length of a segment; at 51.2 kS/s, lines are 6.25 Hz apart."""
     averages: int = 24
-    """Number of segments; older ones are dropped."""
+    """Number of averaged segments; older ones are dropped."""
     overlap: float = 0.5
 
     def __post_init__(self) -> None:
@@ -58,7 +58,7 @@ class LiveSpectrum(Labelled):
     amplitude_density: Reals
     """Shape (channels, lines) [unit of the channel / sqrt(Hz)]."""
     n_eff: float
-    """Independent averages."""
+    """Number of independent averages."""
 
 
 DEFAULT_SETTINGS = SpectrumSettings()
@@ -86,7 +86,7 @@ class LiveSpectra:
         self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
-        """Number of completed segments; changes when there is something new."""
+        """Number of completed segments; a change shows that results are out of date."""
 
     def add(self, values: Values) -> None:
         """Add the next samples, shape (channels, samples)."""
@@ -147,9 +147,9 @@ class LiveSpectra:
         quantity
             Quantity of the response's channel.
         low_hz, high_hz
-            The band.
+            Ends of the band.
         delay_s
-            By how much the response channel lags the base channel.
+            Lag of the response channel behind the base channel.
         """
         used = self._used()
         if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
@@ -198,7 +198,7 @@ class LiveSpectra:
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
-"""Hann width of a line under a Hann window, at half power, times the length of the window."""
+"""Width of a line under a Hann window, at half power, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
 """Ratio of the visible range to the segment length, within the limits above."""
 _LOG_ROWS = 300

@@ -37,15 +37,15 @@ _CONTACT_S = 30e-6
 _APART_S = 100e-6
 """Kinks closer than this are counted as one."""
 _LEAST_FRESH_S = 20e-3
-"""Fewest samples to estimate the noise."""
+"""Shortest stretch to estimate the noise [s]."""
 _MOST_FRESH_S = 0.1
 """Longer data are processed in pieces of this length."""
 _NOISE_FACTOR = 5.2
-"""Threshold over the standard deviation: one false impact by noise in two minutes."""
+"""Threshold in standard deviations of the noise: one false impact by noise in two minutes."""
 _SMOOTH_FACTOR = 3.0
-"""Threshold over the residual of a sine at the motion's mean frequency."""
+"""Threshold relative to what the filter passes of a sine with the motion's mean frequency."""
 _REST_SHARE = 0.2
-"""Least share of a neighbouring kink; anything smaller is a residual of subtracting that one."""
+"""Smallest kink relative to a stronger neighbour; smaller ones are residuals of that neighbour."""
 _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Noise gain of the sixth difference, for white noise."""
@@ -148,7 +148,7 @@ def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
 
 
 MOST_POINTS = 36_000
-"""One hour at ten points per second; the oldest are dropped."""
+"""Most points, one hour at ten points per second; the oldest are dropped."""
 _COLUMNS = tuple(each.name for each in fields(SinePoint))
 
 
@@ -179,7 +179,7 @@ class SweepTrace:
         return self._end - self._begin
 
     def add(self, point: SinePoint) -> None:
-        """Keep one more."""
+        """Add a point; the oldest one is dropped when the memory is full."""
         if self._end == self._rows.shape[1]:
             self._rows[:, : self.points] = self._rows[:, self._begin : self._end].copy()
             self._begin, self._end = 0, self.points
@@ -215,7 +215,7 @@ class TimeHistories:
     time_s: Reals
     """Left edge of each column since the start of the run, shape (columns,)."""
     low: Samples
-    """Shape (channels, columns), in the channels' units; lost samples are NaN."""
+    """Lower edges, shape (channels, columns), in the channels' units; lost samples are NaN."""
     high: Samples
 
 
@@ -225,11 +225,11 @@ class LiveView:
     Parameters
     ----------
     channels
-        In the order of the samples.
+        Channels in the order of the samples' rows.
     band_hz
-        Excited band: transmission is shown in it, and no drive is searched below.
+        Excited band: transmission is shown in it, and the drive is not searched below it.
     delay_s
-        By how much the response channel lags the base channel.
+        Lag of the response channel behind the base channel.
     lead_in_s
         Start-up time, in which no sweep points and no Poincaré points are taken.
     """
@@ -245,7 +245,7 @@ class LiveView:
         settings: SpectrumSettings = DEFAULT_SETTINGS,
     ) -> None:
         self.channels = tuple(channels)
-        """In the order of the time histories."""
+        """Channels in the order of the time histories."""
         self._rate_hz = sample_rate_hz
         self._band_hz = band_hz
         self._delay_s = delay_s
@@ -263,14 +263,14 @@ class LiveView:
         self._trace = SweepTrace()
         self._pointed = 0
         self.section = PoincareSection()
-        """The Poincaré points of all portraits so far."""
+        """Poincaré points of all portraits so far."""
         self._portrait: tuple[int, Portrait | None] = (-(10**12), None)
         self._frequency_response: tuple[int, FrequencyResponse | None] = (0, None)
         self._spectrum: tuple[int, LiveSpectrum | None] = (0, None)
 
     @property
     def next_sample(self) -> int:
-        """Number of the next sample to add."""
+        """Index of the next sample to add."""
         return self._ring.next_sample
 
     def add(self, first_sample: int, volts: NDArray[np.float32]) -> None:
