@@ -38,16 +38,16 @@ _FRAME_SAMPLES = 1 << 15
 _BATCH_FRAMES = 16
 """Frames per batch, about 10 MB."""
 _LEVEL_LINES = 256
-"""Lines for the noise level, whose median is robust against lines of the drive."""
+"""Number of lines whose median is the noise level; a few lines of the drive hardly change it."""
 _SURELY = 20.0
-"""Power of a line over the noise level that noise exceeds once in 5e8 lines."""
+"""Power of a line relative to the noise level, which noise exceeds once in 5e8 lines."""
 
 
 class PlayedVoltage:
     """A recorded voltage without converter noise, as far as possible.
 
     Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each frame
-    and line a Wiener filter keeps the likely part, and the uncertain rest is drawn. Draws therefore scatter
+    and line a Wiener filter keeps the likely part, and the uncertain rest is drawn at random. Draws scatter
     by the uncertainty of the voltage, and their power excludes the converter noise.
     """
 
@@ -63,7 +63,7 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the likely voltage and the roots of the recorded shares by line, in batches."""
+        """Return the likely voltage, and in batches the square root of the kept share of each line."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
         # Synthesis window, with which half-overlapping frames add up to the signal.
@@ -97,7 +97,7 @@ class PlayedVoltage:
         """Return a random voltage compatible with the recording, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
-        # The unknown part is independent between frames, so fading keeps its power.
+        # Unknown parts of frames are independent, so fading by the root of the window keeps the power.
         fade = np.sqrt(self._window, dtype=np.float32)
         size = np.float32(self._own_v * np.sqrt(self._hop))
         roots = iter(self._roots)
@@ -127,15 +127,15 @@ class PlayedVoltage:
 DRAWS = 16
 """Number of draws of a colliding motion, which determine its 95 % band to a fifth of its width."""
 FIRST_DRAWS = 8
-"""Fewer draws, sufficient for clear agreement or without collisions."""
+"""Number of draws that is enough for clear agreement or without collisions."""
 _FURTHER_DRAWS = 4
-"""Draws between two checks whether they are enough."""
+"""Number of draws between two checks of whether there are enough."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position."""
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Time before a stretch, with fades in and out [s]."""
+"""Lead-in before a stretch, its fade-in, and the faded tail after the stretch [s]."""
 _NOISE = 0.15
 """Logarithmic uncertainty of a channel's noise from its quietest stretch."""
 _MORE = 3
@@ -189,7 +189,7 @@ class Draw(Generic[R]):
     """One draw, analysed like the recording."""
 
     response: Callable[[], R]
-    """Complete the estimate; comparisons need only the quantities."""
+    """Function that completes the estimate; comparisons need only the quantities."""
     quantities: tuple[Quantity, ...]
     endings: tuple[Ending, ...]
     impacts: float
@@ -233,7 +233,7 @@ def voltage_source(
     Parameters
     ----------
     recording
-        Whose bench configuration describes the rig.
+        Recording; its bench configuration describes the rig.
     fitted
         A shaker instead of the described one; each draw varies it within its uncertainty.
     draws
@@ -298,7 +298,7 @@ def drawn(
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
             if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
-                # A request for more than the default is for narrower bands, so all are made.
+                # More draws than the default are requested for narrower bands, so all are made.
                 len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
             ):
                 break
@@ -364,7 +364,7 @@ def _moved(
 
 
 def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np.random.Generator) -> Samples:
-    """Add noise of a channel as an analysis reads it, in place."""
+    """Add the noise that an analysis reads from a channel, in place."""
     first = 0
     for block in noise_as_read(role, rate_hz, samples.size, _BLOCK, rng):
         samples[first : first + block.size] += np.float32(rms) * block
@@ -384,9 +384,9 @@ class StretchDraws:
     fitted: FittedShaker | None
     noise: ChannelNoise
     volts: Reals
-    """Without the noise of its channel."""
+    """Recorded voltage without the noise of its channel."""
     first: int
-    """First sample in the recording."""
+    """Index in the recording of the first of ``volts``."""
     kept: slice
     """The stretch within ``volts``."""
 
@@ -424,8 +424,8 @@ def stretch_draws(
 
     At the end of the recording the stretch ends slightly earlier.
 
-    Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is not a velocity,
-    because the noise of an integrated channel is not white.
+    Raises UnusableData when samples were lost, the shaker is unknown, or m0's channel is not a velocity:
+    the noise of an integrated channel is not white.
     """
     if VELOCITY not in recording.roles:
         raise UnusableData(

@@ -55,9 +55,9 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
     Parameters
     ----------
     recording
-        Recording with the amplifier's output, otherwise with the generator's.
+        Recording of the amplifier's output; without it, the generator's is used.
     specimen
-        On the table.
+        Specimen on the table.
     shaker
         Fitted parameters; by default those of the bench configuration.
     """
@@ -88,13 +88,13 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
 
 
 def carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
-    """Return the apparent mass: momentum of the masses over the base velocity, without contact [kg]."""
+    """Return the apparent mass without contact: momentum of the masses divided by the base velocity [kg]."""
     moved = base_transmissibility(specimen, frequency_hz)[:, :3]
     return np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
 
 
 def acceleration_per_volt(shaker: Shaker, s: Complexes, carried_kg: Complexes) -> Complexes:
-    """Return the base's acceleration over the coil's voltage at s = i omega [m/s2/V]."""
+    """Return the base's acceleration per coil voltage at s = i omega [m/s2/V]."""
     dynamic = (
         shaker.suspension_stiffness_n_per_m
         + shaker.suspension_damping_ns_per_m * s

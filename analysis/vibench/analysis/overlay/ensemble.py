@@ -16,16 +16,16 @@ from ..signals.arrays import Flags, Integers, Reals
 from ..tables import Labelled
 
 AGREEMENT = 0.99
-"""Share of agreeing twins within the limit, for any number of compared values."""
+"""Share of agreeing twins with all values within the limit, for any number of values."""
 BAND = 0.95
 MIXED = -1
 """State of a value with a mixture of motions, which is not compared."""
 FEWEST_DRAWS = 5
 """Fewest draws of one kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the normal limit; values within it after half of the draws will stay within the limit."""
+"""Share of the normal limit; if values are within it after half of the draws, more draws change nothing."""
 _FEWEST_POINTS = 30
-"""Fewest values for which the largest of a draw follows Gumbel's distribution."""
+"""Fewest values of a draw for which the largest |z| follows Gumbel's distribution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +33,10 @@ class Quantity:
     """Positive values of one kind, from one estimate; arrays of shape (points,)."""
 
     name: str
-    """``"Response II"``, ``"band around 201 Hz"``."""
+    """Name, such as ``"Response II"`` or ``"band around 201 Hz"``."""
     frequency_hz: Reals
     value: Reals
-    """NaN where there is none."""
+    """Values, NaN where there is none."""
     state: Integers | None = None
     """Kind of motion (colliding or not), if there are several; only equal kinds are compared."""
 
@@ -44,8 +44,6 @@ class Quantity:
 @dataclass(frozen=True, eq=False)
 class EnsembleCurve(Labelled):
     """One quantity, measured and in every draw.
-
-
 
     Square roots are compared, because they are nearly normal both for accurate magnitudes and for random
     ones (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
@@ -74,7 +72,7 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def median(self) -> Reals:
-        """Median of the draws, shape (points,); NaN without draws."""
+        """Median of the draws, shape (points,); NaN below two draws."""
         return _over_draws(self.draws, np.nanmedian)
 
     @cached_property
@@ -84,12 +82,12 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def upper(self) -> Reals:
-        """Upper end of the same."""
+        """Upper end of this band."""
         return np.asarray((self._mean + self._reach) ** 2)
 
     @cached_property
     def relative_sd(self) -> Reals:
-        """Relative scatter of the draws, shape (points,); NaN below two."""
+        """Relative scatter of the draws, shape (points,); NaN below two draws."""
         return 2 * self._sd / self._mean
 
     @cached_property
@@ -148,7 +146,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def verdict(self) -> bool | None:
-        """Whether they agree; None without comparisons."""
+        """Whether measurement and draws agree; None without comparisons."""
         return self.agrees if self.compared else None
 
     @property
@@ -159,7 +157,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Result of the comparison in words."""
         if not self.compared:
             return f"{self.name}: too few draws of the measured kind of motion to compare"
         verdict = "within" if self.agrees else "outside"
@@ -184,12 +182,12 @@ class EnsembleCurve(Labelled):
 
     @cached_property
     def _z_of_draws(self) -> Reals:
-        """Z score of each draw among the others, shape (draws, points); NaN for too few."""
+        """Z score of each draw among the others, shape (draws, points); NaN for too few draws."""
         left = self.count - 1
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = left * self._sd**2
-            # Squares without the draw; below 1e-9 they are rounding.
+            # Sum of squares without the draw itself; a part below 1e-9 is rounding error.
             others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
@@ -230,11 +228,11 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 
 
 def largest_of_chance(largest: Reals) -> float:
-    """Return the largest |z| of another draw in 99 % of cases, from the largest of five draws or more.
+    """Return the limit that the largest |z| of another draw does not exceed in 99 % of cases.
 
-    The quantile of Gumbel's distribution with their mean and deviation is widened, because few draws
-    determine these poorly: otherwise 2 % of further draws exceed it with 16 draws, 5 % with five. The
-    factor was fitted to simulated draws.
+    ``largest`` has the largest |z| of five or more draws. The quantile of a Gumbel distribution with their
+    mean and deviation is widened, because few draws determine these poorly: otherwise 2 % of further draws
+    exceed the limit with 16 draws, 5 % with five. The factor was fitted to simulated draws.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -242,7 +240,7 @@ def largest_of_chance(largest: Reals) -> float:
 
 
 def z_limit(values: int) -> float:
-    """Return the largest |z| in 99 % of cases among this many independent normal deviates."""
+    """Return the limit that none of this many independent normal deviates exceeds in 99 % of cases."""
     return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 
@@ -269,7 +267,7 @@ def _alike(measured: Quantity, drawn: Quantity) -> Reals:
 
 
 def _over_draws(values: Reals, reduce: object) -> Reals:
-    """Reduce over draws; NaN at points without draws, without a warning."""
+    """Reduce over draws; NaN at points with fewer than two draws, without a warning."""
     some = np.sum(np.isfinite(values), axis=0) > 1
     found = np.full(values.shape[1:], np.nan)
     if some.any():
@@ -282,7 +280,7 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 @dataclass(frozen=True)
 class CurveDifference(Labelled):
-    """Measured over simulated magnitude; arrays of shape (points,)."""
+    """Ratio of measured to simulated magnitude; arrays of shape (points,)."""
 
     DOCUMENT: ClassVar = "median_abs_db rms_db share_within_two_standard_errors=share_within_two"
 
@@ -297,7 +295,7 @@ class CurveDifference(Labelled):
 
     @property
     def median_abs_db(self) -> float:
-        """Half of the points differ by less."""
+        """Median of the absolute difference."""
         return float(np.nanmedian(np.abs(self.decibel)))
 
     @property
@@ -307,7 +305,7 @@ class CurveDifference(Labelled):
 
     @property
     def share_within_two(self) -> float:
-        """Share of points within two standard errors; 0.95 if only the stated scatter differs."""
+        """Share of points within two standard errors; 0.95 is expected if only scatter differs."""
         known = self.standard_errors[~np.isnan(self.standard_errors)]
         return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
 
@@ -328,15 +326,15 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""Runs that all stop within this time share one edge, possibly the end of the record."""
+"""If all runs stop within this time, they stop at one edge, such as the end of the record."""
 
 
 @dataclass(frozen=True)
 class Ending:
-    """One run of a motion, from when it could end to its end or the end of the record."""
+    """One run of a motion: the time from which it could end, and its end or that of the record."""
 
     what: str
-    """``"collisions"``, ``"irregular motion"``."""
+    """Kind of motion: ``"collisions"`` or ``"irregular motion"``."""
     start_s: float
     stop_s: float
     ended: bool
@@ -378,7 +376,7 @@ class EscapeRate:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Rate and bounds in words."""
         low, high = self.bounds_per_s
         return (
             f"The end of {self.what} is a draw of chance: it came in {self.ends} of {self.runs} runs, the "

@@ -19,7 +19,7 @@ SIMULATED_S = 6.0
 """Duration from rest at each frequency; the transient decays to 0.1 % in half of it."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
-"""Steps and time per step [s] to follow a sweep, small enough to disturb little."""
+"""Number of steps to follow a sweep, small enough to disturb little, and time per step [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
 
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
-    """Return bands of points that are inside; an edge lies half way to the next point."""
+    """Return the bands of points with ``is_inside``; a band ends half way to the next point outside."""
     middles = np.array([0.5 * (low + high) for low, high in pairwise(frequency_hz)])
     lows = np.concatenate([frequency_hz[:1], middles])
     highs = np.concatenate([middles, frequency_hz[-1:]])

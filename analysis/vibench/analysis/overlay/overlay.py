@@ -63,13 +63,13 @@ class AbstractOverlay(Labelled, Generic[R]):
     escape: EscapeRate | None
     """Rate at which the motion ends, if that is random."""
     difference: CurveDifference
-    """Measured over simulated transmission, or Response II: over the median of all draws."""
+    """Ratio of the measured transmission or Response II to the median of all draws."""
     prediction: ResponsePrediction
     """Prediction under sines of the measured A0."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """Quantities with draws that are not compared."""
+        """Quantities that have draws but are not compared."""
         return ()
 
     @property
@@ -118,13 +118,13 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
-    """Both of the first draw."""
+    """Displacement and levels of the terminal bands, both of the first draw."""
     spectrum: EnsembleCurve
-    """Spectrum of the displacement over A0; not compared, because the model has no noise floor."""
+    """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """The spectrum."""
+        """Only the spectrum."""
         return (self.spectrum,)
 
 
@@ -138,7 +138,7 @@ class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
 
 
 TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", "Response II", "spectrum"
-"""Names of quantities."""
+"""Names of the compared quantities."""
 
 
 def _difference(
@@ -152,7 +152,7 @@ def _difference(
 
 
 def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
-    """Return the quantities to compare a draw of noise."""
+    """Return the quantities of noise that are compared with draws."""
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
 
@@ -217,7 +217,7 @@ _EDGE_S = 1.0
 
 
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
-    """Return the quantities to compare a draw of a sweep, where both collide or neither does.
+    """Return the quantities of a sweep that are compared with draws where both collide or neither does.
 
     Intervals within a second of an edge are left out, because they contain both motions.
     """
@@ -266,7 +266,7 @@ _LEAST_BAND = 1e-3
 def dwell_quantities(
     response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
 ) -> tuple[Quantity, ...]:
-    """Return the quantities to compare a draw of a dwell: both responses, and bands with motion."""
+    """Return the quantities of a dwell that are compared with draws: both responses and bands with motion."""
     at = np.array([response.drive.frequency_hz])
     state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
     columns_hz, size = spectrum_columns(response)
@@ -314,7 +314,7 @@ def dwell_overlay(
 
 
 def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
-    """Return the quantities to compare a draw of a stepped sine."""
+    """Return the quantities of a stepped sine that are compared with draws."""
     return (
         Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
         Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),

@@ -24,7 +24,7 @@ from ..tables import Labelled
 PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 """Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
 PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
-"""Without contact; same place."""
+"""Resonances without contact; from the same place in the paper."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
 """Resonances with m1 bound to m2; from the same section of the paper."""
 PREDICTION_S = 8.0

@@ -13,7 +13,7 @@ from ..sine.dwell import silence_before
 from .driven_rig import Driven, DrivenRig, acceleration_per_volt, carried_mass
 
 _FEWEST_LINES = 50
-"""Lines in silence that show the level of noise to 25 %."""
+"""Fewest lines in silence; they determine the level of noise to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Blocks spread over the recording, in addition to the first and last second."""
@@ -29,7 +29,7 @@ class ChannelNoise:
 
     rms: dict[str, float]
     converter_v: float
-    """Smallest of them at a converter input, which is the converter's noise [V]."""
+    """Smallest noise of all converter inputs, taken as the converter's own [V]."""
 
 
 def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
@@ -72,7 +72,7 @@ _HEARD_HZ = (100.0, 2000.0)
 _MEDIAN_SD = 1.44
 """Relative standard deviation of the median of N exponential values, times the root of N."""
 _HANN_LINES = 1.5
-"""Lines of a Hann window in an independent one."""
+"""Lines of a Hann-windowed spectrum per independent line."""
 UNKNOWN_NOISE = (
     "The noise of the amplifier is unknown, because neither its voltage nor the silence of a bench check was "
     "recorded; limits of a weak motion may be too narrow"
@@ -86,7 +86,7 @@ class UnseenNoise:
     power: float = 0.0
     """Variance per sample [V²]."""
     sd: float = 0.0
-    """Its standard deviation [V²]."""
+    """Standard deviation of this power [V²]."""
 
     def drawn(self, rng: np.random.Generator) -> float:
         """Return a possible rms per sample [V]."""
@@ -98,9 +98,9 @@ def unseen_noise(
 ) -> tuple[UnseenNoise, ChannelNoise] | None:
     """Return the noise of an amplifier whose output is not recorded; None if no silence shows it.
 
-    In silence, the base minus the motion under the recorded voltage is noise of the amplifier through the
-    table, converter noise of the voltage, and noise of the sensor. The median over lines ignores hum. The
-    channels' noise is returned without that of the amplifier.
+    In silence, the motion under the recorded voltage is subtracted from the recorded base motion. The rest is
+    noise of amplifier, converter and sensor. The median over lines ignores hum. The second result is the
+    channels' noise without that of the amplifier.
     """
     if rig.driven is Driven.AMPLIFIER:
         return UnseenNoise(), noise
@@ -122,11 +122,11 @@ def unseen_noise(
     floor = (noise.converter_v * physical_per_volt[BASE]) ** 2
 
     def sensor(unseen_v2: float) -> float:
-        """Return the base's noise without motion, by its high band [m²/s⁴]."""
+        """Return the variance of the base's sensor noise, from the high band [m²/s⁴]."""
         return max(floor, noise.rms[BASE] ** 2 - passed_high * (recorded_v2 + unseen_v2))
 
     def excess(unseen_v2: float) -> float:
-        """Return the median of what is exponential with mean 1 for the true noise, minus its median."""
+        """Return the median of power over level, minus log 2: for the true noise, this is 0."""
         level = passed * (unseen_v2 + own_v2) + sensor(unseen_v2)
         return float(np.median(power / level) - np.log(2.0))
 
@@ -139,7 +139,7 @@ def unseen_noise(
 
 
 def _base_over_voltage(rig: DrivenRig, frequency_hz: Reals) -> Complexes:
-    """Return the recorded acceleration of the base over the recorded voltage; 0 at 0 Hz."""
+    """Return the recorded base acceleration per recorded voltage; 0 at 0 Hz."""
     table, above = rig.table, frequency_hz[1:]
     s: Complexes = np.asarray(2j * np.pi * above, dtype=np.complex128)
     moved = acceleration_per_volt(table.shaker, s, carried_mass(table.specimen, above))

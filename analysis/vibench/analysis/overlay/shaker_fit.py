@@ -25,7 +25,7 @@ FEWEST_LINES = 30
 _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
 """Start of the search: a small electrodynamic shaker."""
 _REACH = np.log(300.0)
-"""Largest deviation of each parameter from there, as a natural logarithm."""
+"""Largest deviation of each parameter from the typical one, as a natural logarithm."""
 _STARTS = 12
 _NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
 
@@ -71,8 +71,8 @@ def fit_shaker(
 ) -> FittedShaker:
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
 
-    With D(s) = k + d s + (m + M(s)) s^2, M the specimen's mass as the base feels it, the base's acceleration
-    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3). The search starts from
+    The base's acceleration over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3),
+    where D(s) = k + d s + (m + M(s)) s^2 and M is the specimen's apparent mass. The search starts from
     the ``described`` shaker, else from several typical ones. Raises UnusableData when there are too few
     lines, or no shaker explains them.
     """
@@ -88,7 +88,7 @@ def fit_shaker(
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
     measured = found.value[known] / s
     carried = carried_mass(specimen, frequency_hz)
-    # The scatter is the same for both parts of ln(measured / modelled).
+    # Real and imaginary part of ln(measured / modelled) have the same scatter.
     sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
 
     def misfit(logarithms: Reals) -> Reals:
@@ -108,7 +108,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starts, because the products of coil and table are known better than each."""
+    """Search from several starts, because data determine products of parameters better than each one."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -150,7 +150,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return s times the base acceleration over the voltage, which the estimators treat as displacements."""
+    """Return s times acceleration over voltage: estimators take these for a velocity and an acceleration."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:

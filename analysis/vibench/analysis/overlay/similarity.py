@@ -12,7 +12,7 @@ from ..tables import Labelled
 SIMILARITY_THRESHOLD = 0.1
 """Largest difference of similar points (Gong et al. 2025, section 4)."""
 DRAWS = 2000
-"""Number of bootstrap resamples; limits scatter by about a fortieth of the interval's width."""
+"""Number of bootstrap resamples; an interval's limits scatter by about a fortieth of its width."""
 CONFIDENCE = 0.95
 
 
@@ -35,7 +35,7 @@ class SimilarityCurve:
 
     frequency_hz: Reals
     response: Reals
-    """Response I or II over the drive amplitude; NaN if missing."""
+    """Response I or II, relative to the drive amplitude; NaN if missing."""
     amplitude_m: float
     """Drive amplitude A0."""
 
@@ -121,8 +121,8 @@ def similarity(
         The piece-wise model (or a measurement) and its substitute, at the same frequencies;
         `SimilarityCurve.at` interpolates.
     logarithm_of
-        The paper leaves it open. If the reference is 1 in this unit, the difference is infinite and the
-        point dissimilar unless both are equal.
+        Unit in the logarithm, which the paper does not state. Where the reference is 1 in this unit, points
+        are similar only if both curves are equal, since the difference is otherwise infinite.
     threshold
         Largest difference of a similar point.
     seed

@@ -32,7 +32,7 @@ class RecordedBaseMotion:
     sample_rate_hz: float
     low_hz: float
     high_hz: float
-    """The band that was kept."""
+    """Ends of the kept band."""
     delay_s: float
     """Corrected delay of the accelerometer channel: sample k is the motion at k / sample_rate_hz."""
 
@@ -74,7 +74,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Shift a signal forward in time by any number of samples, by the phase of its spectrum."""
+    """Advance a signal by any number of samples, with the phase of its spectrum."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -83,9 +83,9 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 
 
 _PIECE_S = 5.0
-"""Samples simulated at once, to bound memory."""
+"""Length simulated at once, to bound memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; the effect of a spline's ends decays by 0.27 per sample."""
+"""Extra samples on each side of a piece; the effect of a spline's ends falls to 0.27 with every sample."""
 _VX = 3
 _STATE = 6
 
@@ -104,7 +104,7 @@ class SimulatedChannels:
     base_acceleration: Samples
     """Acceleration of the simulated table, or the recorded one if that drove, shape (samples,) [m/s2]."""
     sensors: Callable[[Reals], Complexes]
-    """Gain of the response's sensor over that of the base's, without their delays."""
+    """Ratio of the response sensor's gain to the base sensor's, without their delays."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -117,7 +117,7 @@ class SimulatedChannels:
         return self.recorded.samples
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
-        """Gain of the response's sensor over that of the base's, without their delays."""
+        """Ratio of the response sensor's gain to the base sensor's, without their delays."""
         return self.sensors(frequency_hz)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
