@@ -12,7 +12,7 @@ MACHINE = "one core of a 2-core AMD EPYC"
 
 @dataclass(frozen=True)
 class MeasuredLevel:
-    """One level, on the paper's specimen; simulated seconds per second of one core."""
+    """Speed and error of one level on the paper's specimen; speeds in simulated seconds per core second."""
 
     free: float
     """Hertz's contact, 260 Hz and 1 um: no impact."""
@@ -21,11 +21,11 @@ class MeasuredLevel:
     chaos: float
     """260 Hz and 5 um."""
     power: float
-    """A force at every p, as of power:3 at 150 Hz and 10 um."""
+    """Contact power:3, which has a force at every p, at 150 Hz and 10 um."""
     state_error: float
     """State error of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
     response_i_error: float
-    """Relative, of a periodic motion, against reference."""
+    """Relative error of Response I of a periodic motion, against `reference`."""
 
 
 MEASURED = {
@@ -34,7 +34,7 @@ MEASURED = {
     Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
-"""Scatter of Response I in chaos from start to start, at every level."""
+"""Relative scatter of Response I in chaos between different starts, at every level."""
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:

@@ -108,7 +108,7 @@ class MapPicture:
     """A map so far; unknown cells show the nearest known one."""
 
     frequency_hz: tuple[float, float]
-    """Outer edges."""
+    """Outer edges of the picture."""
     amplitude_m: tuple[float, float]
     classes: NDArray[np.int8]
     """Indices in `MOTION_CLASSES`, shape (rows, columns)."""
@@ -141,7 +141,7 @@ class SettledMotion:
     gaps_m: tuple[float, float]
     line_hz: Reals
     line_m: Reals
-    """Amplitude of x over frequency, over whole drive periods."""
+    """Amplitude spectrum of x from whole drive periods."""
 
 
 class PicturingStore(MemoryStore):
@@ -199,7 +199,7 @@ def picture_of(results: MapResults) -> MapPicture:
 def settled_motion(request: MotionRequest) -> SettledMotion:
     """Simulate a specimen from rest until its motion has settled, and sample that motion.
 
-    Raises ValueError when it cannot be followed.
+    Raises ValueError when the motion cannot be simulated.
     """
     plan = MapRequest(
         **request.model_dump(exclude={"frequency_hz", "amplitude_m"}),
@@ -252,7 +252,7 @@ class SimulatedPoint:
     error_estimate: float | None
     memory: StartMemory = StartMemory.UNKNOWN
     ensemble: Ensemble | None = None
-    """Other motions from other starts, with sensitive dependence on the start."""
+    """Motions from other starts, in case of sensitive dependence on the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,7 +400,7 @@ def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
 
 
 class SimulationProgress:
-    """Collects pieces in any order."""
+    """Results of a request so far, from pieces in any order."""
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
         self._amplitude_m = amplitude_m
@@ -519,7 +519,7 @@ class SimulationProgress:
         )
 
     def similarity(self) -> Similarity | None:
-        """Return the similarity of Response I of both models, where known; None before."""
+        """Return the similarity of Response I of both models, where known; None without results of both."""
         if len(self._found) < 2:
             return None
         first, second = (model for model in self.models if model in self._found)
