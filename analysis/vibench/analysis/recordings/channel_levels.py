@@ -15,7 +15,7 @@ from .channels import BASE, DRIVE, OnRead, ignore_reading
 
 _BLOCK_S = 2.0
 _AT_FULL_SCALE = 0.999
-"""Converters cut off a few counts to either side of their nominal range."""
+"""Share of full scale that counts as clipped, as converters clip a few counts beside the nominal range."""
 
 
 @dataclass(frozen=True)
@@ -104,22 +104,22 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
 _COUNTED = 2**16 + 1
 """Bins over the range to find flat tops."""
 _TOPS = (0.1, 0.03, 0.01)
-"""Height of a top relative to the peak."""
+"""Heights of the examined tops relative to the peak."""
 _FLAT = 0.88
-"""Share of a top's samples in its upper half: 0.71 of a smooth peak, 0.84 without curvature, 1 if cut."""
+"""Share of a top's samples in its upper half: smooth peaks have 0.71, straight ones 0.84, clipped ones 1."""
 _FLAT_VALUE = 0.4
-"""Share of the upper half of a peak's samples at one value that no smooth peak has."""
+"""Share of the samples in a peak's upper half at one value; no smooth peak has as many."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
-"""Steps of the converter to a peak: a sine of 16 of them has 0.42 of its samples at two values."""
+"""Fewest converter steps up to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
-"""Largest range without samples, relative to the peak and to a top, where samples cover a smooth peak."""
+"""Largest empty range of values in a well sampled smooth peak, relative to the peak and to a top."""
 _AS_FREQUENT = 0.4
-"""A value below a clipped peak is less frequent than this, relative to the clipped samples."""
+"""Largest number of samples at one value below a clipped peak, relative to the clipped samples."""
 
 
 def _lasting(bins: Reals) -> tuple[int, int]:
-    """Return the highest bin that three successive samples reach, from below and from above."""
+    """Return the highest bin reached by three successive samples, and the same of the mirrored signal."""
     if bins.size < 3:
         return 0, 0
     three = np.stack((bins[:-2], bins[1:-1], bins[2:]))
@@ -129,9 +129,9 @@ def _lasting(bins: Reals) -> tuple[int, int]:
 def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
     """Return the value at which the upper peaks are clipped; None if they are not, or it is not known.
 
-    A sample clock locked to the drive takes the same few values in every period. If a range without samples
-    separates the highest values from what ``lasting`` successive samples reach, a smooth peak has such a
-    histogram too.
+    With a sample clock locked to the drive, every period has the same few values. A smooth peak may then have
+    the histogram of a clipped one, but with an empty range above ``lasting``, the highest bin that three
+    successive samples reach.
     """
     filled = np.flatnonzero(counts)
     if filled.size < 2:
@@ -165,11 +165,11 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Of a peak above the median, over the whole span: less is a channel that rests at its lowest value."""
+"""Smallest height of a peak above the median, relative to the span; less if the channel rests there."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
-    """Smallest, largest and summed squares of each bin, shape (channels, bins)."""
+    """Return the minimum, maximum and sum of squares of each bin, shape (channels, bins)."""
     starts = np.arange(0, values.shape[1], length)
     low = np.minimum.reduceat(np.nan_to_num(values, nan=np.inf), starts, axis=1)
     high = np.maximum.reduceat(np.nan_to_num(values, nan=-np.inf), starts, axis=1)
@@ -178,13 +178,13 @@ def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
 
 
 _CLIPPED_SHARE = 0.2
-"""A sine that just fills its range spends 3 % of its time within a thousandth of it; this is not a sine."""
+"""Largest share of samples at full scale in a usable channel; a sine that just fills its range has 3 %."""
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
     """Refuse unusable channels; ``response`` is the analysed channel.
 
-    Raises UnusableData: one sentence that names every such channel and what to look at.
+    Raises UnusableData with one sentence that names every such channel and what to check.
     """
     used = (DRIVE, BASE, response)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]

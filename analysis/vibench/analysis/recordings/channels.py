@@ -19,7 +19,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from .response import RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 SENSOR_DAMPING_RATIO = 0.02
-"""Damping ratio of a piezoelectric sensor's mounted resonance; usual for the kind."""
+"""Damping ratio of a piezoelectric sensor's mounted resonance; a usual value."""
 
 
 class SensedChannel(Protocol):
@@ -27,7 +27,7 @@ class SensedChannel(Protocol):
 
     @property
     def role(self) -> str:
-        """``"m0_velocity"``."""
+        """Role, such as ``"m0_velocity"``."""
 
     @property
     def delay_s(self) -> float:
@@ -39,10 +39,10 @@ class SensedChannel(Protocol):
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
-    """Return the complex gain of a channel over its motion, shape (lines,); 1 at low frequency.
+    """Return the complex gain of a channel relative to its motion, shape (lines,); 1 at low frequency.
 
-    It includes the delay in the header, the sensor's mounted resonance, and its bandwidth, whose delay is
-    part of the header's, but not the converter's coupling.
+    It includes the delay in the header, the sensor's mounted resonance and its bandwidth, but not the
+    converter's coupling. The delay in the header contains the delay of the bandwidth.
     """
     sensor = described_sensor(bench, channel.role)
     part = frequency_hz / _number(sensor, "resonance_hz")
@@ -53,7 +53,7 @@ def sensor_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: 
 
 
 def coupled_gain(bench: Mapping[str, Any], channel: SensedChannel, frequency_hz: Reals) -> Complexes:
-    """Return the same with the channel's coupling, above 0 Hz."""
+    """Return the gain of `sensor_gain` with the channel's coupling, above 0 Hz."""
     coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel.coupling))
     return np.asarray(sensor_gain(bench, channel, frequency_hz) * coupling)
 
@@ -98,7 +98,7 @@ class Stretch:
 
 
 class Channels(Protocol):
-    """Facts that an estimator needs, whatever the source of the samples."""
+    """Channels as an estimator uses them, recorded or simulated."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -110,10 +110,10 @@ class Channels(Protocol):
 
     @property
     def response_delay_s(self) -> float:
-        """By how much the response channel lags the base channel."""
+        """Lag of the response channel behind the base channel."""
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
-        """Gain of the response's sensor over that of the base's, without their delays; shape (lines,)."""
+        """Ratio of the response sensor's gain to the base sensor's, without their delays; shape (lines,)."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Return the named parts of the record, in the order of time."""
@@ -160,11 +160,11 @@ class RecordedChannels:
 
     @property
     def response_delay_s(self) -> float:
-        """By how much the response channel lags the base channel."""
+        """Lag of the response channel behind the base channel."""
         return self.recording.channel(self._response.role).delay_s - self.recording.channel(BASE).delay_s
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
-        """Gain of the response's sensor over that of the base's, couplings included and delays left out."""
+        """Ratio of the response sensor's gain to the base sensor's, with couplings and without delays."""
         response, base = (
             coupled_gain(self.recording.bench, self.recording.channel(role), frequency_hz)
             for role in (self._response.role, BASE)
@@ -173,7 +173,7 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the named parts of the record with samples, without rejected averages."""
+        """Return the named parts of the record that have samples, without rejected averages."""
         found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments

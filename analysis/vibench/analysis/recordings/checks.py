@@ -23,7 +23,7 @@ class Verdict(StrEnum):
 
     PASSED = "passed"
     NOTE = "note"
-    """Nothing is wrong, but a reader should know."""
+    """Nothing is wrong, but the remark matters to a reader."""
     WARNING = "warning"
     """The result may be wrong, or is less than was planned."""
 
@@ -38,14 +38,14 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""A channel below a thousandth of its range is recorded with little of the converter."""
+"""Smallest used share of a channel's range; below it, the converter resolves the signal poorly."""
 _OFTEN_DARK = 0.01
-"""Share of a recording without light beyond which its results deserve a second look."""
+"""Share of a recording in drop-outs of the vibrometer above which a warning is given."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
-"""Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+"""Largest overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
 _SHORTFALL = 0.15
-"""Shortfall of its peak below the setting: as much as a bench check refuses."""
+"""Largest shortfall of the drive's peak below its setting, which is also the limit of a bench check."""
 
 
 P = TypeVar("P")
@@ -170,7 +170,7 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
 
 
 def _least_peak_v(facts: RecordingFacts) -> float:
-    """Return the lowest expected peak of the drive; None if unknown.
+    """Return the lowest expected peak of the drive; 0 if unknown.
 
     Feedback may stay below its setting, the peak of streamed noise is random, and few samples per period
     may miss the peak of a sine.

@@ -34,9 +34,9 @@ from .response import (
 )
 
 MOST_BYTES = 1e9
-"""Most bytes of memory, for what need not be checked against the file's size."""
+"""Memory up to which a recording need not be checked against the size of its file."""
 BYTES_A_SAMPLE = 80
-"""Bytes per sample of a stretch that is analysed at once: three channels, and what is made of them."""
+"""Bytes per sample of a stretch that is analysed at once: three channels and intermediate results."""
 LARGEST_PACKING = 16.0
 """Largest compression ratio: converter noise packs 1.2 to 3 times, a computed sine without noise 6 times."""
 
@@ -98,7 +98,7 @@ class RecordingFacts(RecordingDescription):
     planned_stretches: int
     whole_stretches: int
     late: tuple[str, ...]
-    """When the drive fell behind its plan, a sentence each."""
+    """One sentence for each time at which the drive fell behind its plan."""
     check: str
     """Result of the bench check before the run; empty if left out."""
     seal: SealCheck
@@ -111,7 +111,7 @@ class RecordingFacts(RecordingDescription):
 
     @property
     def mass(self) -> str:
-        """Mass whose motion is analysed: ``"m0"``."""
+        """Mass whose motion is analysed, such as ``"m0"``."""
         return self.response.partition("_")[0]
 
     @property
@@ -135,12 +135,12 @@ class RecordingFacts(RecordingDescription):
 def recording_facts(
     recording: Recording, on_read: OnRead = ignore_reading, response: str | None = None
 ) -> RecordingFacts:
-    """Collect what a recording says about itself; ``on_read`` receives the part of its samples read so far.
+    """Collect the facts in a recording; ``on_read`` receives the number of samples read so far.
 
     ``response`` is the channel whose motion is analysed; None for that of m0.
 
-    Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
-    know, and NotEnoughData when it holds no samples.
+    Raises UnusableData when the recording was changed after it was sealed, or this version cannot read its
+    plan or bench; NotEnoughData when it has no samples.
     """
     require_measured_size(recording)
     seal = require_intact(recording)
@@ -215,7 +215,7 @@ def plan_of(recording: Recording) -> Measurement:
 
 
 def specimen_of(bench: Mapping[str, Any]) -> Specimen:
-    """Build the specimen that the bench configuration describes; as `described_specimen`."""
+    """Build the specimen of the bench configuration; defaults and errors as for `described_specimen`."""
     return described_specimen(bench).specimen()
 
 
@@ -259,7 +259,7 @@ class _BenchCheck(BaseModel):
 
 
 class _Bench(BaseModel):
-    """The part of a bench configuration that analysis reads, from any version."""
+    """Part of a bench configuration of any version that analysis reads."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -27,19 +27,19 @@ _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
 """Kaiser's beta: truncation errors of the integral are below 3e-5 above 5 Hz."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
-"""Samples, and part of the sample rate up to which the fit is exact to 1e-4 (2e-6 below 0.4)."""
+"""Samples on each side, and part of the sample rate up to which the fit is exact to 1e-4 (2e-6 below 0.4)."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
-"""Weights of the fit; above the band, only the gain of the derivative is limited."""
+"""Frequencies of the fit, and its weight above the band, where it only limits the gain."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
-"""Kernels and samples of a block, which is read with half a kernel more on either side."""
+"""Smallest block in kernels and in samples; half a kernel more is read on either side."""
 
 
 def integral_kernel(rate_hz: float) -> Reals:
     """Weights that integrate samples with zero phase, shape (2 L + 1,) [s].
 
     The integral of a band-limited signal has the weights Si(pi n) / pi (the integral of sinc). They are
-    multiplied by 1 up to 0.2 s, and fade to 0 at 1 s along the integral of a Kaiser window. Being odd, they
-    remove a constant.
+    multiplied by 1 up to 0.2 s, and fade to 0 at 1 s along the integral of a Kaiser window. They are odd and
+    so remove a constant.
     """
     reach, held = round(_REACH_S * rate_hz), round(_HELD_S * rate_hz)
     places = np.arange(1, reach + 1)
@@ -59,8 +59,8 @@ def derivative_kernel(rate_hz: float) -> Reals:
 def _derivative_weights() -> Reals:
     """Fit the half of the kernel that lies behind the sample, for a rate of 1, shape (L,).
 
-    Least squares of the relative error: a window over the ideal weights errs by 2e-3 at 100 Hz, since
-    their step at half the rate leaks down to where a derivative is small.
+    The fit minimises the squared relative error. Windowed ideal weights would err by 2e-3 at 100 Hz:
+    their step at half the rate leaks to low frequencies, where a derivative is small.
     """
     angle = 2 * np.pi * np.linspace(0.0, 0.5, _FIT_POINTS + 1)[1:]
     inside = angle <= 2 * np.pi * _EXACT_BAND
@@ -76,7 +76,7 @@ _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = Ma
         DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
-"""Kernel and ``about``: samples beyond an end are ``about`` times the last one, minus the mirrored ones."""
+"""Kernel and ``about``: samples beyond an end are ``about`` times the last sample minus the mirrored ones."""
 
 
 @dataclass(eq=False)
@@ -96,7 +96,7 @@ class ResponseChannel:
     quantity: str = field(init=False)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
-    """Number and velocities of the last block, because estimators read sequentially."""
+    """Number and velocities of the last block, kept because estimators read sequentially."""
 
     def __post_init__(self) -> None:
         found = self.response or response_role(self.recording)
@@ -126,7 +126,7 @@ class ResponseChannel:
 
     @property
     def noise_gain(self) -> float:
-        """Rms noise of the velocity over that of the channel, if that is white."""
+        """Ratio of the rms noise of the velocity to that of the channel, if the latter is white."""
         return float(np.linalg.norm(self._kernel)) if self._kernel.size else 1.0
 
     def read(self, start: int, stop: int) -> Reals:
@@ -151,7 +151,7 @@ class ResponseChannel:
 
     @property
     def _may_drop_out(self) -> bool:
-        """Whether jumps of the signal are drop-outs: those of m1 and m2 are collisions."""
+        """Whether jumps of the signal are drop-outs; jumps of m1 and m2 are collisions."""
         return self.quantity not in _CONVERSIONS and self.role.partition("_")[0] not in _COLLIDING
 
     def _velocities(self, number: int, size: int) -> Reals:
@@ -177,7 +177,7 @@ class ResponseChannel:
 def noise_as_read(
     role: str, rate_hz: float, count: int, block: int, rng: np.random.Generator
 ) -> Iterator[Samples]:
-    """Yield white noise of unit variance at a sensor as an analysis reads it, for a mass as a velocity."""
+    """Yield white sensor noise of unit variance as an analysis reads it; for a mass, as velocity."""
     conversion = None if role.startswith("base_") else _CONVERSIONS.get(_quantity(role))
     kernel = np.ones(1) if conversion is None else conversion[0](rate_hz)
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
