@@ -1,7 +1,7 @@
-"""Reports: one HTML file with everything in it, figures and tables of results, and measured accuracy.
+"""Reports: one self-contained HTML file with figures and tables of results.
 
 A campaign, one recording or a comparison is written for screen and print, with findings and limits in
-sentences. This package also chooses the figures of each result and their order. It analyses nothing.
+sentences. This package also chooses the figures of each result and their order, and contains no analysis.
 The page on speed and accuracy is docs/accuracy.md.
 
 >>> from vibench.analysis.report import table

@@ -108,7 +108,7 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
-    """Yield the sentences that apply to these results."""
+    """Yield the sentences on limits of these results."""
     if any(each.is_simulated for each in results.facts):
         yield (
             "The instruments were simulated: the samples are what the simulated generator's output does to "
@@ -305,7 +305,7 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     },
     PlugInKind.DRAWING,
 )
-"""Drawings by the kind of a plan."""
+"""Drawings, keyed by the kind of excitation."""
 
 
 def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:
@@ -327,11 +327,11 @@ def findings(results: CampaignResults) -> Iterator[str]:
     Parameters
     ----------
     results
-        As `vibench.analysis.analyse_files` gives them.
+        Results of `vibench.analysis.analyse_files`.
 
     Returns
     -------
-    Sentences: of a fit to all of them first, then of each recording, after its name.
+    Sentences: first on a fit to all recordings, then on each recording, which they name.
     """
     yield from results.model_said
     for each in results.in_order:

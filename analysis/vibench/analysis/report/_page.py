@@ -60,12 +60,12 @@ class Card:
 
     name: str
     result: str
-    """A sentence."""
+    """Result in one sentence."""
     agreement: Agreement
     look_at: str
     """Warnings to read before the result is used."""
     numbers: Rows = ()
-    """Up to three, each with its bounds."""
+    """Up to three names of quantities and their values with bounds."""
     warnings: tuple[str, ...] = ()
     figure: DrawnFigure | None = None
     folds: tuple[Fold, ...] = ()
@@ -81,7 +81,7 @@ class Page:
     warnings: tuple[str, ...]
     """Warnings that change a conclusion."""
     findings: str
-    """At most 120 words."""
+    """Summary of at most 120 words."""
     figure: DrawnFigure | None
     noun: str
     """Heading of the first table's rows, such as recording or claims."""
@@ -108,7 +108,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
     Parameters
     ----------
     figures_folder
-        Where PNG, SVG and CSV of each figure are saved too; None saves none.
+        Folder for PNG, SVG and CSV of each figure; None saves none.
     """
     figures = list(dict.fromkeys(_figures(page)))
     environment = Environment(
@@ -141,7 +141,7 @@ def _figures(page: Page) -> Iterator[DrawnFigure]:
 
 
 def _escape(content: object) -> object:
-    """Write control characters of names and texts as escapes; Markup is of the template itself."""
+    """Escape control characters in names and texts; Markup comes from the template and is not changed."""
     return printable(content) if type(content) is str else content
 
 

@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State what the model has at a level without a found resonance: multipliers, or no motion."""
+    """State the model's largest multipliers, or that it has no motion, at a level without a resonance."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -297,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """State the result of the last check of the bench, its age, and its complaints."""
+    """State the result and age of the last check of the bench, and its findings that are not ok."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -392,13 +392,13 @@ def write_report(
     path
         Path of the HTML file; its folder is created.
     figures_folder
-        Where PNG, SVG and CSV of each figure go beside it; None writes none.
+        Folder for PNG, SVG and CSV of each figure; None writes none.
     diagrams
         Branches that are overlaid on the stepped sines and sweeps.
     hidden
         Hidden motions of these recordings.
     maps
-        Maps on which the levels of stepped sines and sweeps are laid.
+        Maps on which the levels of stepped sines and sweeps are drawn.
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
@@ -506,7 +506,7 @@ def check_warnings(results: CampaignResults, checks: frozenset[str] | None = Non
     Parameters
     ----------
     results
-        As `vibench.analysis.analyse_files` gives them.
+        Results of `vibench.analysis.analyse_files`.
     checks
         Names of the checks whose warnings are wanted; by default all.
     """

@@ -17,7 +17,7 @@ from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
 
 _NEAR = 0.08
-"""Largest distance of resonances in one row; modes lie at least 9 % apart."""
+"""Largest relative distance of resonances in one row; modes lie at least 9 % apart."""
 ABSENT = "–"
 _SMALLEST_BIAS = 1e-3
 """Smallest bias that is shown; below it noise does not matter."""
@@ -198,7 +198,7 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
 
 
 def _simulated_response(laid: DwellOverlay | None, name: str) -> tuple[str, str]:
-    """Return one response of the draws with the 95 % band, and the rank of the measured one."""
+    """Return one response of the draws with the 95 % band, and the z of the measured one."""
     found = None if laid is None else laid.quantity(name)
     if laid is None or found is None:
         return ABSENT, ABSENT
