@@ -51,14 +51,14 @@ def overlay(
     draws: int = DRAWS,
     stage: Stage = ignore_stage,
 ) -> AbstractOverlay[Any]:
-    """Simulate what was measured and compare.
+    """Simulate the measured test and compare the results.
 
     Raises UnusableData when the samples have holes, or the simulation did not reach its end.
 
     Parameters
     ----------
     recording, analysis
-        The recording and what `analyse` made of it.
+        The recording, and the result of `analyse` for it.
     specimen
         The model; by default the specimen in the recording's bench configuration.
     accuracy
@@ -146,7 +146,7 @@ class CampaignResults:
 
     @property
     def in_order(self) -> tuple[AnyResult, ...]:
-        """Results by kind, each from weak to strong or in the order given."""
+        """Results sorted by kind; within a kind from weak to strong, or in the order given."""
         families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
 
         def place(each: AnyResult) -> tuple[float, ...]:
@@ -236,7 +236,7 @@ def analyse_files(
 
 
 def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
-    """Leave out copies of a recording; the checks of the one that counts name them."""
+    """Leave out copies of a recording; a warning in the result that is kept names them."""
     firsts = first_copies([each.analysis.facts for each in results])
     kept = {first: results[first] for first in firsts}
     for place, (first, each) in enumerate(zip(firsts, results, strict=True)):
@@ -278,7 +278,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
                 if ANALYSES[present_word(plan["kind"])].family == NOISE_FAMILY:
                     unknown.append((float(plan["amplitude_vpp"]), path))
         except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
-            continue  # its own analysis reports the reason
+            continue  # the analysis of this file reports the reason
     for _, path in sorted(unknown) if needed and len(paths) > 1 else ():
         try:
             with open_recording(path) as recording:
@@ -344,7 +344,7 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
 
 
 def _start_time(path: Path) -> str:
-    """Return when a recording started; unreadable ones sort last and are reported later."""
+    """Return the start time of a recording; unreadable ones sort last and are reported later."""
     last = "~"
     try:
         with open_recording(path) as recording:
@@ -371,9 +371,9 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
     Returns
     -------
-    One budget each for A0 and Responses I and II of a dwell, for the largest Responses of a sweep or of
-    steps, and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). If
-    the recording lasted until a bound was met, budgets are widened: see `Budget.widened`.
+    Budgets (JCGM 100:2008). A dwell has them for A0 and Responses I and II, a sweep or steps for the largest
+    Responses, noise for frequency, damping and transmissibility at each resonance. If the recording lasted
+    until a bound was met, budgets are widened: see `Budget.widened`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
     has_chosen_end = result.analysis.facts.measurement.until is not None

@@ -71,7 +71,7 @@ def compare_recording(
 
 
 def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
-    """Return the whole result; its bytes come from this program, never from a file."""
+    """Return the whole result; unpickling is safe, as the bytes never come from a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
 

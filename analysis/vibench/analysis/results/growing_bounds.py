@@ -2,8 +2,7 @@
 
 The first line of standard output says that the process is ready. Then each line of standard input requests
 the bounds, and a line of standard output answers. All lines are JSON objects. A run that lasts until a
-bound is met
-starts this process (`vibench.acquisition.run.until`).
+bound is met starts this process (`vibench.acquisition.run.until`).
 """
 
 import json
@@ -78,9 +77,10 @@ def bound_of(budget: Budget) -> float | None:
 
 
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
-    """Analyse a recording up to a time [s] within a stretch: the number of the step, otherwise 1.
+    """Analyse a recording up to a time [s] within a stretch.
 
-    Only complete realisations of noise are analysed. Raises AnalysisError when nothing is usable.
+    ``stretch`` is the number of the step, or 1. Only complete realisations of noise are analysed. Raises
+    AnalysisError when nothing is usable.
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)

@@ -21,18 +21,18 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Segment length [s] of densities; Hann window, 50 % overlap."""
+"""Inverse of the longest segment of a density; Hann window, 50 % overlap."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})
-"""Labels of the ramps; pauses and settling have none."""
+"""Labels of parts that are left out; pauses and settling have no label."""
 _UNITS = {Quantity.DISPLACEMENT: "m", Quantity.VELOCITY: "m/s", Quantity.ACCELERATION: "m/s2"}
 
 
 def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> tuple[UniversalFunction, ...]:
     """Estimate spectral functions of an excerpt.
 
-    Returns the density of each channel while the excitation played, by segments of at most one second.
+    Returns the density of each channel during the excitation, from segments of at most one second.
     Noise also has the frequency response from base to m0 and its coherence, of the whole recording as in
     `analyse`.
 
@@ -93,7 +93,7 @@ class _Played:
 
 
 def _played_parts(excerpt: Excerpt) -> _Played:
-    """Return the parts of the plan; a recording without named parts counts as one."""
+    """Return the parts with excitation; a recording without named parts counts as one part."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     parts = [(each.label, each.start, each.stop) for each in recording.segments if each.label not in _AROUND]
