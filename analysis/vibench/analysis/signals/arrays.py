@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
 Samples = NDArray[np.floating]
-"""In double or in single precision."""
+"""Real numbers in double or single precision."""
 Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]

@@ -33,10 +33,10 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 
 
 def standard_uncertainty(values: Reals | Complexes) -> float:
-    """Return the standard uncertainty of the mean of a few values; twice it covers in 95 % of cases.
+    """Return the standard uncertainty of the mean of a few values; twice that covers 95 % of cases.
 
-    The standard error times Student's t over the normal deviate (JCGM 100:2008, G.3.2); for complex values,
-    of either part.
+    It is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008, G.3.2). For
+    complex values it is that of the real or of the imaginary part.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
     error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)
@@ -89,11 +89,11 @@ _ONE_IN = 1e-3
 
 
 def chi_square_of(squared: Reals, n_eff: float) -> Reals:
-    """Chi square with 2 degrees of freedom of a line's squared residual over its estimated scatter.
+    """Chi square with 2 degrees of freedom of a line's squared residual relative to its estimated scatter.
 
     A residual over a standard deviation from n averages follows F(2, 2 (n - 1)), not chi square. The value
-    with the same probability is nu ln(1 + squared / nu), nu =
-    2 (n - 1). It is twice the negative logarithm of Student's likelihood, except for a factor (nu + 2) / nu.
+    with the same probability is nu ln(1 + squared / nu), nu = 2 (n - 1). It is twice the negative logarithm
+    of Student's likelihood, except for a factor (nu + 2) / nu.
     """
     freedom = max(2 * (n_eff - 1), 1.0)
     return np.asarray(freedom * np.log1p(squared / freedom))

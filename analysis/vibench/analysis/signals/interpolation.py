@@ -28,7 +28,7 @@ def _weights_of_phases() -> Reals:
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
     window = np.where(np.abs(distance) <= REACH, i0(_KAISER_BETA * shape) / i0(_KAISER_BETA), 0.0)
-    # Samples are reproduced exactly: the sine of a multiple of pi is not exactly zero.
+    # Set values at samples exactly, because the computed sine of a multiple of pi is not exactly zero.
     sinc = np.where(distance == np.rint(distance), distance == 0.0, np.sinc(distance))
     return np.asarray(sinc * window)
 
@@ -48,7 +48,7 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
         Shape (n,) or (channels, n). The signal is taken as zero outside, so values within `REACH` of an end
         are wrong unless it is zero there.
     positions
-        Where to evaluate, in samples from the first, shape (m,).
+        Positions to evaluate, in samples from the first one, shape (m,).
     """
     channels = np.ascontiguousarray(np.atleast_2d(samples), dtype=np.float64)
     values = np.empty((len(channels), positions.size))

@@ -21,7 +21,7 @@ class Quantity(StrEnum):
 
     @property
     def derivatives(self) -> int:
-        """0, 1 or 2."""
+        """Order of the time derivative of displacement: 0, 1 or 2."""
         return list(Quantity).index(self)
 
 
@@ -37,7 +37,7 @@ class ConvertedSignal:
     quantity: Quantity
     low_hz: float
     high_hz: float
-    """The band that was kept."""
+    """Ends of the kept band."""
     edge_samples: int
     """Number of disturbed samples at each end."""
 
@@ -54,7 +54,7 @@ _EDGE_PERIODS = 6
 
 
 def derivative_factor(frequency_hz: Reals, given: Quantity, wanted: Quantity) -> Complexes:
-    """(i w)^n that turns a spectrum of the given quantity into the wanted one.
+    """Factor (i w)^n that turns a spectrum of the given quantity into the wanted one.
 
     For integrals the factor at 0 Hz is NaN.
     """
@@ -77,8 +77,8 @@ def converted_signal(
 ) -> ConvertedSignal:
     """Integrate or differentiate a signal within a band, free of drift and of the trapezoid's gain error.
 
-    The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges, each half
-    an octave wide on the outer side of its limit; the band itself passes unchanged. A straight line is
+    The spectrum of the whole signal is multiplied by (i w)^n and by a band with cosine edges. Each edge
+    is half as wide as its frequency and lies outside the band, which passes unchanged. A straight line is
     subtracted first, so that offset and slow drift do not ring at the ends.
 
     Parameters

@@ -41,7 +41,7 @@ def taper(window: Window | str, samples: int) -> Reals:
 
 
 def cosine_weights(window: Window | str) -> tuple[float, ...]:
-    """Return the weights of 1, cos, cos of twice the angle, ... that a window is the sum of."""
+    """Return the weights of 1, cos, cos of twice the angle, ... in a window."""
     return _COSINES[window_by_name(window)]
 
 
@@ -93,7 +93,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
 def line_correlation(window: Window | str) -> tuple[float, float]:
     """Return the number of correlated neighbouring lines of a windowed spectrum, for values and squares.
 
-    Errors of lines k apart correlate as the transform of the squared window at k does over that at 0.
+    Errors of lines k apart have the correlation |W(k) / W(0)|, with W the transform of the squared window.
     """
     squared = taper(window, 256) ** 2
     correlation = np.abs(np.fft.fft(squared)) / np.sum(squared)
