@@ -14,24 +14,24 @@ from .sweep import SweptMotion
 _NOISE_FACTOR = 4.0
 """Least ratio of residual to noise; the rms of hundreds of samples scatters by a few percent only."""
 _DISTORTION = 0.02
-"""Largest residual over order 1 of a smooth motion, from high harmonics of amplifier and shaker."""
+"""Largest residual of a smooth motion relative to order 1, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
 """Least ratio of the residual to that of the specimen without contact in the same sweep."""
 _TOO_FAST = 0.5
-"""Residual over order 1 that collisions usually exceed; stronger ringing can hide them."""
+"""Residual relative to order 1 that collisions usually exceed; ringing above it can hide collisions."""
 _IMPACTS = 0.1
-"""Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05 where neither meets a mode."""
+"""Orders 2 and 3 relative to order 1 that show impacts; ringing causes 0.05 at most, away from modes."""
 _RING_CYCLES = 5_000.0
 """Cycles after which a mode with a damping ratio of 0.02 % has decayed to 1/500."""
 _ENOUGH = 0.25
-"""Least share of a run with such orders, if no specimen is known."""
+"""Smallest share of a region with such orders, which is required if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1
-"""Residual over order 1 that excludes a smooth motion in any case."""
+"""Residual relative to order 1 that excludes a smooth motion in any case."""
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _VOTE_S = 1.0
-"""Length of the neighbourhood that votes on an interval, because collisions last."""
+"""Length of the neighbourhood whose majority decides on an interval, because collisions last."""
 _MERGE_S = 3.0
 """Shorter quiet stretches do not split a region: motion between impacts may settle briefly."""
 
@@ -44,7 +44,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: the nearest interval clearly without and clearly with collisions; ring-down widens them."""
+    """Bounds: nearest intervals clearly without and clearly with collisions; ring-down widens them."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class CollisionRegion:
     DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
 
     start: Edge
-    """In the order of time; the higher frequency in a downward sweep."""
+    """First edge in time, which has the higher frequency in a downward sweep."""
     stop: Edge
     reaches_start: bool
     """Whether the sweep started inside the region, so that ``start`` is the start of the sweep."""
@@ -79,7 +79,7 @@ class Collisions(Labelled):
 
     regions: tuple[CollisionRegion, ...]
     residual_rms: Reals
-    """Residual velocity without all orders, shape (intervals,) [m/s]."""
+    """RMS of the velocity after removing all orders, shape (intervals,) [m/s]."""
     threshold: Reals
     """Largest residual of a smooth motion, shape (intervals,) [m/s]."""
     is_colliding: Flags
@@ -97,10 +97,10 @@ def collisions(sweep: SweptMotion) -> Collisions:
     """Find where the motion is not a smooth, slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
-    sweep. An interval counts as colliding when this residual exceeds 4 times the noise, 2 % of order 1, and
-    twice the residual of the specimen without contact under the recorded base motion. The noise is the
+    sweep. An interval counts as colliding when this residual exceeds three limits: 4 times the noise, 2 % of
+    order 1, and twice the residual simulated without contact under the recorded base motion. The noise is the
     larger of two estimates: the sixth difference of the samples, and the quietest tenth of the sweep if it
-    can be smooth. Single intervals follow their neighbourhood, as do those with drop-outs of the laser.
+    can be smooth. Single intervals follow their neighbours, as do those with drop-outs of the laser.
     Orders 2 and 3 above a tenth of order 1, and above twice those without contact, also show impacts. If no
     specimen is known, they are required, at frequencies whose double and triple the sweep has not just
     passed.
@@ -116,7 +116,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
             f"more than {votes}"
         )
     ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
-    # Within a vote: resonances may lie a little beside where the specimen's description puts them.
+    # The maximum over a vote, because real resonances may differ a little from the described ones.
     rung = maximum_filter1d(_RINGING * np.nan_to_num(sweep.linear_impacts), votes)
     impacts = sweep.velocity.impacts > np.maximum(_IMPACTS, rung)
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))

@@ -30,14 +30,14 @@ from ..tones.sine_fit import DriveLevel, drive_level, noise_lift, peaks, steady_
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
-"""Largest ratio of the residual motion to the vibrometer noise that counts as noise only."""
+"""Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Largest ratio of the residual motion to the noise in the silence, which is shorter than a mode rings."""
+"""The same ratio to the noise in the silence, which is shorter than the ring-down of a mode."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence that may still be noise.
 
-In one short silence of 400, a mode excited by noise is as faint as that; noise of the generator is missing
-there.
+In one of 400 short silences, a mode excited by noise is by chance as faint as that. The generator's noise
+is missing in a silence.
 """
 BETWEEN = "what the motion contains between its lines"
 
@@ -49,18 +49,18 @@ class Background:
     rms_m: float
     """RMS; NaN if it cannot be distinguished from motion."""
     frequency_hz: float
-    """Its rms frequency; a window has two independent values per cycle of it."""
+    """Rms frequency of the noise; a window has two independent values per cycle of it."""
     source: str
     """Source of the estimate, or the reason for none."""
 
     @property
     def is_rest(self) -> bool:
-        """Return whether it is everything that does not repeat, so that the motion is what repeats."""
+        """Return whether the noise is the whole non-repeating part; the repeating part is then the motion."""
         return self.source == BETWEEN
 
     @property
     def is_known(self) -> bool:
-        """Return whether it is known."""
+        """Return whether the noise is known."""
         return bool(np.isfinite(self.rms_m))
 
 
@@ -96,9 +96,9 @@ def background_between_lines(rest: Reals, rate_hz: float) -> Background:
 def background_of(rest: Background, motion_m: float, sensor: Background, silent: Background) -> Background:
     """Return how much of the non-repeating part is noise, and its rms frequency.
 
-    Chaos does not repeat either. The residual between the lines is noise if the vibrometer noise or the
-    silence before the test explains it, or if it is too small to matter for a periodic motion. Otherwise it
-    may be motion, and only the silence shows the noise; without one it is unknown.
+    Chaos does not repeat either. The residual between the lines is noise if vibrometer noise or noise in the
+    silence explains it, or if it hardly matters for a periodic motion. Otherwise it may be motion, and only
+    the silence shows the noise; without a silence the noise is unknown.
 
     Parameters
     ----------
@@ -134,11 +134,11 @@ _LEAST_CYCLES = 4.0
 """Fewest drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks that ten random ones exceed once in a hundred records."""
+"""Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
 _ONCE = 0.5
-"""Share of the variance with a period of a whole record, whose further course is unknown."""
+"""Share of the variance with the record's length as period, above which the further course is unknown."""
 _BEYOND = 3.0
-"""Remaining decay over the observed scatter, if a tenth of it occurs within the record."""
+"""Ratio of the remaining decay to the observed scatter, if a tenth of the decay is within the record."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
@@ -194,7 +194,7 @@ _NOISE_BAND = (0.2, 0.4)
 """Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
 _NOISE_SEGMENT = 4096
 LEAST_CLEAR = 0.2
-"""Least share of a window without drop-outs."""
+"""Smallest share of a window that must be clear of drop-outs."""
 _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
@@ -242,7 +242,7 @@ class DwellResponse(Labelled):
     noise_source: str
     """Source of that noise, or the reason why it is unknown."""
     rest_bias_i: float
-    """The same bias if everything non-repeating were noise; NaN if other changes are present."""
+    """The same bias if the whole non-repeating part were noise; NaN if that part is too large."""
     rest_error_i: float
     rest_displacement_m: float
     """RMS of the part that does not repeat with the drive [m]."""
@@ -251,7 +251,7 @@ class DwellResponse(Labelled):
     sd_response_ii: float
     """NaN if the response still changes by an unknown amount."""
     slow_change: float
-    """Relative standard uncertainty of Response I by slow change of base or response; NaN likewise."""
+    """Relative standard uncertainty of Response I by slow change of base or response; NaN if unknown."""
     phase_rad: float
     """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
     sd_phase_rad: float
@@ -261,7 +261,7 @@ class DwellResponse(Labelled):
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """RMS of the same in displacement within its band, or the noise in the silence [m]."""
+    """RMS of this noise as displacement in its band, or the noise in the silence if that is larger [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags
@@ -273,8 +273,8 @@ class DwellResponse(Labelled):
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
         """Return a copy with the non-repeating part as noise, for motions not known to be irregular.
 
-        If the motion is not known to repeat either, up to `OVERHEARD` times the noise in the silence
-        counts.
+        If the motion is not known to repeat either, only a part of at most `OVERHEARD` times the known noise
+        counts as noise.
         """
         heard_m = self.noise_displacement_m
         if not (is_known_to_repeat or self.rest_displacement_m <= OVERHEARD * heard_m):
@@ -304,7 +304,7 @@ def dwell_response(
     """Analyse the last seconds of a dwell.
 
     Raises NotEnoughData when the record without its disturbed ends is shorter than the window, and
-    UnusableData when the drive channel holds no sine there.
+    UnusableData when the drive channel has no sine near ``near_hz``.
 
     Parameters
     ----------
@@ -314,11 +314,11 @@ def dwell_response(
     near_hz
         Drive frequency, within 20 %; the exact one is measured.
     window_s
-        Length of the window, ending where the settled part of the displacement ends [s].
+        Length of the window, which ends with the settled part of the displacement [s].
     towards_hz
         Frequencies, such as those of the bound modes, near which (10 %) the largest peak is listed.
     delay_s
-        By how much the response channel lags the base channel [s].
+        Lag of the response channel behind the base channel [s].
     sensors
         Gain ratio of the response sensor to the base sensor at the drive frequency, without delays.
     silence
@@ -423,7 +423,7 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
 
 
 def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -> tuple[TrackedOrders, ...]:
-    """Fit over tenths of the window, whose scatter includes all changes and chaos.
+    """Fit the orders in tenths of the window; their scatter includes all changes and chaos.
 
     A window that is too short for ten parts is cut into fewer.
     """
@@ -435,7 +435,7 @@ def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -
 def _slow_changes(
     base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
 ) -> tuple[float, float]:
-    """Return the uncertainties by slow change of the base and of the response over it."""
+    """Return the uncertainties by slow change of the base, and of the response over the base."""
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (

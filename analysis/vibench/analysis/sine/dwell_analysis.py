@@ -32,12 +32,12 @@ BAND_ABOVE = 0.25
 
 
 _CLEAR_MOTION = 0.8
-"""Least share of a dwell without drop-outs if its motion does not repeat."""
+"""Smallest share of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Median deviations above the median that the largest of many noise maxima stays below."""
+"""Largest distance of any of many noise maxima from their median, in median deviations."""
 _LEAST_RISE = 0.01
-"""Least relative rise of |x| above its usual maximum in a burst."""
+"""Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,10 @@ class Section:
     """Drive phase of the points; the drive is a cosine."""
     displacement_m: Reals
     velocity_m_per_s: Reals
-    """Shape (periods,)."""
+    """Displacement and velocity of the points, shape (periods,)."""
     orbit_displacement_m: Reals
     orbit_velocity_m_per_s: Reals
-    """The phase portrait: shape (samples,), over the same stretch."""
+    """Phase portrait over the same stretch, shape (samples,)."""
     time_s: Reals
     """Time of the points, from the first sample of the record; shape (periods,)."""
 
@@ -80,7 +80,7 @@ def stroboscope(
     phase_rad
         Phase of the points.
     delay_s
-        By how much the response channel lags the drive channel [s].
+        Lag of the response channel behind the drive channel [s].
     """
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
@@ -154,7 +154,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
 
 
 def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> float:
-    """Return the relative rise of |x| over the median of its maxima; 0 if scatter explains it."""
+    """Return the relative rise of |x| above the median of its maxima; 0 if scatter explains it."""
     motion = response.displacement
     size = np.where(is_clear, np.abs(motion.samples), 0.0)[motion.edge_samples : -motion.edge_samples]
     block = round(LONGEST_PERIOD * motion.sample_rate_hz / response.drive.frequency_hz)
@@ -179,7 +179,7 @@ class IrregularMotion:
 
 
 def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
-    """Return how long the motion of a dwell did not repeat; None if all of it repeats."""
+    """Return the part of a dwell in which the motion did not repeat; None if all of it repeats."""
     section = _section(channels, response)
     points = _points(section, response, channels.sample_rate_hz)
     begin = begin_of_last_motion(points)
@@ -292,7 +292,7 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     motion: DwellMotion
     """Poincaré points and verdict."""
     irregular: IrregularMotion | None
-    """How long it did not repeat; None if all of it repeats."""
+    """Part of the motion that did not repeat; None if all of it repeats."""
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
@@ -338,7 +338,7 @@ def settled_envelope(response: DwellResponse) -> Envelope:
 _HIGHEST_ORDER = 2.4
 """Upper end of a shown spectrum relative to the drive frequency."""
 COLUMN_HZ = 1.0
-"""Width of a column [Hz], drawn as its largest line: a figure has no more pixels."""
+"""Width of a column [Hz], in which only the largest line is drawn: a figure has no more pixels."""
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:

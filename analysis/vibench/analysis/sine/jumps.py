@@ -14,7 +14,7 @@ from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
 
 _SIDE = 12
-"""Intervals on each side for a straight line."""
+"""Intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
 """Standard errors of a significant step among thousands of candidates, even with rough errors."""
@@ -23,10 +23,10 @@ _LIKELY = 3.84
 _TRANSITION = 3
 """Intervals of the transition, which belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
-"""Degree of a polynomial for 1/response squared, which a resonance follows, and its largest residual over the
-step: a step leaves 0.13 or more, and 400 resonances left 0.03 at most."""
+"""Degree of the polynomial that 1/response squared follows at a resonance, and its largest residual
+relative to the step: a jump leaves 0.13 or more, and 400 resonances left 0.03 at most."""
 _LARGER = 2.0
-"""Least step over that of the linear specimen."""
+"""Smallest ratio of a jump to the step of the linear specimen."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -45,7 +45,7 @@ class Jump:
     after: float
     """Response before and after, in the order of time."""
     standard_errors: float
-    """Step over its uncertainty."""
+    """Step divided by its standard error."""
 
     @property
     def decibel(self) -> float:
@@ -64,13 +64,13 @@ def jumps(
 
     At each interval straight lines are fitted to the logarithm of the response before and after. A jump is
     a local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear
-    specimen are excluded: they are steep, and ring in a fast sweep. Its place maximises the likelihood; its
-    bounds come from the likelihood ratio.
+    specimen are excluded: they are steep, and ring in a fast sweep. The place of a jump maximises the
+    likelihood; its bounds come from the likelihood ratio.
 
     Parameters
     ----------
     time_s, frequency_hz, response
-        In the order of time, shape (intervals,); the response positive.
+        In the order of time, shape (intervals,); the response must be positive.
     smooth
         Intervals with smooth motion, by default all. At least one side of a jump must be smooth, because a
         chaotic response fluctuates without jumps.
@@ -107,7 +107,7 @@ def _logarithm(response: Reals) -> Reals:
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Return the step before each interval, between lines on both sides, and its standard error."""
+    """Return the step at each interval between the lines fitted on both sides, and its standard error."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
@@ -149,7 +149,7 @@ def _peaks(size: Reals) -> list[int]:
 
 
 def _likely(logarithm: Reals) -> tuple[int, int, int]:
-    """Return the lowest, best and highest boundary of one step, by the likelihood of two levels."""
+    """Return the lowest, best and highest place of one step, from the likelihood of two levels."""
     count = logarithm.size
     misfit = np.full(count, np.inf)
     for place in range(2, count - 1):
@@ -182,10 +182,10 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
 
 
 JUMP_FACTOR = 2.0
-"""Change of Response II between two levels that counts as a jump; a linear one does not change."""
+"""Change of Response II between two levels that counts as a jump; a linear response does not change."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may contain two motions; NaN too."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class LevelJump:
     before_vpp: float
     after_vpp: float
     factor: float
-    """Response II after over before."""
+    """Ratio of Response II after the jump to before."""
 
 
 def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
@@ -221,7 +221,7 @@ def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
 
 
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
-    """Return the least and largest difference between the levels of the jumps up and down [V].
+    """Return the smallest and largest difference between the levels of the jumps up and down [V].
 
     None without both jumps.
     """
@@ -255,7 +255,7 @@ class SteppedLevelAnalysis(SteppedSineAnalysis):
 _POINTS = 1000
 _APART_DB = 1.5
 _SMOOTHED_POINTS = 21
-"""Averaging width relative to the band: the scatter of chaos is not hysteresis."""
+"""Number of averaged points, so that the scatter of chaos does not count as hysteresis."""
 _PER_BEL_DB = 20.0
 
 
@@ -266,7 +266,7 @@ class Hysteresis(Labelled):
     frequency_hz: Reals
     up: Reals
     down: Reals
-    """Response II."""
+    """Response II of both sweeps."""
     differs: Flags
     """Where both differ by more than 1.5 dB, averaged over 2 % of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]

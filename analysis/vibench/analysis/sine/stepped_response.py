@@ -73,7 +73,7 @@ class SteppedResponse(Labelled):
     sd_response_ii: Reals
     """NaN if the response still changed during the step."""
     slow_change: Reals
-    """Relative standard uncertainty of Response I by slow change; NaN likewise."""
+    """Relative standard uncertainty of Response I by slow change; NaN if unknown."""
     phase_rad: Reals
     left_out: int
     """Number of steps that were incomplete, lost samples or had drop-outs."""
@@ -118,7 +118,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
-    # Before and after, frequency or level differed; integration would mix them in.
+    # Outside the step, frequency or level differed, and integration would mix that in.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     bridged = channels.bridged(stretch.start, stretch.stop)[places]
@@ -141,7 +141,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
     """Return the indices that continue a record at both ends, shape (samples + 2 edge,).
 
-    It is continued by whole drive periods, after which the response (last row) repeats best.
+    The record is continued periodically; the number of drive periods is that which fits the response best.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
@@ -288,7 +288,7 @@ class TrackedResonance:
     harmonic: int
     """Harmonic of the drive, at which m0 resonates."""
     subharmonic: int
-    """Drives in a period of m0."""
+    """Number of drive periods in a period of m0."""
     mode_hz: float | None
     """Natural frequency, fitted to both flanks; None if undetermined."""
     u_mode_hz: float | None

@@ -119,7 +119,7 @@ _SAME_LARGEST = 0.03
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge after which a bridge of three times the motion errs by 2 %."""
+"""Periods of the band's lower edge after which the error of a bridge three times the motion is 2 %."""
 _ROOM = 1.1
 """Relative margin of the interval length, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
@@ -129,7 +129,7 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 @dataclass(frozen=True)
 class SweptMotion(Labelled):
-    """Quantities to compare draws of a sweep; arrays of shape (intervals,) unless stated otherwise."""
+    """Quantities by which draws of a sweep are compared; arrays of shape (intervals,) unless stated."""
 
     OWN_UNITS: ClassVar = {
         "upper": "m s-1",
@@ -147,7 +147,7 @@ class SweptMotion(Labelled):
     time_s: Reals
     """Centre of each interval, from the first sample of the sweep."""
     frequency_hz: Reals
-    """Instantaneous frequency of the recorded drive there."""
+    """Mean frequency of the recorded drive in each interval."""
     upper: Reals
     lower: Reals
     """Largest and smallest value of the recorded response at the full sample rate [m/s]."""
@@ -159,9 +159,9 @@ class SweptMotion(Labelled):
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
-    """Largest |x| over the drive amplitude without drop-outs; NaN if they leave too little."""
+    """Largest |x| outside drop-outs, divided by the drive amplitude; NaN if too little is left."""
     response_ii: Reals
-    """Amplitude of x at the drive frequency over the drive amplitude."""
+    """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: Reals
     phase_rad: Reals
     """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
@@ -170,11 +170,11 @@ class SweptMotion(Labelled):
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
-    """Residual over order 1 of the specimen without contact in this sweep; NaN without a specimen."""
+    """Residual relative to order 1, of the specimen without contact in this sweep; NaN without a specimen."""
     linear_ii: Reals
-    """Response II of the same, which rings too."""
+    """Response II of the specimen without contact in this sweep, with its ringing."""
     linear_impacts: Reals
-    """Orders 2 and 3 over order 1 of the same, from modes that still ring at twice the drive."""
+    """Orders 2 and 3 relative to order 1 in this response, from modes that still ring at twice the drive."""
     steady_over_swept: float
     """Ratio of the largest Response II without contact under steady sines to that in this sweep; NaN if the
     measured one differs, for example while the specimen still rings."""
@@ -213,11 +213,11 @@ class SweepResponse(SweptMotion):
     """Drive frequency at the centre of each longer interval, shape (longer intervals,)."""
     noise_bias_i: Reals
     noise_error_i: Reals
-    """Expected bias of Response I by noise."""
+    """Expected bias and rms error of Response I by noise."""
 
 
 Transmission = Callable[[Reals], Complexes]
-"""Displacement of m0 over that of the base against frequency [Hz], both of shape (lines,)."""
+"""Function of frequency [Hz]: ratio of m0's displacement to the base's; both have shape (lines,)."""
 
 
 class SweepSums:
@@ -310,7 +310,7 @@ class SweepSums:
         Parameters
         ----------
         delay_s
-            By how much the response channel lags the base channel [s].
+            Lag of the response channel behind the base channel [s].
         linear
             Transmission of the specimen without contact, for comparison in the same sweep.
         """
@@ -330,7 +330,7 @@ class SweepSums:
         )
 
     def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
-        """Return the quantities for comparing draws; see `response`."""
+        """Return the quantities by which draws are compared; see `response`."""
         return self._analysed(delay_s, linear)[0]
 
     @property
@@ -369,7 +369,7 @@ class SweepSums:
         residual = impacts = linear_ii = np.full(upper.size, np.nan)
         steady_over_swept = np.nan
         if linear is not None:
-            # Order 1 only, because accelerometer noise would ring in a linear specimen too.
+            # Drive the linear specimen by order 1 only: accelerometer noise would make it ring too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
             place = np.arange(data.shape[1])
             at_middles = base.order(1.0)

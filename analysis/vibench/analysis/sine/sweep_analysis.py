@@ -59,8 +59,8 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
     """Find the jumps of Response II that have a smooth motion on one side.
 
-    Without a description of the specimen they are known only where collisions begin or end: elsewhere they
-    may be the ringing of a fast sweep.
+    Without a description of the specimen, only jumps where collisions begin or end are returned: others may
+    be the ringing of a fast sweep.
     """
     smooth = ~colliding.is_colliding
     where = (response.time_s, response.frequency_hz, response.response_ii, smooth)
@@ -73,7 +73,7 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
 
 
 _NEAR = 12
-"""Intervals between a jump and the collisions that it begins or ends."""
+"""Largest number of intervals between a jump and the start or end of collisions that it marks."""
 
 
 _BEHIND_STEPS = 1.5
@@ -99,7 +99,7 @@ def played_check(response: SweepResponse, sweep: Sweep) -> Check:
 
 
 def _is_whole(channels: Channels, first: int, last: int) -> bool:
-    """Whether samples were recorded there, none of them lost."""
+    """Return whether all samples from ``first`` to before ``last`` were recorded."""
     return first >= 0 and last <= channels.samples and not np.isnan(channels.read(first, last)).any()
 
 
@@ -127,7 +127,7 @@ class SweepDraws:
         self._clock: DrivePhase | None = None
 
     def motion(self, channels: Channels) -> SweptMotion:
-        """Analyse a draw like `measured_sweep`; the first measures the drive."""
+        """Analyse a draw like `measured_sweep`; the first draw measures the phase of the drive."""
         sums = _sums(self._sweep, channels, self._clock)
         first = _read_sweep(channels, sums, lambda _: None)
         found = sums.motion(delay_s=channels.response_delay_s, linear=_without_contact(self._specimen))
@@ -152,7 +152,7 @@ def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], Non
     reach = min(sums.neighbour_samples, stretch.samples // 4)
     start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
     stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
-    # The specimen may still ring from before the sweep.
+    # A longer lead-in contains base motion before the sweep, from which the specimen may still ring.
     lead = reach * max(1, min(round(_LEAD_S * rate), start) // max(reach, 1))
     lead = lead if _is_whole(channels, start - lead, start - reach) else reach
     for begin, end, add in (
