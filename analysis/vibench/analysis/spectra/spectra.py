@@ -31,7 +31,7 @@ class SpectralAverages:
     segments_excluded: int
     """Segments left out because they touched an invalid sample."""
     n_eff: float
-    """Independent averages, corrected for overlap and gaps."""
+    """Number of independent averages, corrected for overlap and gaps."""
     segment_samples: int
     window: Window
     overlap: float
@@ -54,9 +54,9 @@ class SpectralAverages:
 class SegmentSpectra:
     """Sum of the products of segment spectra over blocks of samples.
 
-    The FFT of each segment is computed once and shared by all pairs of channels. The mean is not removed:
-    with a Hann window an offset reaches lines 0 and 1 only, with a boxcar line 0 only, whereas removing it
-    per segment would disturb the lowest lines.
+    The FFT of each segment is computed once and shared by all pairs of channels. The mean is not removed,
+    because removing it per segment would disturb the lowest lines. An offset only reaches lines 0 and 1 with
+    a Hann window, and line 0 with a boxcar.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class SegmentSpectra:
         self._carry_valid = marks[count * self._hop :]
 
     def _sum_products(self, spectra: Complexes) -> None:
-        """Add conj(X_i) X_j for i <= j; the other half is filled in at the end."""
+        """Add conj(X_i) X_j for i <= j; `averages` fills in the other half."""
         for i, first in enumerate(spectra):
             self._sums[i, i] += np.einsum("kf,kf->f", first.real, first.real)
             self._sums[i, i] += np.einsum("kf,kf->f", first.imag, first.imag)
@@ -116,8 +116,7 @@ class SegmentSpectra:
     def averages(self) -> SpectralAverages:
         """Return the averages over everything added so far.
 
-        Raises NotEnoughData when no segment could be used, and UnusableData when a sample that was not marked
-        invalid is not finite.
+        Raises NotEnoughData without a usable segment; UnusableData when a sample marked valid is not finite.
         """
         used = np.concatenate(self._used) if self._used else np.empty(0, dtype=np.bool_)
         count = int(np.count_nonzero(used))
@@ -172,12 +171,12 @@ class SpectralDensity(Labelled):
 
     frequency_hz: Reals
     density: Reals
-    """[unit^2 / Hz]."""
+    """Spectral density [unit^2 / Hz]."""
     lower: Reals
     upper: Reals
     """Bounds of each line that contain the true value with probability ``confidence``."""
     n_eff: float
-    """Independent averages, corrected for overlap and gaps."""
+    """Number of independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float
     """Equivalent noise bandwidth: density times this is the power of a sine on a line."""
     segments_used: int
@@ -285,7 +284,7 @@ def amplitude_spectrum(
     samples
         Shape (samples,); the mean is removed, so that an offset does not hide the lowest lines.
     window
-        Hann by default, which reads up to 15 % low between lines; flat top stays within 0.1 %.
+        Hann by default, which shows up to 15 % too little between lines; flat top is within 0.1 %.
     """
     count = samples.size
     if count < 2:
@@ -321,7 +320,7 @@ class Spectrogram(Labelled):
     time_s: Reals
     """Middle of each column, from the first sample, shape (columns,)."""
     frequency_hz: Reals
-    """Shape (rows,)."""
+    """Frequency of each row, shape (rows,)."""
     amplitude: Reals
     """Peak amplitude of a sine with the same power, shape (rows, columns)."""
     resolution_hz: float
@@ -340,7 +339,8 @@ class SpectrogramSums:
 
     Parameters
     ----------
-    samples Length of the whole record, which sets the time per column.
+    samples
+        Length of the whole record, which sets the time per column.
     highest_hz
         Frequency of the last row.
     segment_s
