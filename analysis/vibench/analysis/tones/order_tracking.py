@@ -13,9 +13,9 @@ from ..signals.arrays import Complexes, Reals
 from ..tables import Labelled
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
-"""Impacting systems respond at half orders too."""
+"""Default orders; impacting systems respond at half orders too."""
 ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
-"""With thirds and high harmonics; they need intervals of twelve drive cycles."""
+"""Orders with thirds and high harmonics, which need intervals of twelve drive cycles."""
 _LARGEST_DENOMINATOR = 12
 _BATCH_INTERVALS = 256
 """Intervals solved at once, about 10 MB."""
@@ -59,7 +59,7 @@ class TrackedOrders(Labelled):
 
     @property
     def impacts(self) -> Reals:
-        """Orders 2 and 3 over order 1, shape (intervals,)."""
+        """Magnitude of orders 2 and 3 together, relative to order 1, shape (intervals,)."""
         return np.asarray(np.hypot(*np.abs([self.order(2.0), self.order(3.0)])) / np.abs(self.order(1.0)))
 
 
@@ -81,8 +81,8 @@ def tracked_together(
     """Fit all orders at once to each interval of signals, by least squares.
 
     One order at a time would be biased by the others whenever an interval is not a whole number of
-    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too, so that a
-    drifting sensor or a sweep through a resonance leaves no residual.
+    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too: drift of a sensor
+    or a sweep through a resonance then leaves no residual.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def tracked_together(
         The signals and the drive phase at the same instants, each of shape (samples,); a remainder
         after the last whole interval is not used.
     interval_samples
-        Must hold at least two periods of the smallest distance between orders.
+        Samples per interval; at least two periods of the smallest distance between orders.
     """
     count = phase_rad.size // interval_samples
     if count == 0:
@@ -118,8 +118,7 @@ def tracked_together(
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
     """Return exp(i order phase) for each order.
 
-    Rational orders are powers of one phasor: a product costs a tenth of
-    a sine and a cosine.
+    Rational orders are computed as powers of one phasor: a product costs a tenth of a sine and a cosine.
     """
     fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
     if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):

@@ -18,9 +18,9 @@ from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spec
 from .order_tracking import tracked_orders
 
 _NOISE_NEIGHBOURS = 50
-"""Lines on each side whose median is the noise floor around a peak."""
+"""Lines on each side of a peak, whose median is the noise floor."""
 _LEAST_RATIO = 5.0
-"""Least ratio of a peak to that floor."""
+"""Smallest ratio of a peak to the noise floor."""
 _MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
 """Median of the magnitude of complex noise, in standard deviations of one component."""
 
@@ -41,16 +41,16 @@ class Peak:
 def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
     """Find the largest peaks of a Hann spectrum in a band, the largest first.
 
-    For a sine between two lines the ratio of the two largest Hann values gives the place exactly
-    (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355): d = (2a - 1) / (a + 1), and the amplitude is
-    the reading times (pi d / sin(pi d)) (1 - d^2).
+    For a sine between two lines, d = (2a - 1) / (a + 1) is its distance from the larger line, where a is the
+    ratio of the smaller line to the larger (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355). The
+    amplitude is that of the larger line times (pi d / sin(pi d)) (1 - d^2).
 
     Parameters
     ----------
     low_hz, high_hz
-        Where to look; both at least two lines away from 0 and from half the sample rate.
+        Band to search, at least two lines away from 0 and from half the sample rate.
     count
-        At most this many.
+        Largest number of peaks to return.
     """
     if spectrum.window is not Window.HANN:
         raise InvalidRequest(
@@ -112,9 +112,9 @@ class FittedSine:
 def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
     """Fit a sine and a straight line by least squares, frequency included (IEEE Std 1057, four parameters).
 
-    The line takes the drift of a sensor, which is not in the standard.
+    The straight line, which is not in the standard, takes up the drift of a sensor.
 
-    Raises UnusableData when no line stands above the noise there.
+    Raises UnusableData when no spectral line near ``near_hz`` stands above the noise.
 
     Parameters
     ----------
@@ -182,14 +182,14 @@ class DriveLevel:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """Standard deviation by the converter clock, from the drive channel."""
+    """Standard deviation of the frequency relative to the converter clock, from the drive channel."""
     phase_rad: float
     """Phase of the drive voltage, as a cosine, at the first sample."""
     amplitude_m: float
     """A0: displacement amplitude of the base at the drive frequency [m]."""
     sd_amplitude_m: float
     distortion: float
-    """Displacement amplitudes of orders 2 and 3 over that of order 1."""
+    """Displacement amplitude of orders 2 and 3 together, relative to order 1."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ class NoiseDriveLevel:
     low_hz: float
     high_hz: float
     rms_acceleration: float
-    """[m/s2]."""
+    """RMS acceleration of the base [m/s2]."""
     rms_displacement_m: float
     relative_sd: float
     """Relative standard deviation of both, from independent averages and lines."""
@@ -234,7 +234,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
     density
         Density of the base acceleration [(m/s2)^2 / Hz].
     low_hz, high_hz
-        The band.
+        Ends of the band.
     """
     kept = (density.frequency_hz >= low_hz) & (density.frequency_hz <= high_hz) & (density.frequency_hz > 0)
     factor = np.abs(
@@ -256,7 +256,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
 _REACH_SD = 7.0
 """Noise beyond this many standard deviations is neglected (1e-12 per sample)."""
 _GRID = 141
-"""Ten points per standard deviation: the integral is then good to 1e-3 of one."""
+"""Number of points, ten per standard deviation: the integral errs by 1e-3 of a standard deviation."""
 
 
 class NoiseLift(NamedTuple):
@@ -271,9 +271,9 @@ class NoiseLift(NamedTuple):
 def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift:
     """Return the rise of max|x| by Gaussian noise, expected and root mean square.
 
-    From the distribution of the maximum, P(max < z) = prod_j P(|x_j + n_j| < z), where x_j is the largest
-    sample that shares one noise value. Noise alone over 51 200 samples gives 4.4 standard deviations. The
-    samples stand for the true motion, although they may contain the noise.
+    Both follow from the distribution of the maximum, P(max < z) = prod_j P(|x_j + n_j| < z). Here x_j is the
+    largest of the samples with one noise value n_j. Noise alone over 51 200 samples gives 4.4 standard
+    deviations. The samples are taken as the true motion, although they may contain the noise.
 
     Parameters
     ----------
