@@ -14,7 +14,7 @@ from ..tables import Labelled, plus_minus
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Widening of scatter if the recording ended by it, see `Budget.widened`."""
+"""Factor on the scatter if the scatter decided when the recording ended, see `Budget.widened`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = {
@@ -23,7 +23,7 @@ RESULT_PATTERNS: Mapping[str, str] = {
     "response_i": r"\bResponse I\b",
     "response_ii": r"\bResponse II\b",
 }
-"""Quantities that belong to a result for which a recording may wait, see `vibench.acquisition.plan.Until`."""
+"""Names of quantities for each result that can end a recording, see `vibench.acquisition.plan.Until`."""
 
 
 class Cause(StrEnum):
@@ -49,7 +49,7 @@ class Contribution:
     relative: float | None
     """Relative standard uncertainty; None if not stated."""
     source: str
-    """Source of the value, or missing information."""
+    """Source of the value, or the information that is missing."""
 
     def __post_init__(self) -> None:
         if self.relative is not None and not 0.0 <= self.relative < np.inf:
@@ -60,7 +60,7 @@ class Contribution:
 
 
 def from_scatter(cause: Cause, sd: float, value: float, source: str) -> Contribution:
-    """Return the contribution of a standard deviation; not stated if their ratio is not finite."""
+    """Return the contribution of a standard deviation; not stated if its ratio to the value is not finite."""
     with np.errstate(all="ignore"):
         relative = float(np.divide(sd, abs(value)))
     return Contribution(cause, relative if np.isfinite(relative) else None, source)
@@ -83,13 +83,13 @@ class Budget(Labelled):
 
     @property
     def standard(self) -> float:
-        """Combined standard uncertainty of what is stated (JCGM 100:2008, eq. 10) [unit]."""
+        """Combined standard uncertainty of the stated contributions (JCGM 100:2008, eq. 10) [unit]."""
         stated = [each.relative for each in self.contributions if each.relative is not None]
         return float(abs(self.value)) * hypot(*stated)
 
     @property
     def expanded(self) -> float:
-        """Twice that [unit]."""
+        """Expanded uncertainty: twice the standard uncertainty [unit]."""
         return COVERAGE * self.standard
 
     @property
@@ -112,9 +112,9 @@ class Budget(Labelled):
     def widened(self) -> "Budget":
         """Return the widened budget of a recording that ended when its scatter was small enough.
 
-        Underestimated scatter ends a recording more often. The factor gives 95 % coverage for Gaussian
-        records of ten parts, checked up to nine times at intervals that grow by the square root of two, for
-        any target: `benchmarks/until_coverage.py --rule`.
+        Such a recording often ends because its scatter is underestimated. The factor gives 95 % coverage for
+        any target: `benchmarks/until_coverage.py --rule`. It holds for Gaussian records of ten parts that are
+        checked up to nine times, at intervals that grow by the square root of two.
         """
         parts = tuple(
             replace(each, relative=WIDENING * each.relative, source=f"{each.source}, its end chosen by it")
@@ -126,7 +126,7 @@ class Budget(Labelled):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence: expanded uncertainty, and contributions from the largest."""
+        """Return a sentence with the expanded uncertainty and the contributions, the largest first."""
         causes = dict.fromkeys(each.cause for each in self.contributions)
         parts = sorted(((size, cause.value) for cause in causes if (size := self.share(cause))), reverse=True)
         each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
@@ -198,7 +198,7 @@ def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> It
     if angle is None:
         yield Contribution(Cause.ALIGNMENT, None, f"{sensor}: alignment_deg is not stated")
     else:
-        # Of (angle^2 / 2)^2 over a uniform angle.
+        # Root of the mean of (angle^2 / 2)^2 over a uniform angle.
         relative = np.radians(float(angle["value"])) ** 2 / np.sqrt(20.0)
         yield Contribution(Cause.ALIGNMENT, float(relative), f"{sensor}: {angle['source']}")
 

@@ -1,4 +1,4 @@
-"""Expected uncertainty of a plan over recording time, before anything moves."""
+"""Expected uncertainty of a plan over recording time, computed before the measurement."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -47,15 +47,15 @@ STEADY = 1e-4
 """Relative scatter below which a simulated motion repeats."""
 _SETTLED_S = 2.5
 _EDGE_PERIODS = 80
-"""Time at each end that integration disturbs [s]."""
+"""Drive periods at each end that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Difference of runs on different motions, in standard errors."""
+"""Difference of runs, in standard errors, above which they are on different motions."""
 
 
 @dataclass(frozen=True)
 class SimulatedDwell:
-    """Windows of the rig under a sine, from several starts."""
+    """Results of simulated dwells of the rig from several starts."""
 
     sd_largest: float
     """Standard deviation of Response I, relative; 0 where nothing collides."""
@@ -68,10 +68,10 @@ class SimulatedDwell:
 def simulated_dwell(
     measurement: Measurement, rig: Rig, at_hz: float, window_s: float
 ) -> SimulatedDwell | None:
-    """Simulate amplifier, table and specimen under the plan's voltage, and analyse that like a recording.
+    """Simulate amplifier, table and specimen under the plan's voltage, and analyse them like a recording.
 
     Runs start more gently and harder than the generator's ramp: if both reach the same motion, the
-    measurement will too. None if a motion is lost, or the window is too short.
+    measurement will too. None if a simulation fails, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -117,7 +117,7 @@ def _scatter(found: DwellResponse) -> tuple[float, float]:
 
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
-    """Return the peak at the terminal: as set, or as feedback will set it for its level."""
+    """Return the peak voltage at the terminal: as set, or as feedback needs for its level."""
     excitation = measurement.excitation
     if not isinstance(excitation, HeldDwell):
         return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
@@ -128,7 +128,7 @@ def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
 _WINDOW_S, _TENTHS = 5.0, 10
 _GRID_HZ = 0.25
 _HIGHEST_TURN = 4.0
-"""Largest value of Gaussian noise over its rms, within some ten thousand turns."""
+"""Largest value of Gaussian noise relative to its rms, within some ten thousand cycles."""
 _TIMES = (0.25, 1.0, 4.0, 16.0)
 _HALF_BAND_HZ = 25_600.0
 """Band of the white noise of a virtual accelerometer [Hz]."""
@@ -146,7 +146,7 @@ class Expected(Labelled):
 
     quantity: str
     time_s: float
-    """Planned recording time, or the window of a sine."""
+    """Planned recording time, or the length of a sine's window."""
     scatter: float | None
     """Relative standard uncertainty by noise or chance after that time; None if not stated."""
     cause: Cause
@@ -162,12 +162,12 @@ class Expected(Labelled):
 
     @property
     def curve(self) -> tuple[tuple[float, float | None], ...]:
-        """Recording times [s], from 1/4 to 16 times the planned, with `after` each."""
+        """Recording times from 1/4 to 16 times the planned one [s], with the result of `after` for each."""
         return tuple((factor * self.time_s, self.after(factor * self.time_s)) for factor in _TIMES)
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Expected uncertainty in words."""
         missing = ", ".join(self.not_stated)
         return f"{self.quantity}: {self._how}" + (f"; not stated: {missing}" if missing else "")
 
@@ -200,18 +200,18 @@ class Expected(Labelled):
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
-    Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
-    Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
-    runs of the described rig under its voltage, analysed like a recording; where these settle on different
-    motions nothing is stated. Scatter falls with the root of the time. Other kinds of plan give nothing, nor
-    does a rig without a channel for the motion of m0 or for the base's acceleration.
+    The results of noise are frequency, damping and transmissibility at each resonance of the linear specimen.
+    Those of a sine are both Responses over a window of at most 5 s. Their chance is the scatter of three
+    simulated runs of the rig, analysed like recordings; it is not stated if the runs settle on different
+    motions. Scatter falls with the root of the time. Other kinds of plan, and rigs without a channel for the
+    motion of m0 or the base's acceleration, have no expected results.
 
     Parameters
     ----------
     measurement
         The plan.
     rig
-        What it is played on: its specimen, and what it states of sensors and noise.
+        The rig, with its specimen and its stated sensors and noise.
     """
     has_base = any(channel.role is Role.BASE_ACCELERATION for channel in rig.daq.channels)
     if rig.response is None or not has_base:
@@ -229,19 +229,19 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
 
 
 MOST_STEPS = 6
-"""Number of stretches with a predicted end; others are taken to last as long on average."""
+"""Most stretches whose end is predicted; the others are assumed to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
-    """Return the planned time of all that is recorded [s]."""
+    """Return the planned recording time of all steps [s]."""
     return float(sum(each.record_s for each in measurement.excitation.steps()))
 
 
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
     """Predict the recorded time of a measurement with `until`, over all stretches [s].
 
-    It ends at a check, and at its planned time at the latest. None if the scatter is unknown beforehand,
-    or without `until`.
+    A stretch ends at a check of its bounds, and at its planned time at the latest. None if the scatter is
+    unknown beforehand, or without `until`.
     """
     return _in_all(measurement, rig, end_s)
 
@@ -249,7 +249,7 @@ def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
 def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
     """Predict the recorded time until all targets are met, over all stretches [s].
 
-    None where it is not known, or no time is long enough.
+    None if the time is not known, or no time is long enough.
     """
     needed_s = _in_all(measurement, rig, lambda need_s, first_s, _: max(need_s, first_s))
     return needed_s if needed_s is not None and np.isfinite(needed_s) else None
@@ -269,7 +269,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Give the time that wishes need, the first look and the planned time [s], of some stretches."""
+    """Yield times of some stretches [s]: needed for all targets, until the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -300,7 +300,7 @@ def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
         for each in found:
             if each.scatter is None:
                 return None
-            # The uncertainty of a maximum does not fall with time: its scatter is 0, and `lasting` holds it.
+            # The uncertainty of a maximum does not fall with time: it is in `lasting`, and `scatter` is 0.
             share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
             fixed = float(np.inf) if share > 1.0 else 0.0
             needs.append(each.time_s * share**2 if each.scatter else fixed)
@@ -308,7 +308,7 @@ def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
 
 
 def end_s(need_s: float, first_s: float, longest_s: float) -> float:
-    """Return the time of the check at which a need is met, at most the longest [s]."""
+    """Return the time of the first check that is not before ``need_s``, at most ``longest_s`` [s]."""
     looks = np.ceil(np.log(min(max(need_s, first_s), longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)
     return float(min(first_s * LOOK_FACTOR ** max(0.0, looks), longest_s))
 
@@ -337,7 +337,7 @@ def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
 def _densities(rig: Rig, frequency_hz: Reals) -> tuple[Reals, float] | None:
     """Noise of m0's velocity [(m/s)^2/Hz] and of the base's acceleration [(m/s2)^2/Hz], one-sided.
 
-    None if not stated. An integrated acceleration has the noise of its sensor over the frequency.
+    None if not stated. The noise of an integrated acceleration is that of its sensor over omega.
     """
     response = rig.response or Role.M0_VELOCITY
     of_m0, of_base = _density(rig, response), _density(rig, Role.BASE_ACCELERATION)
@@ -360,7 +360,7 @@ def _density(rig: Rig, role: Role) -> float | None:
 
 
 def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
-    """Yield the results of a fit to the linear specimen's lines with the sensors' noise."""
+    """Yield the expected results of a modal fit to the lines of the linear specimen with sensor noise."""
     excitation, specimen = measurement.excitation, specimen_of(rig)
     time_s = recorded_s(measurement)
     low_hz, high_hz = excitation.band_hz
@@ -440,7 +440,7 @@ def _expected_lines(
 
 
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
-    """Return whether p of the linear specimen reaches a stop: Gaussian, some thousand turns long."""
+    """Return whether p of the linear specimen, taken as Gaussian over many cycles, reaches a stop."""
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
     p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
     rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
@@ -448,9 +448,9 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
 
 
 def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
-    """Yield what is to be expected of a sine.
+    """Yield the expected Responses of a sine.
 
-    Nothing where a window has no period for each of its tenths, or the motion cannot be simulated.
+    None are yielded if a tenth of the window is shorter than a period, or the motion cannot be simulated.
     """
     window_s = min(_WINDOW_S, sum(each.record_s for each in measurement.excitation.steps()))
     if at_hz * window_s < _TENTHS:
@@ -473,11 +473,11 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         if chance.has_several_motions:
             yield Expected(name, window_s, None, Cause.CHANCE, lasting, missing)
         elif scatter > STEADY and name == RESPONSE_I:
-            # The largest of a window of its own: no time makes it another's.
+            # The largest value differs from window to window, which a longer recording does not reduce.
             yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
         elif scatter > STEADY:
             yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
-            # What generator and amplifier hiss moves the masses, and no rig states it.
+            # Noise of generator and amplifier moves the masses, and no rig states it.
             told = None if name == RESPONSE_I else by_noise
             yield Expected(name, window_s, told, Cause.NOISE, lasting, missing)

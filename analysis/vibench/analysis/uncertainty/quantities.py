@@ -1,4 +1,4 @@
-"""The budgets of each kind of measurement: which causes act on its numbers, and how strongly."""
+"""Uncertainty budgets of each kind of measurement: the causes that act on its results, and their sizes."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,22 +20,22 @@ from ..sine.sweep_analysis import SweepAnalysis
 from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
-"""Number of parts of a window whose maxima give the scatter of the whole maximum."""
+"""Usual and smallest number of parts of a window, whose maxima give the scatter of the largest."""
 _ALIKE = 1e-12
-"""Differences of maxima over their size that are roundings."""
+"""Relative difference of maxima that is only rounding error."""
 _FEWEST_DRAWS = 5
 _UNTOLD = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Chance in a maximum, and in a sweep's results from a tenth of a second."""
+"""Unstated chance, for a maximum or a sweep's interval of a tenth of a second without draws of the twin."""
 _ENDS = 2
-"""Intervals at either end of a sweep; a largest value there is not a peak, since it depends on the ends."""
+"""Intervals at either end of a sweep; a largest value there is no peak, as it depends on where they begin."""
 _PEAKED = 1.05
-"""Response I over Response II above which a step is not a sine."""
+"""Ratio of Response I to Response II above which the motion in a step is not a sine."""
 _FEWEST_PERIODS = 20.0
-"""Fewest periods of the drive in a part: its maximum is then one of many turns."""
+"""Fewest drive periods in a part, so that its maximum is the largest of many peaks."""
 
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Return frequency, damping ratio and transmissibility of every resonance."""
+    """Return budgets for frequency, damping ratio and transmissibility of every resonance."""
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     found = analysis.response
     chance = _chance_share(found)
@@ -79,7 +79,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[B
 
 
 def _chance_share(found: NoiseResponse) -> float:
-    """Return the share of the lines' variance that the periods' noise does not explain; 0 if unknown."""
+    """Return the share of the lines' variance that noise between periods does not explain; 0 if unknown."""
     if found.periodic is None or found.periodic.distortion_variance is None:
         return 0.0
     more = float(np.median(found.periodic.distortion_variance))
@@ -88,7 +88,7 @@ def _chance_share(found: NoiseResponse) -> float:
 
 
 def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
-    """Return base amplitude and both responses of a dwell."""
+    """Return budgets for the base amplitude and both responses of a dwell."""
     found = analysis.response
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
@@ -125,7 +125,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
 
 
 def _ratio(stated: Stated) -> tuple[Contribution, ...]:
-    """Displacement over displacement, from velocity over acceleration: once by the frequency."""
+    """Return the contributions to a displacement ratio, measured as velocity / acceleration * frequency."""
     return (*stated.response, *stated.base, *stated.timed(1))
 
 
@@ -134,12 +134,12 @@ def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str
 
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
-    """Return what the scatter of A0 adds to a maximum that is checked against it."""
+    """Return the contribution of the scatter of A0 to a maximum that is divided by A0."""
     return from_scatter(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
 def _of_change(relative: float) -> tuple[Contribution, ...]:
-    """Return what slow change over the record adds to a maximum; nothing where there is none."""
+    """Return the contribution of slow change over the record to a maximum; empty without change."""
     if relative == 0.0:
         return ()
     return (from_scatter(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
@@ -164,14 +164,14 @@ def of_one_draw(found: DwellResponse) -> Contribution:
 
 
 def sd_of_largest(maxima: Reals) -> float:
-    """Return how the largest of as many maxima scatters, as generalised extreme values.
+    """Return the standard deviation of the largest of these maxima, taken as generalised extreme values.
 
-    With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
-    largest of n is n^-k of that of one: less where the motion is bounded, the same where it is not.
+    With their shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
+    largest of n values is n^-k times the scale of one: smaller for a bounded motion, equal otherwise.
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
         return 0.0
-    # Of their largest: sums of the smallest numbers there are have no digits left.
+    # Relative to the largest, because sums of the smallest floating-point numbers have no digits left.
     ordered, count = np.sort(maxima) / np.max(maxima), maxima.size
     place = np.arange(count)
     first, second, third = (
@@ -189,10 +189,10 @@ def sd_of_largest(maxima: Reals) -> float:
 
 
 def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Return base amplitude and largest Responses of a sweep, with where they are."""
+    """Return budgets for base amplitude and largest Responses of a sweep, with their frequencies."""
     found = analysis.response
     top = found.largest(found.response_ii)
-    # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
+    # A residual that sensor noise does not explain may be chaos, of which a sweep shows one draw.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_uncertainties(analysis.facts.bench, analysis.facts.response)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
@@ -202,7 +202,7 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
 
 
 def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Return the largest Responses of the steps, with where they are."""
+    """Return budgets for the largest Responses of the steps, with their frequencies."""
     found = analysis.response
     if not found.response_ii.size:
         return ()
@@ -228,7 +228,7 @@ def _largest(
         own = [from_scatter(Cause.NOISE, float(scatter[top]), value, source)]
         if isinstance(found, SweepResponse):
             is_hidden = ~found.is_clear | np.isnan(found.response_i)
-            # What a bridge misses scatters within its interval.
+            # Motion that a bridge over a drop-out misses adds to the scatter within its interval.
             if np.any((found.response_ii + 2 * sd)[is_hidden] > found.response_ii[top]):
                 own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
         if collides[top]:
@@ -245,7 +245,7 @@ def _largest(
 
 
 def _scatter(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
-    """Give how one value scatters over draws of the twin of the measured kind of motion; None below five."""
+    """Return the scatter of one value over draws with the measured kind of motion; None below five draws."""
     curve = None if laid is None else laid.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None

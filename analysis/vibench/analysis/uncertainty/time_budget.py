@@ -1,4 +1,4 @@
-"""Time for a whole campaign, distributed over measurements by how long each needs to meet its wishes."""
+"""Distribution of a campaign's time over its measurements, by the time each needs for its targets."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -19,29 +19,27 @@ class TimeShare:
 
     name: str
     planned_s: float
-    """As the campaign states it [s]."""
+    """Recording time in the campaign [s]."""
     needed_s: float | None
-    """Until its wishes are met, as predicted [s]; None without wishes, or where they cannot be predicted."""
+    """Predicted recording time until the targets are met [s]; None without targets or a prediction."""
     allotted_s: float
-    """As it is going to be recorded at most [s]."""
+    """Longest recording time after the distribution [s]."""
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Recording time in words."""
         needed = "as planned" if self.needed_s is None else f"needs about {self.needed_s:.3g} s"
         return f"{self.name}: at most {self.allotted_s:.4g} s of recording ({needed})"
 
 
 def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
-    """Return the campaign with recording times that fill a time, and the share of each measurement.
+    """Return the campaign with recording times that fill ``available_s``, and the share of each measurement.
 
-    What a measurement needs is the time after which `expected_uncertainty` meets its `until`; time beyond the
-    sum of all needs is distributed in their proportion. Sweeps, and measurements without a prediction, keep
-    their times.
+    A measurement needs the time after which `expected_uncertainty` meets its `until`. All these times are
+    lengthened by one factor. Sweeps, and measurements without a prediction, keep their times.
 
-    Raises ConfigurationError when no measurement has wishes that can be predicted, or the time is too short
-    for all wishes.
-
+    Raises ConfigurationError when no measurement has targets with a prediction, or the time is too short for
+    all targets.
     """
     needs = {each.name: time_to_wishes_s(each, rig) for each in campaign.measurements}
     mine = [each for each in campaign.measurements if needs[each.name] is not None]
