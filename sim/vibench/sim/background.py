@@ -1,7 +1,7 @@
 """Jobs in other processes, with progress, results in pieces, and cancellation.
 
-A job is a function call in a spawned process of low priority. The process ends with its parent, however
-that ends.
+A job is a function call in a spawned process of low priority. The process ends with its parent, even if
+the parent is killed.
 """
 
 import math
@@ -24,11 +24,11 @@ from .operating_system.this import bound_memory, lower_priority
 
 NICE = 10
 MOST_BYTES = 6 << 30
-"""Most memory of a process, if the system can limit it."""
+"""Memory limit of a process [bytes], where the system supports one."""
 MOST_WAITING = 200
-"""Most messages of a process that wait for a poll; then the process waits."""
+"""Most unread messages of a process; beyond this it waits until `Pool.poll` reads some."""
 GRACE_S = 2.0
-"""A process that continues a dropped job is ended after this time [s]."""
+"""Time that the process of a dropped job has to stop it; then the process is killed [s]."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,10 @@ class Job:
 
 
 class Pool:
-    """Pool of worker processes; its thread calls `poll` regularly.
+    """Pool of worker processes; its owner must call `poll` regularly.
 
-    Functions, arguments and results must be picklable. Errors are ChildProcessError when the process ended,
-    TimeoutError or MemoryError beyond a limit, else the function's own.
+    Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the
+    process ended, TimeoutError or MemoryError beyond a limit, else the function's own exception.
     """
 
     def __init__(self, workers: int, longest_s: float = math.inf) -> None:
@@ -141,7 +141,7 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` here with its parts."""
+        """Call ``function(question, tell, cancelled)`` in a worker; `poll` gives each part to ``on_part``."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:
@@ -253,7 +253,7 @@ class Worker:
         self._is_ended = True
         self.process.kill()
         with suppress(Empty):
-            while True:  # or the thread might wait for room
+            while True:  # a full queue would block the thread
                 self.messages.get_nowait()
         self._thread.join()
         self.process.join()
@@ -291,7 +291,7 @@ def _serve(connection: Any) -> None:
             dropped = Event()
             done = executor.submit(_pack_answer, work, partial(_tell, connection), dropped.is_set)
             done.add_done_callback(partial(_send_answer, connection))
-    os._exit(0)  # nobody would receive the rest
+    os._exit(0)  # the parent has ended
 
 
 def _tell(connection: Any, part: object) -> None:
@@ -304,7 +304,7 @@ def _pack_answer(work: Callable[..., Any], *asker: Callable[..., Any]) -> bytes:
 
 def _send_answer(connection: Any, done: Future[bytes]) -> None:
     error = done.exception()
-    with suppress(OSError):  # nobody is left to receive it
+    with suppress(OSError):  # the parent has ended
         if error is None:
             connection.send_bytes(done.result())
         else:

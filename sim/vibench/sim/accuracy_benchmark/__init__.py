@@ -1,7 +1,7 @@
 """Error over computing time for one scene, by every suitable method, measured on this machine.
 
 `vibench.sim.accuracy_benchmark.curve` has the curve of error over time, and
-`vibench.sim.accuracy_benchmark.equations` the paper's equations as a textbook writes them.
+`vibench.sim.accuracy_benchmark.equations` the paper's equations in textbook form.
 
 >>> from vibench.sim import Harmonic, Scene, Target, gong2025
 >>> from vibench.sim.accuracy_benchmark.curve import scene_curve

@@ -1,4 +1,4 @@
-"""Error over time of every method that can answer one scene, measured on this machine. SI units."""
+"""Error over computing time of every method that can solve one scene, measured on this machine."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Tolerance of the many-harmonic balance."""
+"""Tolerances of the many-harmonic balance."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     """Solve a scene with a target by every suitable method, first to its target.
 
     Unsuitable methods are left out. Raises ValueError when the scene has no target, or
-    cannot be followed in time.
+    cannot be simulated.
     """
     next(refine_scene(scene))  # one-time costs of a process are not counted
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
@@ -113,7 +113,7 @@ def _shot(scene: Scene) -> Answer | None:
 
 
 def _first_order(scene: Scene) -> Answer | None:
-    """Answer by the weakest stable motion, as from rest."""
+    """Return the responses of the stable motion with the smallest amplitude, as reached from rest."""
     spring = spring_of(scene.specimen)
     if not isinstance(spring, PowerSpring):
         return None

@@ -1,7 +1,7 @@
-"""The paper's equations as a textbook writes them, for general solvers and second opinions. SI units.
+"""The paper's equations in textbook form, for general solvers and independent checks. SI units.
 
-Nothing here is shared with the engine: no modes, no other unknowns in contact, no polynomial in place of
-a sine.
+This module shares nothing with the engine: it uses no modes, no special unknowns in contact, and no
+polynomial instead of a sine.
 """
 
 from enum import IntEnum
@@ -24,7 +24,7 @@ class Place(IntEnum):
     FLIGHT = 0
     ON_UPPER = 1
     ANYWHERE = 2
-    """As p says."""
+    """Determined by p."""
 
 
 class Law(NamedTuple):
@@ -44,7 +44,7 @@ class Law(NamedTuple):
 
 
 def law_of(specimen: Specimen) -> Law:
-    """Turn a specimen's contact into numbers."""
+    """Return a specimen's contact law as numbers."""
     lower, upper = specimen.gaps_m
     match specimen.contact:
         case NoContact():
@@ -58,7 +58,7 @@ def law_of(specimen: Specimen) -> Law:
 
 
 def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Masses, stiffnesses, dampings; amplitude, angular frequency and phase of the drive, shape (12,)."""
+    """Return masses, stiffnesses, dampings, and drive amplitude, angular frequency and phase, shape (12,)."""
     of_drive = (drive.amplitude_m, 2.0 * np.pi * drive.frequency_hz, drive.phase_rad)
     return np.array([*specimen.masses, *specimen.stiffnesses, *specimen.dampings, *of_drive])
 
@@ -68,7 +68,7 @@ def _stop_force(depth: Floats, rate: Floats, law: Law) -> Floats:
 
 
 def rates(time_s: float | Floats, state: Floats, place: Place, law: Law, numbers: Floats) -> Floats:
-    """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none.
+    """Return d/dt of x, y, z, vx, vy, vz. On a stop the force is zero below depth 0; in flight there is none.
 
     ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
     """

@@ -34,7 +34,7 @@ def balanced_branches(
     search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
     steps: ArcSteps = STEPS,
 ) -> Iterator[FoundBranch]:
-    """Yield every branch of harmonic balances that is found in a range, one by one.
+    """Yield the branches of harmonic balances found in a range, one by one.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def balanced_branches(
 
     Yields
     ------
-    Branches of the drive's own period: subharmonic motions have no such balance.
+    Branches of motions with the drive's period; subharmonic motions are not included.
     """
     steps = replace(steps, until_s=time.monotonic() + search.time_s)
     structure, spring = structure_of(specimen), spring_of(specimen)

@@ -18,16 +18,16 @@ from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
-"""Relative change of a section that repeats, small enough for Newton's iteration."""
+"""Relative change per period below which a section repeats, close enough for Newton's iteration."""
 SAME_MOTION = 1e-5
 """Relative distance at one moment below which two motions are equal."""
 SIMPLER = 1e-6
-"""Relative distance below which a motion has half the period, or is its own mirror image."""
+"""Relative distance below which a motion counts as one of half the period, or as mirrored."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
 """Range of random starts between the stops, as a share of each gap."""
 RANDOM_REACH = 3.0
-"""Range of other coordinates in gaps, or the motion without stops if that is larger."""
+"""Range of other coordinates, relative to the gap, or to the motion without stops if that is larger."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class MotionSearch:
     places: int = 8
     """Number of evenly spaced values of the parameter for the search, including the ends."""
     starts: int = 12
-    """Random states at each of them, besides rest."""
+    """Number of random states at each value, in addition to rest."""
     settling_periods: int = 300
     most_periods: int = 4
     """Longest period to search, in drive periods."""
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Time to search and follow [s]; the branch followed then is left where it is."""
+    """Time to search and follow [s]; then the current branch ends where it is."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -70,11 +70,11 @@ def periodic_motions(
     Parameters
     ----------
     specimen, drive
-        The drive's phase must be zero.
+        Specimen, and drive with phase zero.
     search
-        Starts and their seed.
+        Number of starts, and their seed.
     until_s
-        Instant of `time.monotonic` after which no start is tried [s].
+        Instant of `time.monotonic` after which no further start is tried [s].
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []
@@ -91,7 +91,7 @@ def periodic_motions(
 
 
 def orbit_states(orbit: PeriodicOrbit) -> Floats:
-    """States of a motion at the drive's time zero of each period, and of its mirror image, shape (n, 6)."""
+    """Return states of a motion and its mirror image at the start of each drive period, shape (n, 6)."""
     mapping = orbit.period_map
     states = [orbit.state]
     one = PeriodMap(mapping.specimen)
@@ -122,8 +122,8 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
     """Draw a state between the stops by ``rng``, shape (6,) [m, m/s].
 
-    m0 and m2 lie within three times the gap, or the motion without stops where that is larger; velocities
-    spread as far, times 2 pi f.
+    m0 and m2 lie within three times the gap, or three times the motion without stops if that is larger.
+    Velocities lie within this range times 2 pi f.
     """
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     lower, upper = specimen.gaps_m
@@ -137,7 +137,7 @@ def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) 
 
 
 def _free_state(specimen: Specimen, drive: Harmonic) -> Vector:
-    """State at time zero of the motion without stops under A0 sin(w t)."""
+    """Return the state at time zero of the motion without stops under A0 sin(w t)."""
     phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
     return np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
 

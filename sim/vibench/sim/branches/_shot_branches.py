@@ -24,9 +24,9 @@ INTERPOLATED = 0.06
 """Largest distance of a branch from the chord between two of its points, over the chord's length (set by the
 largest turn of the tangent)."""
 SAME_MOTION = 1e-5
-"""Smallest such distance, over the state's scale."""
+"""Distance that is always allowed in addition, over the state's scale."""
 LENGTHS = 10.0
-"""Length of the parameter's range in units, as when following a branch."""
+"""Length of the parameter's range in the units in which branches are followed."""
 
 
 class BranchOrigin(StrEnum):
@@ -46,16 +46,16 @@ class FoundBranch:
     branch: Branch
     shape: OrbitShape
     periods: int
-    """Drive periods of a motion."""
+    """Period of a motion in drive periods."""
     origin: BranchOrigin
     has_twin: bool
     """Whether the mirror images of these motions form another branch."""
     elapsed_s: float = 0.0
-    """Time to find and follow it."""
+    """Time to find and follow the branch."""
 
     @property
     def is_isolated(self) -> bool:
-        """Return whether it closes on itself, so that no sweep from outside reaches it."""
+        """Return whether the branch is closed, so that no sweep from outside reaches it."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -77,18 +77,18 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
 
 
 M = TypeVar("M")
-"""A motion in the method's own representation."""
+"""Type of a motion: depends on the method of finding it."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """A motion that a branch may be started from."""
+    """A motion from which a branch may be started."""
 
     motion: M
     origin: BranchOrigin
     drive: Harmonic
     states: Floats
-    """States of it and, where they are known, of its mirror image, once a drive period, shape (n, 6)."""
+    """States once a drive period of the motion and, if known, of its mirror image, shape (n, 6)."""
 
 
 def branches_from(
@@ -101,7 +101,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Follow branches from every start on no known branch, and from their bifurcations, until an instant."""
+    """Follow branches from starts that lie on no known branch, and from bifurcations, until an instant."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -122,11 +122,11 @@ def branches_from(
 
 STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distance from a bifurcation to search a new branch, relative to the gap."""
+"""Distances from a bifurcation at which to search for a new branch, relative to the gap."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distance of the parameter from a bifurcation for this search, relative to the range."""
+"""Distances of the parameter from a bifurcation for this search, relative to the range."""
 LEFT = 1e-4
-"""Distance from the simpler motion, relative to the gap, of a different motion."""
+"""Distance from the simpler motion, relative to the gap, beyond which a motion is different."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,
@@ -141,25 +141,25 @@ def shot_branches(
     search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
     steps: ArcSteps = STEPS,
 ) -> Iterator[FoundBranch]:
-    """Yield every branch of periodic motions that is found in a range, one by one.
+    """Yield the branches of periodic motions found in a range, one by one.
 
     Parameters
     ----------
     specimen
-        Any contact law. On rigid stops a branch ends where a contact grazes: no derivative goes on there.
+        Any contact law. On rigid stops a branch ends at grazing, because no derivative exists there.
     path
         `FrequencyPath` or `AmplitudePath`.
     low, high
         Range of the parameter, ascending [Hz, or m].
     search
-        Settings of the search; branches that it misses are missing, and more starts find more.
+        Settings of the search. It may miss branches; more starts find more.
     steps
-        Along the branches; the range is ten units long, a displacement of the gap one.
+        Step lengths and tolerances; the range is ten units long, a displacement of one gap is one unit.
 
     Yields
     ------
-    Branches with the stability, the events and the error of each point; chaos and quasi-periodic motions
-    are none.
+    Branches with the stability, the events and the error of each point; chaotic and quasi-periodic motions
+    are not included.
     """
     steps = replace(steps, until_s=time.monotonic() + search.time_s)
 
@@ -191,12 +191,12 @@ def _branch_switches(
     bounds: tuple[float, float],
     search: MotionSearch,
 ) -> Iterator[BranchStart[PeriodicOrbit]]:
-    """Find a motion on each branch that leaves this one."""
+    """Find a motion on each branch that branches off this one."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # Where a branch joins a simpler one, the event belongs to the simpler one.
+        # If a branch joins a simpler one, the event is used on the simpler one only.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue
@@ -227,7 +227,7 @@ def _leaving(
 
 
 def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
-    """Return the scaled direction of the multiplier nearest to -1; its largest component is 1."""
+    """Return the scaled eigenvector of the multiplier nearest to -1; its largest component is 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
@@ -238,13 +238,13 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
 
 
 UPDATES_TO_HOLD = 10.0
-"""Least growth time by e that a loop can hold, in its updates."""
+"""Shortest growth time by a factor of e that a control loop can stabilise, in loop updates."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Return the time in which a small distance from a motion grows by e; infinite where it does not grow.
+    """Return the time in which a small distance from a motion grows by e; infinite if it does not grow.
 
-    It is T / ln|mu| with T the period of the motion, and holds where the base moves as prescribed.
+    It is T / ln|mu| with T the period of the motion, for a prescribed motion of the base.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
     multiplier
         Magnitude of the largest Floquet multiplier over the whole period of the motion; same shape.
     periods
-        Drive periods of the motion.
+        Period of the motion in drive periods.
     """
     size = np.asarray(multiplier, dtype=np.float64)
     rate = np.where(size > 1.0 + NEUTRAL, np.log(np.maximum(size, 1.0)), 0.0)
@@ -262,9 +262,9 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
 
 
 def least_growth_time_s(loop_time_s: float) -> float:
-    """Return the shortest growth time that a loop can hold against [s].
+    """Return the shortest growth time that a control loop can stabilise [s].
 
-    Raises ValueError when it is not positive and finite.
+    Raises ValueError when ``loop_time_s`` is not positive and finite.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """A chain of vibro-impact cells, coupled at their outer masses. SI units.
 
-Cell i is a `Specimen`; its (k0, c0) join its m0 to the m0 of the cell before, those of the first cell to
+Cell i is a `Specimen`; its (k0, c0) couple its m0 to the m0 of the previous cell, those of the first cell to
 the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2, z2, ...
 """
 
@@ -23,7 +23,7 @@ MOST_CELLS = 1000
 
 @dataclass(frozen=True)
 class Chain:
-    """Cells from the driven base to the free end; they may differ in everything."""
+    """Cells from the driven base to the free end; they may differ in all parameters."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
@@ -79,7 +79,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
     Parameters
     ----------
     specimen
-        One cell; its k0 and c0 are the coupling, to the base and from cell to cell.
+        One cell; its k0 and c0 are the coupling to the base and between cells.
     cells
         One or more; one cell is the specimen itself.
     """
@@ -89,7 +89,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
 
 
 def _assemble(links: list[Triple]) -> Matrix:
-    """Symmetric matrix of springs (or dampers): links 0, 1, 2 of every cell."""
+    """Return the symmetric matrix of springs (or dampers): links 0, 1, 2 of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))
     for cell, (outer, inner, middle) in enumerate(links):

@@ -1,12 +1,12 @@
 """Waves in an infinite chain without contact: bands, gaps, attenuation per unit. SI units.
 
 A unit consists of one or several cells and repeats. The inner pair of a cell acts on its m0 as
-one dynamic stiffness S(w); with the link K = k0 + i w c0 to the cell before, displacement x of m0 and force f
-in the link pass from cell to cell by
+one dynamic stiffness S(w). With the link K = k0 + i w c0 to the previous cell, the displacement x of m0 and
+the force f in the link change from cell to cell by
 
     x' = x + f / K,    f' = f + (S - w^2 m0) x'
 
-A wave gains exp(i mu) in a unit where that is an eigenvalue of the product of its cells' matrices, whose
+The factor of a wave per unit, exp(i mu), is an eigenvalue of the product of the cells' matrices, whose
 determinant is 1 (Brillouin, Wave Propagation in Periodic Structures, 2nd ed. 1953, chapters IV, V and X).
 """
 
@@ -20,11 +20,11 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a gap is rounding, as for a unit of equal cells."""
+"""Relative width below which a gap counts as rounding; it occurs for units of equal cells."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the ratio of the motion of a unit to the previous one, for the outgoing or decaying wave.
+    """Return the ratio of a unit's motion to the previous unit's, for the outgoing or decaying wave.
 
     Raises ValueError when a frequency is not positive.
 
@@ -46,7 +46,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     for cell in unit.cells:
         across = _across(cell, omega) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
-    # The product of the roots of q^2 - 2 cosine q + 1 is 1, and the larger has no cancellation.
+    # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger one is free of cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
@@ -60,12 +60,12 @@ def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
 
 
 class SeenFromOutside(NamedTuple):
-    """A cell under harmonic motion of its m0; each of shape (n,)."""
+    """A cell under harmonic motion of its m0; fields of shape (n,)."""
 
     link: Complex
     """K = k0 + i w c0 [N/m]."""
     stiffness: Complex
-    """S(w) - w^2 m0: force on m0 over its displacement, the link apart [N/m]."""
+    """S(w) - w^2 m0: force on m0 over its displacement, without the link [N/m]."""
     inner: Complex
     """y over x."""
     middle: Complex
@@ -88,7 +88,7 @@ def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
 
 
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:
-    """Frequencies at which a wave of phase ``wave_number`` from unit to unit travels without damping [Hz].
+    """Return the frequencies of undamped waves with phase ``wave_number`` from unit to unit [Hz].
 
     Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
 
@@ -130,7 +130,7 @@ def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
 
 
 def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Displacement of every mass, and of every p, over the base displacement, without contact.
+    """Return the transmissibility without contact: displacements of the masses and p over the base's.
 
     Raises ValueError when a frequency is negative.
 
@@ -149,7 +149,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
         raise ValueError("Frequencies must be one row of finite numbers, zero or positive, in Hz.")
     cells = [reduce_to_m0(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
-    # From the free end: each cell and the rest of the chain as one stiffness at its m0.
+    # From the free end: reduce each cell and all cells behind it to one stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))

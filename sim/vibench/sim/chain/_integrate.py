@@ -1,4 +1,4 @@
-"""The motion of a chain under a drive, from a state to a later time. SI units."""
+"""Integration of a chain under a drive. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces
 STATES_PER_CELL = 6
 """x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Most windows of a run; `check_work` refuses it long before."""
+"""Most windows of a run; `check_work` refuses such runs long before."""
 
 
 class ChainRun:
@@ -38,14 +38,14 @@ class ChainRun:
         samples: int = 0,
         sample_rate_hz: float = 1.0,
     ) -> None:
-        """Allocate impacts, and samples at ``start_time_s`` + k / ``sample_rate_hz``."""
+        """Allocate memory for impacts, and for samples at ``start_time_s`` + k / ``sample_rate_hz``."""
         engine, cells = native_engine(), chain.size
         self._states = engine.rows("CellState", cells)
         # Only filled entries are read.
         self._times, self._places = np.empty(most_impacts), np.empty(most_impacts)
         self._samples = np.empty((samples, cells, STATES_PER_CELL))
         self.peaks_m, self._lines = np.zeros((cells, 2)), np.zeros(cells, np.complex128)
-        """Largest abs of x and p of every cell that was observed, shape (cells, 2)."""
+        """Largest observed abs(x) and abs(p) of every cell, shape (cells, 2)."""
         self._motion = engine.new(
             "ChainMotion",
             kinds=tables.kinds.view(np.float64),
@@ -84,11 +84,11 @@ class ChainRun:
         )
 
     def watch(self, what: Watch) -> None:
-        """Observe this from now on."""
+        """Observe ``what`` from now on."""
         self._motion["watch"] = what
 
     def advance(self, until_s: float) -> Outcome:
-        """Advance to an instant [s]; one that has passed already changes nothing."""
+        """Advance to an instant [s]; do nothing if it has already passed."""
         self._motion["until"] = until_s
         return Outcome(native_engine().call("follow_chain", self._motion))
 
@@ -105,7 +105,7 @@ class ChainRun:
 
     @property
     def forces(self) -> Complex:
-        """Integral of each cell's force against exp(-i (omega t + phase)), of observed lines [N s]."""
+        """Integral of each cell's force times exp(-i (omega t + phase)), for observed lines [N s]."""
         return self._lines
 
     @property
@@ -124,7 +124,7 @@ class ChainRun:
         return self._places[: self.impacts].astype(np.int64)
 
     def samples(self, outcome: Outcome) -> Floats:
-        """x, y, z, vx, vy, vz of every cell at the samples of a run that ended so, shape (n, cells, 6)."""
+        """Return x, y, z, vx, vy, vz of every cell at the samples of a finished run, shape (n, cells, 6)."""
         kept = int(self._motion["samples_kept"])
         if outcome is not Outcome.REACHED_END:
             return self._samples[:kept]
@@ -134,7 +134,7 @@ class ChainRun:
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Most windows times cells of a run: they take hours."""
+"""Most windows times cells of a run, because more take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ class ChainImpacts:
     cells: NDArray[np.int64]
     """Cell of each contact, counted from 0 at the base; shape (count,)."""
     per_cell: NDArray[np.int64]
-    """Number in each cell, shape (cells,)."""
+    """Number of contacts in each cell, shape (cells,)."""
 
     @property
     def count(self) -> int:
@@ -167,7 +167,7 @@ class ChainTrajectory:
     end_time_s: float
     impacts: ChainImpacts
     outcome: Outcome
-    """Check this first: only REACHED_END reached the requested time."""
+    """Only REACHED_END means that the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -186,23 +186,22 @@ def integrate_chain(
 
     Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
     excluded by bounds and resolved with the tolerance of ``accuracy``, in any number of cells at once.
-    Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does. Raises
-    ValueError when an argument is not allowed, the run would take hours, or the drive is over before the
-    run is.
+    Sampling changes no step. A single cell is integrated by `vibench.sim.motion`. Raises
+    ValueError when an argument is not allowed, the run would take hours, or the drive ends before the run.
 
     Parameters
     ----------
     chain, drive
         Chain, and motion of its base.
     duration_s
-        [s]; within the drive, if that is a sweep or samples.
+        [s]; a sweep or a sampled drive must last as long.
     accuracy
         Relative error allowed in a step of a contact.
     initial_state
         x, y, z, vx, vy, vz of every cell, absolute [m, m/s], shape (cells, 6); at rest when None. Cells may
         be in contact.
     sample_rate_hz
-        Samples at start_time_s + k / sample_rate_hz up to the end; None keeps none.
+        Samples at start_time_s + k / sample_rate_hz up to the end; no samples when None.
     start_time_s
         Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
@@ -258,7 +257,7 @@ def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
 
 
 def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
-    """Check a state, or take rest: shape (cells, 6)."""
+    """Return the checked initial state, shape (cells, 6); rest if None."""
     shape = (chain.size, STATES_PER_CELL)
     motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != shape or not bool(np.all(np.isfinite(motion))):
@@ -286,7 +285,7 @@ def _of_one(run: Trajectory) -> ChainTrajectory:
 
 
 def most_chain_impacts(chain: Chain, rate_hz: float, duration_s: float) -> int:
-    """Return the largest number of impacts in a run at a largest mean impact rate per cell.
+    """Return the number of impacts allowed in a run for a largest mean impact rate per cell.
 
     Raises ValueError when the rate is not allowed.
     """

@@ -24,11 +24,11 @@ from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impact
 from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
-"""Distance of the two motions over the size of the first."""
+"""Distance of the two motions relative to the size of the first."""
 SHORTEST_INTERVAL_S = 5e-3
-"""Time between readings, in which a growth of 100 per second stays below a factor of 2."""
+"""Shortest time between readings; an exponent of 100 per second then gives a factor below 2."""
 FEWEST_INTERVALS = 32
-"""Intervals that must fit into the duration, so that a mean can have an error."""
+"""Fewest intervals in the duration for estimating the error of the mean."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class ChainExponent:
     drive: Harmonic
     accuracy: Accuracy
     exponent_per_s: float
-    """Mean growth [1/s]; negative for converging neighbours."""
+    """Mean growth rate [1/s]; negative for converging neighbours."""
     standard_error_per_s: float
     blocks: BlockedMean | None
     """Mean and error from blocks [1/s]."""
@@ -74,7 +74,7 @@ def chain_lyapunov_exponent(
     chain, drive, accuracy, initial_state, max_impact_rate_hz
         As in `vibench.sim.chain.integrate_chain`.
     duration_s, settle_s
-        The exponent is the mean over ``duration_s``, after ``settle_s`` which find the attractor [s].
+        The exponent is the mean over ``duration_s``, after ``settle_s`` for reaching the attractor [s].
     seed
         Seed of the initial direction to the second motion.
     """
@@ -142,9 +142,9 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Move the second motion along the line to the first, to the small distance from it."""
+    """Move the second motion towards the first, to the small distance from it."""
     apart = second - first
-    # At rest, the motion without contact under the drive sets the size.
+    # At rest, a motion of all masses by the drive amplitude sets the size.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))
@@ -152,7 +152,7 @@ def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Fl
 
 
 def _size(chain: Chain, state: Floats) -> float:
-    """Root of twice the energy of a motion without its contacts [J^0.5]."""
+    """Return the root of twice the energy of a motion without contacts [J^0.5]."""
     q, v = state[:, :MASSES_PER_CELL].ravel(), state[:, MASSES_PER_CELL:].ravel()
     stiffness: Table = chain.stiffness_matrix
     return math.sqrt(float(np.sum(chain.masses * v**2) + q @ stiffness @ q))

@@ -33,7 +33,7 @@ class ChainResponse:
     window_s: float
     """Time before the end over which the largest values are taken."""
     line_periods: int
-    """Whole drive periods before the end over which lines are taken: as many as the window contains."""
+    """Number of whole drive periods in the window, over which the lines at the drive frequency are taken."""
     largest_m: Floats
     """Largest abs of x and p = y - z of every cell over the window, shape (cells, 2)."""
     lines_m: Complex
@@ -45,7 +45,7 @@ class ChainResponse:
     impacts_before: NDArray[np.int64]
     """Contacts that began before the window."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6): where a next run may start."""
+    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6), to start the next run."""
     outcome: Outcome
 
     @property
@@ -71,15 +71,14 @@ def chain_response(
 ) -> ChainResponse:
     """Integrate a chain and return the response of every mass at the end.
 
-    The defaults are those of `vibench.sim.steady_response`, which also answers for one cell. A long chain
-    settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is longer
-    than the run or shorter than one period, or the run would take hours.
+    The defaults are those of `vibench.sim.steady_response`, which is also used for a single cell. A long
+    chain settles more slowly than a cell. Raises ValueError when the drive has no amplitude, the window is
+    longer than the run or shorter than one period, or the run would take hours.
 
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; the window is the end of the run that is
-        observed [s].
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` is the observed end of the run [s].
     initial_state
         Shape (cells, 6); at rest when None.
     """
@@ -107,7 +106,7 @@ def chain_response(
             run.watch(watch)
             outcome = run.advance(until)
     end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
-    # Over whole periods the drive's term returns to its start.
+    # Over whole periods exp(-i omega t) returns to its start.
     change = np.asarray((run.motion - line_start) * end, dtype=np.complex128)
     lines = _lines(chain, drive, run.forces, _in_order(change), line_s)
     void = 1.0 if outcome is Outcome.REACHED_END else math.nan
@@ -130,13 +129,13 @@ def chain_response(
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     """Return the response of a specimen as that of a chain of one cell.
 
-    The line of z is what the equation of motion of m0, against the drive and integrated by parts, leaves.
+    The line of z follows from the equation of motion of m0, times exp(-i omega t) and integrated by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
     (m0, _, _), (k0, _, k2), (c0, _, c2) = cell.masses, cell.stiffnesses, cell.dampings
     end = cmath.exp(-1j * (omega * one.duration_s + drive.phase_rad))
-    # Over whole periods the drive's term returns to its start.
+    # Over whole periods exp(-i omega t) returns to its start.
     change = (one.final_state - one.line_start_state) * end * 2.0 / line_s
     x, p, base = one.line_x_m, one.line_p_m, -1j * drive.amplitude_m
     moved = change[0] + 1j * omega * x
@@ -159,12 +158,12 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
 
 
 def _in_order(motion: Complex) -> Complex:
-    """Displacements of all masses, then their velocities, shape (6 cells,)."""
+    """Return the displacements of all masses, then their velocities, shape (6 cells,)."""
     return np.concatenate([motion[:, :MASSES_PER_CELL].ravel(), motion[:, MASSES_PER_CELL:].ravel()])
 
 
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
-    """Components of every motion at the drive frequency, shape (cells, 4), from those of the forces.
+    """Return the components of all motions at the drive frequency, shape (cells, 4), from the forces.
 
     M q'' + C q' + K q = f - F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
     (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of q, with Q,
@@ -173,13 +172,13 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     Parameters
     ----------
     chain, drive
-        As observed.
+        Chain, and its drive.
     forces
-        Integral of the force in each cell against the drive's term, shape (cells,) [N s].
+        Integral of the force in each cell times exp(-i omega t), shape (cells,) [N s].
     change
         Change of the state times exp(-i omega t) from start to end of the lines, shape (6 cells,).
     line_s
-        Their length [s].
+        Length of the lines [s].
     """
     omega = 2.0 * math.pi * drive.frequency_hz
     first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
@@ -196,10 +195,10 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 
 
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
-    """Energy of every cell: of its masses, its springs with the link to the cell before, and its stops.
+    """Return the energy of every cell: masses, springs with the link to the previous cell, and stops.
 
-    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest their sum is
-    constant. A Hunt-Crossley contact stores the energy of its Hertz spring.
+    Returns an array of shape (..., cells) [J]. Without damping and with the base at rest, the sum over
+    cells is constant. A Hunt-Crossley contact stores the energy of its Hertz spring.
 
     Parameters
     ----------
@@ -227,7 +226,7 @@ class MeanEnergies(NamedTuple):
 
     mean_j: Floats
     standard_error_j: Floats
-    """Standard error of the mean, by blocks long enough to be independent."""
+    """Standard error of the mean, from independent blocks."""
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:
@@ -239,7 +238,7 @@ def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> M
 
 
 def _in_stops(cell: Specimen, p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Integral of a cell's contact force over p from 0 on [J]."""
+    """Return the integral of a cell's contact force from 0 to p [J]."""
     match cell.contact:
         case PowerLaw(reference=reference, terms=terms):
             part = p / reference

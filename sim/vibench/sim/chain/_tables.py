@@ -1,4 +1,4 @@
-"""Tables for a run of a chain: cells for the engine, and windows. SI units."""
+"""Tables for a run of a chain: structures of the cells, and windows. SI units."""
 
 import math
 from collections.abc import Iterator
@@ -18,20 +18,20 @@ from ..specimen.state import Table, Vector
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2
-"""Longest window, as the fastest rate of chain and drive times its length [rad]: the tenth integral of a
-force is then 1.4e-12 of the first."""
+"""Longest window times the fastest rate of chain and drive [rad]: the tenth integral of a force is then
+1.4e-12 of the first."""
 COLLISION_TURN = 0.4
-"""Longest window with whole collisions: 7e-10."""
+"""The same for windows with whole collisions: the tenth integral is 7e-10 of the first."""
 WHOLE_COLLISIONS = 1e-7
-"""Least tolerance of whole collisions, as in native/collision.hpp."""
+"""Smallest tolerance for whole collisions, as in native/collision.hpp."""
 MARKOV_TERMS = 11
 """Number of Taylor coefficients of the chain's response to a unit impulse in a cell."""
 REACH = MARKOV_TERMS
-"""Number of cells on each side that it reaches within these terms."""
+"""Number of cells on each side that this response reaches within these terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Share of the tolerance by which one cell's force may change another's velocity unnoticed within a
-window."""
+"""Part of the tolerance below which the effect of one cell's force on another cell's velocity is neglected
+within a window."""
 MOST_HALVINGS = 20
 KEPT = 2
 """Number of windows tried before the shortest."""
@@ -43,11 +43,11 @@ class ChainTables(NamedTuple):
     kinds: Structure
     """One `CellKind` of native/structures.hpp for each different cell."""
     kind_of: Vector
-    """Shape (cells,)."""
+    """Index of the kind of each cell, shape (cells,)."""
     fastest: float
     """Largest rate of chain and drive [1/s]."""
     windows: Vector
-    """Lengths of windows, long to short [s]."""
+    """Lengths of windows, the longest first [s]."""
     clash: Vector
     """Least distance of cells that may both be in contact in such a window; shape (windows,)."""
 
@@ -69,10 +69,10 @@ def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
 
 
 def _fastest(chain: Chain, drive: Drive) -> float:
-    """Bound the rates of all modes, and the drive's if it turns at one rate [1/s].
+    """Return a bound on the rates of all modes and of a harmonic drive [1/s].
 
-    A mode that turns is as fast as the undamped motion of its shape; one that creeps, at most as its damping
-    alone.
+    An oscillating mode is as fast as the undamped motion of its shape; an overdamped mode is at most as fast
+    as its damping alone.
     """
     root = np.sqrt(chain.masses)
     creeping = float(np.linalg.eigvalsh(chain.damping_matrix / np.outer(root, root))[-1])
@@ -81,7 +81,7 @@ def _fastest(chain: Chain, drive: Drive) -> float:
 
 
 def markov_between(chain: Chain) -> Table:
-    """Taylor coefficients of p of every cell after a unit impulse in a cell nearby.
+    """Return Taylor coefficients of p of every cell after a unit impulse in a cell nearby.
 
     Shape (MARKOV_TERMS, 2 REACH + 1, cells): the response to an impulse in an earlier cell, the
     same, or a later one.
@@ -95,10 +95,10 @@ def markov_between(chain: Chain) -> Table:
 
 
 def _answers(chain: Chain, moves: Table) -> Table:
-    """Taylor coefficients of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
+    """Return Taylor coefficients of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
-    Impulses too far apart to affect the same cell share a column. ``moves`` is 0 where a cell is held,
-    else 1.
+    Impulses too far apart to affect the same cell share a column. ``moves`` is 0 for fixed
+    cells, else 1.
     """
     places, masses = np.arange(chain.size), chain.masses.reshape(chain.size, MASSES_PER_CELL)
     rates = np.zeros((MASSES_PER_CELL, chain.size, COLUMNS))
@@ -112,7 +112,7 @@ def _answers(chain: Chain, moves: Table) -> Table:
 
 
 def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
-    """Accelerations of all masses without contact and drive, shape (masses of a cell, cells, columns)."""
+    """Return accelerations without contact and drive, shape (masses of a cell, cells, columns)."""
     masses = chain.masses.reshape(chain.size, MASSES_PER_CELL)
     springs, dampers = (
         np.array(values).T[..., None]
@@ -133,10 +133,9 @@ def _stretches(motion: Table) -> tuple[Table, Table, Table]:
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Bound the change of dp/dt in another cell by an impulse within a window, over the cell's own change; by
-    distance.
+    """Bound the change of dp/dt in other cells within a window after an impulse, over the cell's own change.
 
-    Shape (REACH + 1,): entry d is the largest among cells d apart; entry 0 is not used.
+    Shape (REACH + 1,): entry d is the largest for cells d apart; entry 0 is not used.
     """
     own = between[1, REACH]
     relative = np.max(_answer_within(between, window) / own, axis=1)
@@ -144,7 +143,7 @@ def cross_answers(between: Table, window: float) -> Vector:
 
 
 def _answer_within(coefficients: Table, window: float) -> Table:
-    """Bound the rate that Taylor coefficients, the first axis, reach within a window."""
+    """Bound the rate within a window of a series; the first axis contains its Taylor coefficients."""
     orders = range(1, MARKOV_TERMS)
     return np.asarray(
         sum(np.abs(coefficients[k]) * window ** (k - 1) / math.factorial(k - 1) for k in orders)
@@ -163,8 +162,8 @@ def _back_action(chain: Chain, between: Table, window: float) -> float:
 def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector, Vector]:
     """Choose the windows and the distance of cells that may be in contact in them.
 
-    In the last one even neighbours may. Each cell is integrated as if its neighbours did not react; in no
-    window may that matter.
+    In the last window even neighbours may be in contact. Each cell is integrated as if its neighbours did not
+    react; the error of this must be negligible in every window.
     """
     between = markov_between(chain)
     shortened = 1.0
@@ -189,23 +188,23 @@ def _clash(answers: Vector, allowed: float) -> int:
 
 # The force of a moving base on the first m0, k0 U + c0 dU/dt, as polynomials on equal pieces. SI units.
 #
-# The engine treats harmonic drives exactly. The force of other drives is one more known force
+# The engine treats harmonic drives exactly. Other drives enter as an additional known force
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""Through eight Chebyshev points of a piece of `WINDOW_TURN` a sine is off by 1e-14."""
+"""The error of a sine through eight Chebyshev points of a piece of `WINDOW_TURN` is 1e-14."""
 ALMOST = 1e-9
 """Share of a piece that counts as rounding."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16
-"""Pieces of a sweep that are cut at a time: bounds the memory of a long sweep."""
+"""Number of pieces of a sweep made at once; bounds the memory of a long sweep."""
 BaseDrive = Sampled | LinearSweep | LogarithmicSweep
 """Drives that are cut into pieces."""
 
 
 class Pieces(NamedTuple):
-    """Consecutive polynomials."""
+    """Force of the base on the first m0 as consecutive polynomials."""
 
     terms: Table
     """Coefficients of the force on every piece, in powers of the time since its start, shape (pieces,
@@ -232,13 +231,13 @@ def pieces_between(
 
 
 def longest_window_s(tables: ChainTables, drive: Drive) -> float:
-    """Return the longest window: none reaches beyond a piece of the drive [s]."""
+    """Return the length of the longest window, at most one piece of the drive [s]."""
     window = float(tables.windows[0])
     return window if isinstance(drive, Harmonic) else min(window, _grid(tables, drive)[0])
 
 
 def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
-    """Length and number of pieces."""
+    """Return length and number of pieces."""
     match drive:
         case Sampled():
             return 1.0 / drive.sample_rate_hz, len(drive.displacement_m) - 1
@@ -249,7 +248,7 @@ def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
 
 
 def _force_table(drive: BaseDrive, first: Specimen, interval: float, begin: int, stop: int) -> Table:
-    """Coefficients of the force on every piece, in powers of the time since it began, shape (pieces, 8)."""
+    """Return the coefficients of the force on every piece, as in `Pieces.terms`, shape (pieces, 8)."""
     spring, damper = first.stiffnesses[0], first.dampings[0]
     match drive:
         case Sampled():

@@ -5,6 +5,6 @@ loaded once, and checked with a known scene (docs/decisions/0077-native-engine.m
 forms and the shapes of collisions and steps. `CubicRun` integrates under a base motion of cubic polynomials
 on equal intervals: sweeps and recordings.
 
-Signals, filters and the analogue world call it through `native_engine`: `Engine.new` fills a structure of
-native/structures.hpp, `Engine.call` hands it over.
+Signals, filters and the analogue world call the engine through `native_engine`: `Engine.new` fills a
+structure of native/structures.hpp, `Engine.call` passes it to a function.
 """

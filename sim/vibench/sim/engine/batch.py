@@ -38,29 +38,29 @@ from .shapes import (
 
 # Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
 #
-# The units are the depth and the time u of a free collision of the same speed. In these units a collision
-# depends only on the acceleration by all other springs, and on the specimen only through u. The variables are
-# that acceleration and its first four derivatives in the middle of the collision, and u. Duration and moments
-# of the force about the middle are fitted to collisions that are solved at sixteen points.
+# In units of the depth and the time u of a free collision of the same speed, a collision depends only on the
+# acceleration by all other springs and on u. The variables of the fit are this acceleration and its first
+# four derivatives in the middle of the collision, and u. The polynomials give the duration and the moments of
+# the force about the middle; they are fitted to collisions solved at sixteen points.
 
 MIDDLE = 1.47
 """Middle of a collision, in u."""
 DERIVATIVES = 5
-"""Number of derivatives of the acceleration, including itself."""
+"""Number of variables for the acceleration: its value and four derivatives."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Range of fitted speeds, over gap times fastest rate."""
+"""Range of fitted speeds, over gap times fastest modal rate."""
 HARDEST_PRESS = 0.24
 """Largest fitted acceleration, in both directions, over speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""The first derivative over speed / u^2, of the paper's specimen, and each one over the one before."""
+"""Largest first derivative over speed / u^2, and later ones over the one before; paper's specimen."""
 PAPER_TURN = 0.053
-"""Fastest rate times u, of the paper's specimen in the middle of its speeds."""
+"""Fastest modal rate times u for the paper's specimen, in the middle of the range of speeds."""
 SLOWEST_TURN = 0.15
-"""Largest fastest rate times u [rad]; a collision lasts three times u."""
+"""Limit of the fastest modal rate times u [rad]; a collision lasts three times u."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
@@ -139,7 +139,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect of the integrals of a force on p, relative to the second one."""
+    """Return the effects of the integrals of a force on p, relative to the effect of the second one."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -205,7 +205,7 @@ MODES = 3
 MOST_DAMPED = 0.05
 """Largest damping ratio of a mode; above it the series needs more terms."""
 LEAST_PART = 1e-9
-"""Smallest share of a mode in p, over the largest: only p is followed, and all else derived from it."""
+"""Smallest share of a mode in p, over the largest: batches follow p and derive all else from it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +250,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     Parameters
     ----------
     runs
-        Each in flight, at a whole drive period, at the same tolerance. They carry no small changes.
+        Each in flight, at a whole drive period, at the same tolerance. Small changes are not propagated.
     periods
         Number of drive periods for each.
 
@@ -267,7 +267,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
         raise ValueError(
             "This specimen cannot be simulated in a batch: use Hertz contacts and three oscillating modes."
         )
-    # Longest first, so that all lanes end at about the same time.
+    # Longest first, so that motions computed in parallel end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((count, DIRECTIONS)) for count in periods]
     motions = engine.rows("BatchMotion", len(runs))

@@ -1,4 +1,4 @@
-"""Find, load and call the native engine by `ctypes`, which releases Python's lock."""
+"""Find, load and call the native engine by `ctypes`, which releases the global interpreter lock."""
 
 import ctypes
 import hashlib
@@ -33,7 +33,7 @@ def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     ----------
     texts
         C++ as native/structures.hpp declares it, such as ``State { double motion[6]; double side; }``; a
-        structure may hold those before it.
+        structure may contain earlier ones.
     """
     known: dict[str, StructureType] = {}
     for text in texts:
@@ -70,7 +70,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Build script; in a checkout only, not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-"""File name ending of libraries of this system; wheels of others may have been built in the same checkout."""
+"""File ending of libraries for this system; a checkout may also contain libraries for other systems."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
@@ -78,7 +78,7 @@ FUNCTIONS = (
     *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
     *("describe_collisions", "follow_batch"),
 )
-"""Functions of the library, each with one structure."""
+"""Functions of the library that take one structure as argument."""
 Tables = NDArray[np.float64]
 """Prepared data of one scene, in the engine's layout."""
 _Pointer = ctypes.c_void_p
@@ -95,7 +95,7 @@ class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
 
 
 class Engine:
-    """A library of the native engine, loaded."""
+    """A loaded library of the native engine."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -177,11 +177,11 @@ class Engine:
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
-        """Return the number of floats of memory for a chain; ``kinds`` counts different cells."""
+        """Return the number of floats that a chain needs; ``kinds`` is the number of different cells."""
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Create the tables of a scene; its shapes of collisions and steps must outlive them.
+        """Create the tables of a scene; do not free its shapes of collisions and steps before the tables.
 
         Raises ValueError when the engine refuses a number of the scene.
         """
@@ -251,12 +251,12 @@ class Engine:
         )
 
     def reach(self, tables: Tables, state: Structure) -> float:
-        """Return the largest abs(p) while no stop is touched [m]; infinite on a stop."""
+        """Return a bound on later abs(p) in free flight [m]; infinite if a stop is touched now."""
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
 def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
-    """Return the address of an array; a structure unchanged."""
+    """Return address and size of an array; return a structure unchanged."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -297,7 +297,7 @@ def native_digest() -> str:
 
 
 def sources_digest() -> str | None:
-    """Return the digest of the native sources; None where there are none, as in an installed wheel."""
+    """Return the digest of the native sources; None without sources, as in an installed wheel."""
     if not BUILD.is_file():
         return None
     spec = importlib.util.spec_from_file_location("vibench_native_build", BUILD)
@@ -321,7 +321,7 @@ SIM = Path(__file__).parents[1]
 
 @cache
 def physics_digest() -> str:
-    """Return the digest, the same in a checkout and in an installed wheel."""
+    """Return the digest of all code of the simulation, the same in a checkout and an installed wheel."""
     digest = hashlib.sha256(native_digest().encode())
     for path in sorted(each for kind in ("*.py", "*.pyi") for each in SIM.rglob(kind)):
         digest.update(path.relative_to(SIM).as_posix().encode())

@@ -1,6 +1,6 @@
-"""Family of this computer's processor; the native engine is compiled for each.
+"""Families of processors for which the native engine is compiled, and those of this computer.
 
-The build hook reads this file too, so it needs nothing but the standard library.
+The build hook also imports this file, so it may use only the standard library.
 """
 
 import ctypes
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FAMILIES = ("x86_64", "x86_64_v3", "x86_64_v4", "arm64")
-"""As compilers call them: every x86-64 processor; those with AVX2; those with AVX-512; ARM."""
+"""Names as in compilers: every x86-64 processor; those with AVX2; those with AVX-512; ARM."""
 _ARM = {"arm64", "aarch64"}
 _X86 = {"x86_64", "amd64"}
 _V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
@@ -19,7 +19,7 @@ _WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
 
 
 def usable_families() -> tuple[str, ...]:
-    """Return the families whose code this processor runs, the fastest first; none for an unknown one."""
+    """Return the families whose code this processor runs, the fastest first; empty for an unknown one."""
     machine = platform.machine().lower()
     if machine in _ARM:
         return ("arm64",)

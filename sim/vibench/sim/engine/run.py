@@ -22,7 +22,7 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most steps of flight in a run: seconds of work, two days of the paper's specimen. """
+"""Most steps of flight in a run: seconds of computing, two days of motion of the paper's specimen."""
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run: 0.5 GB for their times, allocated when they happen."""
 SPARE_IMPACTS = 100
@@ -30,7 +30,7 @@ SPARE_IMPACTS = 100
 DIRECTIONS = 6
 """Number of directions of a state: the most small changes that can be carried along."""
 INSIDE = 1e-9
-"""Relative rounding within which a start beyond a rigid stop counts as on it."""
+"""Relative tolerance within which a start beyond a rigid stop counts as on the stop."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -68,24 +68,24 @@ class RunRecord:
         steps: int | None = None,
         engine: Engine | None = None,
     ) -> None:
-        """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
+        """Allocate memory for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
         # Not cleared, because that takes as long as a short run; only filled entries are read.
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
-        """Structure that the engine takes."""
+        """Structure that the engine fills."""
         record["start"], record["sample_rate"] = start_s, sample_rate_hz
         record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
         record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
         record["steps_left"] = MOST_STEPS if steps is None else steps
 
     def watch(self, what: Watch) -> None:
-        """Observe this from now on."""
+        """Observe ``what`` from now on."""
         self.structure["watch"] = what
 
     @property
     def impacts(self) -> int:
-        """Contacts that began, so far."""
+        """Number of contacts that began so far."""
         return int(self.structure["impacts"])
 
     @property
@@ -99,7 +99,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples; those that rounding puts beyond the end are ``last``."""
+        """Return all samples; ``last`` is used for samples that rounding places beyond the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -120,12 +120,12 @@ class RunRecord:
 
     @property
     def area_x(self) -> complex:
-        """Integral of x exp(-i (omega t + phase)), where lines were observed [m s]."""
+        """Integral of x exp(-i (omega t + phase)) over the time with observed lines [m s]."""
         return complex(self.structure["line_x"])
 
     @property
     def area_p(self) -> complex:
-        """The same of p."""
+        """The same integral for p."""
         return complex(self.structure["line_p"])
 
 
@@ -167,7 +167,7 @@ class NativeRun:
             raise ValueError(f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1.")
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return a copy; with another tolerance, without small changes."""
+        """Return a copy; a copy with another tolerance has no small changes."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
@@ -188,11 +188,11 @@ class NativeRun:
 
     @property
     def growth(self) -> Floats:
-        """Logarithm of a factor of each change, shape (n,)."""
+        """Logarithm of the factor that was divided out of each of `changes`, shape (n,)."""
         return np.array(self._tangent["growth"][: int(self._tangent["changes"])])
 
     def advance(self, until_s: float, record: RunRecord) -> Outcome:
-        """Advance to an instant [s]; one that has passed already changes nothing.
+        """Advance to an instant [s]; do nothing if it has already passed.
 
         Raises ValueError when the engine refuses the instant.
         """
@@ -205,7 +205,7 @@ class NativeRun:
         return Outcome(code)
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
-        """Advance up to reading ``last`` of how the changes grow."""
+        """Advance up to reading ``last`` of the growth of the changes."""
         return Outcome(
             self.engine.take_readings(
                 *(self._tables, self._state, self.tolerance, record.structure),
@@ -229,7 +229,7 @@ class NativeRun:
         return float(self._state["clock_high"])
 
     def pass_over(self, length_s: float) -> None:
-        """Advance the time by a period after which the motion repeats."""
+        """Advance only the time, by a period after which the motion repeats."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
@@ -241,7 +241,7 @@ class NativeRun:
 
     @property
     def reach_m(self) -> float:
-        """Return the largest future abs(p) while no stop is touched; infinite on a stop."""
+        """Return a bound on later abs(p) in free flight; infinite if a stop is touched now."""
         return self.engine.reach(self._tables, self._state)
 
 
@@ -254,7 +254,7 @@ class GrowthReadings:
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
         self.structure = readings = native_engine().new("Readings")
-        """Structure that the engine takes."""
+        """Structure that the engine fills."""
         readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
         readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
         readings["motions"], readings["room"] = self._motions.ctypes.data, room
@@ -295,7 +295,7 @@ def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:
-    """Return the largest number of impacts in a run at a largest mean rate."""
+    """Return the number of impacts allowed in a run for a largest mean rate."""
     return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
 
 
@@ -340,7 +340,7 @@ def cubic_tables(engine: Engine, specimen: Specimen, interval_s: float) -> Table
 def start_on_cubics(
     engine: Engine, tables: Tables, specimen: Specimen, state: Structure, motion: ArrayLike, tolerance: float
 ) -> None:
-    """Put a `State` to x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,); a stop that is reached is found.
+    """Set a `State` to x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,), and find any contact.
 
     Raises ValueError when the motion is inside a rigid stop.
     """
@@ -380,11 +380,11 @@ class CubicRun:
         Parameters
         ----------
         pieces
-            c0 ... c3 of the base's displacement on each, shape (intervals, 4).
+            c0 ... c3 of the base's displacement on each interval, shape (intervals, 4).
         record
             Record of the run.
         first_from_s, last_to_s
-            Start in the first interval and end in the last, since their starts [s].
+            Start of the run within the first interval, and its end within the last [s].
         """
         drive = self._engine.new("CubicDrive", base=pieces, first_from=first_from_s)
         drive["last_to"] = self._interval_s if last_to_s is None else last_to_s
@@ -393,7 +393,7 @@ class CubicRun:
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance over whole intervals, as far as possible.
 
-        ¶ Return motions at the ends of completed intervals, shape (passed, 6), and impacts in each.
+        Returns motions at the ends of completed intervals, shape (passed, 6), and impacts in each.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)
@@ -420,8 +420,8 @@ class CubicRun:
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0
-"""Default limit of the impact rate, several times the largest known of the paper's specimen: at 50 um 4300
-per second on Hertz's stops, 23000 in chatter on rigid ones of restitution 0.8."""
+"""Default limit of the impact rate, several times the largest known rate of the paper's specimen: at 50 um,
+4300 per second on Hertz's stops, and 23000 in chatter on rigid stops of restitution 0.8."""
 
 
 def start_motion(initial_state: ArrayLike | None) -> Floats:

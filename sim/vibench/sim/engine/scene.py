@@ -1,4 +1,4 @@
-"""Convert a specimen and a harmonic drive for the native engine, including modal forms."""
+"""Convert a specimen and a harmonic drive to structures of the native engine, with modal forms."""
 
 import cmath
 import math
@@ -39,7 +39,7 @@ from .shapes import (
 )
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
-"""`Law` in native/structures.hpp."""
+"""Values of `Law` in native/structures.hpp."""
 Phasors = NDArray[np.complex128]
 
 
@@ -103,8 +103,8 @@ def collision_structure(engine: Engine) -> Structure:
         return _collision_structure(engine)
 
 
-# The tables of a run point into these, so that they live as long as the process. Without the lock two threads
-# would make one each at the first call, and the cache would drop one of them.
+# The tables of a run point into these structures, so they must never be freed. Without the lock, two threads
+# could each create one at the first call, and the cache would drop the other.
 _ONE_THREAD = Lock()
 
 

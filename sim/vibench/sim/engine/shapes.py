@@ -1,6 +1,6 @@
 """Tables that are the same for every specimen: Hertz collisions, and steps under power laws.
 
-Hertz collisions are solved before they happen.
+Hertz collisions are solved in advance.
 
 With t = T (1 - cos phi) / 2, where T is the duration, depth and force are smooth in phi, including the square
 roots at both ends: sixteen Gauss points in phi describe a whole collision. Scaled by the depth and time of a
@@ -22,22 +22,22 @@ POINTS = 16
 TERMS = 8
 """Terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""Number of tabulated presses, and the first and the last. A press is the acceleration by all other springs,
-over speed^2 / depth."""
+"""First and last tabulated press, and their number. A press is the acceleration by all other springs over
+speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
 NEWTON_STEPS = 60
 HALF_FORCE = 1.25
 """k / m in units of the depth and the speed: m v^2 / 2 = 2 k d^(5/2) / 5."""
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
-"""Rows of a shape after those of the sixteen misfits of depth: derivatives by the last misfit (of the end);
-derivatives of the duration by the misfits; depths at the points; and their derivatives by the press, by its
-rate, and by the force through dampers and springs (two or three integrals)."""
+"""Rows of a shape, after sixteen rows of derivatives by the residuals of depth: derivatives by the residual
+of the end; derivatives of the duration by the residuals; depths at the points; derivatives of the depths by
+the press, by its rate, and by the force through dampers and springs (two or three integrals)."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Places of the scalars of a shape. The third is the largest depth over that of the polynomial through the
-points, whose error is 1e-5 in the middle and 1e-8 at the end. From the fourth on: derivatives of the
-duration, in the order of those of depths."""
+"""Columns of the scalars of a shape. DEEPER is the largest depth over that of the polynomial through the
+points, whose error is 1e-5 in the middle and 1e-8 at the end. From LASTS_BY on: derivatives of the
+duration, in the order of the derivatives of depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
@@ -64,7 +64,7 @@ rounding."""
 
 
 def _top_of(terms: Vector) -> float:
-    """Largest value of a Taylor polynomial near its middle."""
+    """Return the largest value of a Taylor polynomial near its middle."""
     polynomial = np.polynomial.Polynomial(terms)
     slope, bend = polynomial.deriv(), polynomial.deriv(2)
     at = 0.0
@@ -105,7 +105,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 def collision_shapes() -> tuple[Table, Table]:
     """Solve the tabulated collisions, each starting from the previous one."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
-    # Without a press: 2.943 long, and close to half a sine.
+    # Without a press a collision lasts 2.943, and its depth is close to half a sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
     for softer in np.linspace(0.0, SOFTEST, SHAPES):
         depths, duration, _ = _solve_collision(depths, duration, float(softer))
@@ -132,7 +132,7 @@ def collision_shapes() -> tuple[Table, Table]:
 
 
 def _deepest(press: float) -> float:
-    """Depth at which all energy is in the stop: d^(5/2) = 1 + 2 press d, in units of speed and depth."""
+    """Return the depth with all energy in the stop: d^(5/2) = 1 + 2 press d, in units of speed and depth."""
     depth = 1.0
     for _ in range(NEWTON_STEPS):
         depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
@@ -151,7 +151,7 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
 
 
 # Sums over the Gauss points of a step under a power law, the same for every law and length. In a step from 0
-# to 1 the force F is a polynomial through its values at eight points; what follows is linear in them
+# to 1 the force F is a polynomial through its values at eight points; all results are linear in these values
 # (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
@@ -171,13 +171,13 @@ GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
 
 AT_START: Vector = _cardinal(np.array(0.0), POINTS_AT)
 AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
-"""The polynomial through the points, at a step's start and end."""
+"""Weights of the values at the points for the polynomial's values at a step's start and end."""
 
 
 def _course() -> Table:
-    """Coefficients of F's course in powers of (s - 1), from F at the points and the end of a step.
+    """Return the map from F at the points and the end of a step to coefficients in powers of (s - 1).
 
-    Shape (POINTS + 1, POINTS); the places beyond the degree are zero.
+    Shape (POINTS + 1, POINTS); entries beyond the degree are zero.
     """
     weights = np.append(np.ones(GAUSS_POINTS), END_WEIGHT)
     known = np.vander(np.append(POINTS_AT, 1.0) - 1.0, COURSE_DEGREE + 1, increasing=True)
@@ -201,11 +201,11 @@ def _power_shares() -> Table:
 
 POWER_SHARES: Table = _power_shares()
 INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
-"""Places of an observed step: its start, points and end."""
+"""Instants at which a step is observed: its start, points and end."""
 
 
 def _between(places: Vector) -> Table:
-    """Distances of places, 1 from each to itself."""
+    """Return the differences between all places, with 1 on the diagonal."""
     return np.asarray(places[:, None] - places + np.eye(len(places)))
 
 
@@ -213,4 +213,4 @@ POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
 INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
 """Barycentric weights: Berrut and Trefethen, SIAM Rev. 46 (2004) 501."""
 INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
-"""Slope at its own instant of the polynomial that is 1 there and 0 at the others."""
+"""Slope, at each instant, of the polynomial that is 1 there and 0 at all other instants."""

@@ -1,9 +1,9 @@
 """The largest Lyapunov exponent of a specimen under a harmonic drive, with its error. SI units.
 
 One small variation of the motion is propagated exactly through flight and contacts; its mean growth rate
-is the exponent. The final motion decides how it is found: from the modes if no impact will
-follow, from the multipliers if the motion has become periodic, else as a mean with a standard error that
-allows for correlation between neighbouring intervals. Transient chaos is reported separately.
+is the exponent. The method depends on the final motion: modes if no impact will follow, multipliers if the
+motion has become periodic, else a mean with a standard error that allows for correlation between
+neighbouring intervals. Transient chaos is reported separately.
 """
 
 import math
@@ -38,7 +38,7 @@ from .tangent_run import (
 )
 
 FEWEST_INTERVALS = 32
-"""Fewest intervals in the duration, so that the mean has a known error."""
+"""Fewest intervals in the duration for estimating the error of the mean."""
 
 
 class ExponentVerdict(StrEnum):
@@ -99,7 +99,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of a mean: from blocks; of multipliers: how far two cycles differ; of modes: zero."""
+    """From blocks for a mean, half the difference of two cycles for multipliers, zero for modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
@@ -116,9 +116,9 @@ class LyapunovEstimate:
     """Growth rate in each interval from time zero, shape (n,)."""
     transient: ChaoticTransient | None
     impacts: int
-    """Since time zero."""
+    """Number of impacts since time zero."""
     impact_rate_hz: float
-    """In the final motion."""
+    """Mean impact rate in the final motion."""
     final_state: Floats
     """x, y, z, vx, vy, vz at the end, shape (6,)."""
     end_time_s: float
@@ -156,8 +156,8 @@ def lyapunov_exponent(
     interval_s
         Approximate time between readings; two cycles of the slowest mode when None.
     precision
-        End the run as soon as the error is this small. None takes the whole duration: chaos that dies out
-        late is then found.
+        End the run as soon as the error is this small. None uses the whole duration, so that
+        chaos that ends late is found.
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
     """
@@ -187,7 +187,7 @@ def lyapunov_exponent(
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
-    """Return the number of intervals of settling; refuse times that leave too few for a mean."""
+    """Return the number of settling intervals; refuse times that leave too few intervals for a mean."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
             f"Duration {duration_s} s after settling for {settle_s} s is not allowed: positive, and finite."

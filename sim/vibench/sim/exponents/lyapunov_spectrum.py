@@ -1,10 +1,9 @@
-"""All six Lyapunov exponents of a specimen under a harmonic drive, and their Kaplan-Yorke dimension. SI
-units.
+"""All six Lyapunov exponents of a specimen under a harmonic drive, and Kaplan-Yorke dimension. SI units.
 
-Six small variations span all directions of the state. Propagated together and made orthogonal repeatedly,
-they give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is the mean
-rate at which volumes shrink: -tr(M^-1 C) for every elastic law and any motion, which tests the
-calculation.
+Six small variations span all directions of the state. They are propagated together and made orthogonal
+repeatedly, and give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is
+the mean rate of change of a volume's logarithm: -tr(M^-1 C) for every elastic law and any motion, which
+tests the calculation.
 """
 
 import math
@@ -46,16 +45,16 @@ class LyapunovSpectrum:
     standard_errors_per_s: Floats
     """Shape (6,); zero where the exponents are those of the modes."""
     blocks: NDArray[np.int64]
-    """Independent stretches of the run behind each standard error, shape (6,)."""
+    """Number of independent blocks from which each standard error is estimated, shape (6,)."""
     verdict: ExponentVerdict
     """Verdict on the largest exponent."""
     source: Source
     motion: FinalMotion
     since_s: float
     impacts: int
-    """Since time zero."""
+    """Number of impacts since time zero."""
     impact_rate_hz: float
-    """In the final motion."""
+    """Mean impact rate in the final motion."""
     dimension_standard_error: float
     """Standard error of `dimension` from the correlated errors of the exponents; 0 for a whole number."""
     final_state: Floats
@@ -69,16 +68,16 @@ class LyapunovSpectrum:
 
     @property
     def dimension(self) -> float:
-        """Kaplan and Yorke's dimension of the attractor's stroboscopic section; one more in time."""
+        """Kaplan-Yorke dimension of the attractor's stroboscopic section; that of the flow is one higher."""
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
-        """Bounds of each exponent, shape (6, 2): Student's, with a degree of freedom less than blocks."""
+        """Return Student's bounds of each exponent, for blocks - 1 degrees of freedom, shape (6, 2)."""
         reach = self._reach(confidence) * self.standard_errors_per_s
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Bounds of the dimension, by the fewest blocks of all exponents; never outside 0 to 6."""
+        """Return confidence bounds of the dimension within 0 to 6, for the fewest blocks of all exponents."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
@@ -198,14 +197,14 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
 
 
 def _mean(rates: Floats) -> BlockedMean:
-    """Mean of local exponents with its error; minus infinity where the direction was lost."""
+    """Return the mean of local exponents with its error; minus infinity if the direction was lost."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
     return block_mean(rates)
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
-    """Return the standard error of the dimension: its linear part in the local exponents, averaged like one.
+    """Return the standard error of the dimension, from its linearisation in the local exponents.
 
     D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0: dD = -dS / l + S dl / l^2.
     """
@@ -218,7 +217,7 @@ def _dimension_error(rates: Floats, exponents: Floats) -> float:
 
 
 def kaplan_yorke(exponents: Floats) -> float:
-    """Return the Kaplan-Yorke dimension from descending exponents; their number where none shrinks.
+    """Return the Kaplan-Yorke dimension from descending exponents; their number if all sums are positive.
 
     j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative (Kaplan and Yorke, Lecture
     Notes in Mathematics 730 (1979) 204).

@@ -1,7 +1,7 @@
-"""Integration with small variations of the state, whose growth is read at even intervals. SI units.
+"""Integration with small variations of the state, whose growth is read at equal intervals. SI units.
 
 Between readings the variations are propagated exactly. At a reading they are made orthogonal and of unit
-length in the energy norm s' diag(K, M) s, and the logarithms of what was divided out are kept (Benettin,
+length in the energy norm s' diag(K, M) s, and the logarithms of the divisors are kept (Benettin,
 Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9 and 21). The energy without stops is the specimen's
 natural norm: free motion only shrinks in it, so that any growth is due to impacts.
 """
@@ -33,7 +33,7 @@ from ..specimen.state import Floats, Table
 # together (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""Number of independent blocks below which an error has itself more than 20 per cent uncertainty."""
+"""With fewer independent blocks, a standard error itself is uncertain by more than 20 per cent."""
 CONFIDENCE = 0.99
 """Confidence of the test above which blocks count as correlated."""
 
@@ -72,7 +72,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
     # Choose the shortest blocks above which no neighbours are correlated.
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
-    # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
+    # For independent values the lagged correlation has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
     passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
     level = int(passes[0]) if len(passes) else len(counts) - 1
@@ -88,7 +88,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
 
 
 def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
-    """Variance, covariance of neighbours and number of blocks at every length that leaves two or more."""
+    """Return variance, covariance of neighbours and number of blocks for each length with two or more."""
     variances, correlations, counts = [], [], []
     while len(centred) > 1:
         variances.append(float(np.mean(centred**2)))
@@ -101,21 +101,21 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the evidence for correlation at each length and all longer ones."""
+    """Return the largest evidence for correlation by chance, at each length and all longer ones."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Longest time between orthogonalisations, in radians and decays of the fastest mode; changes stay distinct
-by several digits."""
+"""Longest time between orthogonalisations, in radians and decays of the fastest mode; in this time changes
+remain distinct to several digits."""
 CHECKS = 32
 """Most checks per run for an early end."""
 ALMOST = 1e-9
 """A duration this close to a whole number of intervals counts as whole."""
 Enough = Callable[[Floats], bool]
-"""Called during a run with the growth of the intervals so far, shape (n, m): returns whether it may end."""
+"""Called during a run with the growth in each interval so far, shape (n, m): whether it may end."""
 CYCLES = 2.0
 """Cycles of the slowest mode in an interval, unless another is requested."""
 
@@ -126,7 +126,7 @@ class Interval:
 
     length_s: float
     periods: int
-    """Drive periods in it; 0 if it is not a whole number of them."""
+    """Number of drive periods in the interval; 0 if that is not a whole number."""
 
     def count_in(self, duration_s: float) -> int:
         """Return the number of intervals in a duration."""
@@ -134,9 +134,9 @@ class Interval:
 
 
 def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = None) -> Interval:
-    """Choose whole drive periods of ``about_s`` [s], two cycles of the slowest mode when None.
+    """Choose whole drive periods of about ``about_s`` [s], two cycles of the slowest mode when None.
 
-    Drive periods longer than twice that are divided.
+    If a drive period is longer than twice that time, the interval is ``about_s``.
     """
     about = CYCLES / float(specimen.natural_frequencies_hz[0]) if about_s is None else about_s
     if not 0.0 < about < math.inf:
@@ -155,7 +155,7 @@ class TangentRun:
     growth: Floats
     """Logarithm of the factor by which each change grew in each interval, shape (n, m)."""
     impacts: NDArray[np.int64]
-    """In each interval, shape (n,)."""
+    """Number of impacts in each interval, shape (n,)."""
     section: Floats
     """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
     impact_times_s: Floats
@@ -183,9 +183,9 @@ def run_with_tangent(
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
     enough: Enough | None = None,
 ) -> TangentRun:
-    """Follow a motion from the drive's time zero, with ``changes`` (1 to 6) small changes of it.
+    """Follow a motion from the drive's time zero, with ``changes`` (1 to 6) small changes.
 
-    The run ends with the last interval that fits, or where ``enough`` says so.
+    The run ends with the last interval that fits, or when ``enough`` returns True.
     """
     check_impact_rate(max_impact_rate_hz)
     count = interval.count_in(duration_s)
@@ -207,7 +207,7 @@ def run_with_tangent(
         impacts=readings.impacts,
         section=readings.motions,
         impact_times_s=record.impact_times_s.copy(),
-        # Free phasors only shrink.
+        # Without impacts the amplitudes of all modes only decay.
         is_quiet=run.reach_m < min(specimen.gaps_m),
         final_state=run.motion,
         end_time_s=run.time_s,
@@ -234,21 +234,21 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # When a run settles into its final kind of motion, and whether it was chaotic before. SI units.
 #
 # A motion can strike its stops thousands of times and then leave them for ever: transient chaos (Grebogi, Ott
-# and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run describes no motion.
+# and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run describes neither motion.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
 """Relative change per cycle below which a section repeats, and above which it did not yet repeat."""
 LONGEST_CYCLE = 16
 """Longest searched cycle in intervals."""
 SURE = 3.0
-"""Standard errors from zero at which a number has a sign."""
+"""Number of standard errors from zero beyond which the sign of a mean is significant."""
 CHANGED = 5.0
-"""Standard errors between the means before and after a change; larger, because the best of many places is
-chosen."""
+"""Standard errors between the means before and after a change; more than SURE, because the best of many
+places is chosen."""
 FEWEST_INTERVALS = 32
-"""Intervals on each side of a change of the exponent's sign."""
+"""Fewest intervals on each side of a change of the exponent's sign."""
 ALIGNING = 8
-"""Intervals in which a small change of the state turns towards its direction of growth."""
+"""Number of first intervals in which a small change turns towards its direction of growth."""
 
 
 class FinalMotion(StrEnum):
@@ -266,13 +266,13 @@ class Settling:
 
     motion: FinalMotion
     since: int
-    """Intervals before it."""
+    """Number of intervals before the final motion."""
     cycle: int = 0
-    """Intervals of a periodic motion's cycle."""
+    """Number of intervals in a cycle of a periodic motion."""
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Find the final motion of a run and its beginning; ``scales`` are those of a state, shape (6,)."""
+    """Find the final motion of a run and its beginning; ``scales`` from `state_scales`, shape (6,)."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)

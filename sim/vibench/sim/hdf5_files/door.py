@@ -1,4 +1,4 @@
-"""Checks of an HDF5 file before reading: no external data, and possible sizes."""
+"""Check an HDF5 file before reading: it must have no external data and no impossible sizes."""
 
 import errno
 import math
@@ -10,16 +10,16 @@ from pathlib import Path
 import h5py
 
 MOST_OBJECTS = 20_000
-"""Links to groups and datasets of one file; a recording has about forty."""
+"""Most links to groups and datasets in one file; a recording has about forty."""
 MOST_ATTRIBUTES = 1_000
 """Most attributes of one object; a channel of a recording has about twenty-five."""
 DEEPEST = 32
-"""Groups in groups."""
+"""Deepest nesting of groups."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
-"""Largest chunk in bytes; ours have 200 kB."""
+"""Largest chunk; those of recordings have 200 kB."""
 LARGEST_RATIO = 1100
-"""Deflate makes at most 1030 bytes of one (zlib's documentation)."""
+"""Largest ratio of declared to stored bytes; Deflate reaches at most 1030 (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
 """Bytes that a dataset may declare without stored data."""
 OWN_FILTERS = frozenset(
@@ -36,21 +36,21 @@ OWN_FILTERS = frozenset(
 """Allowed filters; any other is a plug-in library that HDF5 would load and execute."""
 
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
-"""Errors of h5py for unreadable descriptions or number types."""
+"""Errors that h5py raises for unreadable headers or number types."""
 
 _SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
-"""In errors of HDF5; 22 means an address that cannot be, so that the file is wrong."""
+"""System error in a message of HDF5, except 22: an impossible address, so the file is damaged."""
 
 _allowances: list[None] = []
-"""One for each `allow_external_data` that is on in this process, whichever thread asks."""
+"""One entry for each active `allow_external_data`; it is valid in all threads of the process."""
 
 
 class UnsafeHdf5(ValueError):
-    """The file refers to other files or is inconsistent; the text does not name the file."""
+    """The file refers to other files or is inconsistent; the message does not contain its path."""
 
 
 def system_error(error: BaseException) -> str:
-    """Return what the system reported when it could not read ("Input/output error"); else an empty text."""
+    """Return the system's message for a read error ("Input/output error"), or an empty text."""
     if found := _SYSTEM_ERROR.search(str(error)):
         return found[1]
     return error.strerror or "" if isinstance(error, OSError) and error.errno else ""
@@ -69,7 +69,7 @@ def allow_external_data() -> Iterator[None]:
 def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
     """Open a file for reading, and check everything in it except the data.
 
-    Raises OSError when HDF5 cannot open it; UnsafeHdf5 when it points outside itself, or its sizes cannot be.
+    Raises OSError when HDF5 cannot open it; UnsafeHdf5 when it refers to other files or has impossible sizes.
 
     Parameters
     ----------
@@ -96,10 +96,9 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 
 
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Yield every group and dataset below a group, itself first, by path; each once, in the order of names.
+    """Yield path and object of a group and of everything below it, each once and ordered by name.
 
-    Raises UnsafeHdf5 at a link that leaves the file, when that is not allowed; links inside a file are left
-    alone.
+    Raises UnsafeHdf5 at a link to another file, unless that is allowed. Soft links are not followed.
     """
     seen = {_address(file)}
     links = 0

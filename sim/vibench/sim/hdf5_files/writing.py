@@ -1,4 +1,4 @@
-"""Write an HDF5 file with reliable errors on a failing disk, without crashes and silent gaps.
+"""Write an HDF5 file with reliable errors on a failing disk, without crashes or silent gaps.
 
 HDF5 2.0 crashes if a write fails while it closes a file, and h5py only prints errors that occur while it
 closes an object. Therefore HDF5 writes to a file object that reports every write as done and stores the first

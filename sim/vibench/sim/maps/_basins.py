@@ -21,27 +21,27 @@ from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
 
 BLOCKS = 4
-"""Parts along each axis for a jackknife of the exponent."""
+"""Number of parts along each axis for a jackknife of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
 """Fewest uncertain cells that make a distance usable."""
 MOST_UNCERTAIN = 0.5
 """Largest share of uncertain cells that makes a distance usable; above it, cells differ by chance."""
 SPREAD = 4.0
-"""Smallest ratio of the largest to the smallest distance: a slope over less is unreliable."""
+"""Smallest ratio of the largest to the smallest distance; the slope over a smaller range is unreliable."""
 
 
 @dataclass(frozen=True)
 class UncertaintyExponent:
     """Uncertainty exponent: the share f of uncertain starts falls with their uncertainty d as d^exponent.
 
-    1 for a smooth boundary, 0 where more accurate starts do not help; the dimension of the boundary is 2
-    minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
+    The exponent is 1 for a smooth boundary, and 0 if more accurate starts do not help. The dimension of the
+    boundary is 2 minus the exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
     """
 
     exponent: float
     low: float
-    """With its interval, valid in 19 cases of 20 within the resolution of the grid."""
+    """Lower end of the interval for 19 cases of 20, within the resolution of the grid."""
     high: float
     steps: tuple[int, ...]
     """Compared distances in steps of the grid."""
@@ -53,8 +53,8 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     """Find the uncertainty exponent of the boundary between the motions of a map over two coordinates.
 
     A start is uncertain at a distance if a start that far away along an axis reaches another motion. The
-    interval is from a jackknife over parts of the map. None where fewer than three distances have enough
-    uncertain starts, or fewer than half of all.
+    interval is from a jackknife over parts of the map. None unless at least three distances have enough
+    uncertain starts, and at most half of all.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
 
 
 def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
-    """Return whether a start one step away along an axis reaches another motion; without the edge."""
+    """Return whether a start one step away along an axis reaches another motion; edge cells are omitted."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step
     ]
@@ -130,11 +130,10 @@ def kick_stability(
     Parameters
     ----------
     results
-        A map in which only the start varies, complete.
+        A complete map in which only the start varies.
     sizes
         Sizes of the kicks, drawn from a normal distribution (Menck, Heitzig, Marwan and Kurths, Nature
-        Physics 9
-        (2013) 89, draw them from a box).
+        Physics 9 (2013) 89, draw them from a box).
     kicks
         Number of kicks of each size, all at one drive phase.
     seed, workers

@@ -38,13 +38,13 @@ from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 JUMP = 0.1
 """Relative difference of neighbouring responses that triggers refinement."""
 BASIN_JUMP = 2e-3
-"""The same where only the start varies: responses of one motion differ only by what has not settled."""
+"""The same if only the start varies: responses of one motion then differ only by remaining transients."""
 NOTHING = -1
 NOBODY = -1
 
 
 BUNDLE_S = 0.3
-"""Worker time of a bundle of scenes, large enough to fill SIMD lanes."""
+"""Worker time of a bundle of scenes [s], enough for full SIMD batches."""
 
 
 def map_solver(plan: Map) -> Solver:
@@ -95,7 +95,7 @@ class MapPoints:
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
-        """Points of the first lattice."""
+        """Return the points of the first lattice."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
@@ -183,7 +183,7 @@ def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     if starts == 1:
         return label[:, 0]
     found = np.sort(label, axis=1)
-    # A motion counts once, however many starts reach it.
+    # Count a motion only once, even if several starts reach it.
     found[:, 1:][found[:, 1:] == found[:, :-1]] = NOTHING
     cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
     flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
@@ -191,7 +191,7 @@ def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def cells_shape(grid: Grid) -> tuple[int, int]:
-    """Rows and columns of a map over two quantities."""
+    """Return rows and columns of a map over two quantities."""
     rows, _, columns = grid.shape
     return rows, columns
 
@@ -213,11 +213,11 @@ class MapEstimate:
 
     points: int
     coarse_points: int
-    """Number of points of the first lattice: a map has at least this many."""
+    """Number of points of the first lattice: at least these are computed."""
     work_s: float
     """Work of all points on one core, from recent run times on this machine."""
     longest_work_s: float
-    """The same if no motion repeats: each is followed for all drive periods of the map."""
+    """Work if no motion repeats: each is followed for all drive periods of the map."""
     coarse_work_s: float
     """Work of the first lattice."""
     workers: int
@@ -234,7 +234,7 @@ class MapEstimate:
 
     @property
     def most_s(self) -> float:
-        """The same if no motion repeats."""
+        """Time until all points are computed if no motion repeats."""
         return self._elapsed_s(self.points, self.longest_work_s)
 
     @property
@@ -264,7 +264,7 @@ class MapEstimate:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON."""
+        """Return plain values for JSON."""
         return {
             **asdict(self),
             "all_s": self.all_s,

@@ -50,7 +50,7 @@ KEPT = (
     "session",
     "state",
 )
-"""Columns of a study."""
+"""Columns of a study that a map also has."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
 """Additional columns of a map with a target."""
 MESSAGE_BYTES = 100
@@ -199,7 +199,7 @@ class Range(FrozenModel):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Ascending, ends included."""
+        """Ascending values, including both ends."""
         spaced = np.linspace if self.spacing is Spacing.LINEAR else np.geomspace
         return tuple(float(value) for value in spaced(self.start, self.stop, self.points))
 
@@ -219,9 +219,9 @@ class Refinement(StrEnum):
     """Selection of the computed points of a map over two quantities."""
 
     ADAPTIVE = "adaptive"
-    """A coarse lattice, and between its points only where neighbours differ."""
+    """A coarse lattice first, and other points only where neighbours differ."""
     FULL = "full"
-    """Every one."""
+    """Every point."""
 
 
 Number = float | Range
@@ -367,7 +367,7 @@ class Map(GridPlan):
 
     @property
     def first_step(self) -> int:
-        """Steps between the points that are computed first; 1 where all of them are."""
+        """Steps between the points that are computed first; 1 if all points are."""
         if self.coarse is not None:
             return self.coarse
         fewest = min(self.range_of(each).points for each in self.varied)
@@ -441,7 +441,7 @@ class Map(GridPlan):
         return Given(state_of(np.array([said[each.field] for each in START])))
 
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
-        """Value of every quantity at a place."""
+        """Return the value of every quantity at a place of the grid."""
         said = {each.field: getattr(self, each.field) for each in QUANTITIES}
         for quantity, index in zip(self.varied, (place[-1], place[0]), strict=False):
             said[quantity.field] = _values(self.range_of(quantity))[index]

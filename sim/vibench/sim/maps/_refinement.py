@@ -25,11 +25,11 @@ class Seen:
     """Compared quantities of the cells of a map, arrays of shape (rows, columns)."""
 
     is_known: Mask
-    """Computed."""
+    """Whether the cell is computed."""
     codes: Codes
     """Motion of each cell."""
     sizes: Floats
-    """Natural logarithm of a response that is the same at each visit to a motion; NaN where it scatters."""
+    """Natural logarithm of a response; NaN for motions whose response is not reproducible."""
     jump: float
     """Difference of sizes above which neighbours are different."""
 
@@ -144,7 +144,7 @@ class _Sketch:
     def filling(self, fine: int, step: int) -> Filling:
         """Return how the remaining cells of a level are filled in.
 
-        Corners that later proved to be another motion do not count.
+        Corners that later turned out to have another motion are not used.
         """
         is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
         cells = np.flatnonzero(is_new)
@@ -187,7 +187,7 @@ def _differs_from_neighbours(codes: Codes, sizes: Floats, jump: float) -> Mask:
 
 
 def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """Yield the neighbours along rows, columns and both diagonals."""
+    """Yield slices of neighbours along rows, columns and both diagonals."""
     whole, low, high = slice(None), slice(None, -1), slice(1, None)
     yield (low, whole), (high, whole)
     yield (whole, low), (whole, high)

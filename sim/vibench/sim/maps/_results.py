@@ -1,4 +1,4 @@
-"""Results of a map over its axes, computed or filled in, and its motions."""
+"""Results of a map over its axes, computed or filled in, and the motions found."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,8 +62,8 @@ class Audit:
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
         """Correct shares of motions in a map of this many cells for errors of filling in.
 
-        Where motions are finely mixed, the commonest is filled in too often. Gains and losses of the audited
-        cells are scaled up to all filled cells.
+        Where motions are finely mixed, the most common one is filled in too often. Gains and losses of the
+        audited cells are scaled up to all filled cells.
         """
         if not self.filled:
             return tuple(shares)
@@ -121,7 +121,7 @@ class MapResults(GridResults[Map]):
 
     @property
     def computed(self) -> int:
-        """Return the points that were computed."""
+        """Return the number of computed points."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
 
     @cached_property
@@ -137,7 +137,7 @@ class MapResults(GridResults[Map]):
 
         Points of one kind and period have the same number; motions without impacts have their own. Where only
         the start varies, periodic motions are also distinguished by their responses, so that each number is
-        one attractor. The commonest is 0.
+        one attractor. The most common motion is 0.
         """
         state = self.state.reshape(-1)
         is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
@@ -163,12 +163,12 @@ class MapResults(GridResults[Map]):
     def motions(self) -> tuple[MapMotion, ...]:
         """Return the motions of the whole map, in the order of `motion_numbers`.
 
-        Shares are of all known points, corrected by the audit where a part is filled in.
+        Shares refer to all known points, and are corrected by the audit if some points are filled in.
         """
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Describe the motions that the starts of one cell reached, the commonest first."""
+        """Describe the motions that the starts of one cell reached, the most common first."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -187,7 +187,7 @@ class MapResults(GridResults[Map]):
         return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
 
     def example(self, number: int) -> int:
-        """Return the first computed point with this number of motion."""
+        """Return the first computed point with the motion of this number."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
 
@@ -237,7 +237,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return rows numbered by label and, where there are sizes, by size: a gap separates two motions."""
+    """Return group numbers by label and, if given, by size; a jump in size separates two motions."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))

@@ -23,11 +23,11 @@ from ..specimen.stops import chosen
 # the tolerance.
 
 HERMITE = 384.0
-"""Cubic Hermite interpolation errs by h^4 / 384 times the fourth derivative."""
+"""The error of cubic Hermite interpolation is h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
 """Part of the accuracy's tolerance for the interpolation of a sweep."""
 SHORTEST_TURN = 0.005
-"""Shortest interval [rad]: shorter ones gain nothing; its error is 2e-12 of the amplitude."""
+"""Shortest interval [rad]; its error is 2e-12 of the amplitude, so shorter ones gain nothing."""
 
 
 class BaseMotion(NamedTuple):
@@ -72,9 +72,9 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 
 
 LATEST_START_S = 1e8
-"""Three years: the end of a run is one number, whose last digit there is 1e-8 s."""
+"""Three years: later, double precision cannot resolve 1e-8 s."""
 MOST_SAMPLES = 1e9
-"""48 gigabytes."""
+"""Limit of 48 GB of memory."""
 ROUNDING = 1e-9
 """A duration this close to a whole number of samples or intervals counts as whole."""
 
@@ -125,20 +125,20 @@ def integrate(
     Flight is exact (harmonic drives in closed form, others as cubics on intervals), contacts are proved or
     excluded by bounds and resolved with the tolerance of ``accuracy``. Sampling changes no step, so the
     motion is the same with any sample rate. Raises ValueError when an argument is not allowed, or the drive
-    is over before the run is.
+    ends before the run.
 
     Parameters
     ----------
     specimen, drive
         Specimen, and motion of its base.
     duration_s
-        [s]; within the drive, if that is a sweep or samples.
+        [s]; a sweep or a sampled drive must last as long.
     accuracy
         Relative error allowed in a step of a contact.
     initial_state
         x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,); at rest when None. May be in contact.
     sample_rate_hz
-        Samples at start_time_s + k / sample_rate_hz up to the end; None keeps none.
+        Samples at start_time_s + k / sample_rate_hz up to the end; no samples when None.
     start_time_s
         Start time on the drive's clock, to continue from an earlier final state.
     max_impact_rate_hz
@@ -223,7 +223,7 @@ def integrate_cubics(
 ) -> tuple[CubicRun, Outcome]:
     """Follow a specimen as `integrate` does, from one instant to another.
 
-    Raises ValueError when the drive is over before the run is.
+    Raises ValueError when the drive ends before the run.
     """
     check_within(drive.duration_s, end_s)
     if isinstance(drive, Sampled):
@@ -266,10 +266,10 @@ def _place(time_s: float, interval_s: float) -> tuple[int, float]:
     return int(position), time_s - int(position) * interval_s
 
 
-# The motion at each sample of the recorded base, as overlays of a model on a recording need it. SI units.
+# The motion at each sample of the recorded base, for overlays of a model on a recording. SI units.
 #
-# `integrate` answers more (impact times, samples anywhere, any end) and costs several times as much per
-# interval. Here every interval is whole, the state at its end is kept, and impacts are counted.
+# `integrate` gives more (impact times, any sample rate, any end) and costs several times as much per
+# interval. Here every interval is whole, the state at its end is kept, and impacts are only counted.
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,8 +305,8 @@ def follow_samples(
     initial_state
         x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,); at rest when None. May be in contact.
     first, last
-        Samples at which the run begins and ends; the whole drive if absent. The samples around them
-        still shape the spline.
+        Samples at which the run begins and ends; the whole drive if absent. Samples outside
+        this range still affect the spline.
     """
     accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)

@@ -49,7 +49,7 @@ def flow_derivative(
     Parameters
     ----------
     specimen, drive
-        What moves, and what moves it.
+        Specimen, and motion of its base.
     state
         x, y, z, vx, vy, vz at time zero, shape (6,).
     duration_s

@@ -25,7 +25,7 @@ class Response:
     window_s: float
     """Time before the end over which the largest values are taken."""
     line_periods: int
-    """Whole drive periods before the end over which lines are taken: as many as the window contains."""
+    """Number of whole drive periods in the window, over which the lines at the drive frequency are taken."""
     largest_x_m: float
     """Response I of m0, not normalised."""
     largest_p_m: float
@@ -33,13 +33,13 @@ class Response:
     line_x_m: complex
     """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency; the drive itself is -i A0."""
     line_p_m: complex
-    """The same of p."""
+    """The same for p."""
     impacts: int
     """Contacts that began within the window."""
     impacts_before: int
     """Contacts that began before the window."""
     line_start_state: Floats
-    """x, y, z, vx, vy, vz at the start of the lines, shape (6,)."""
+    """x, y, z, vx, vy, vz at the start of these drive periods, shape (6,)."""
     final_state: Floats
     """x, y, z, vx, vy, vz at the end, shape (6,), to start the next point of a sweep."""
     outcome: Outcome
@@ -78,9 +78,8 @@ def steady_response(
     """Drive a specimen for some time and measure its motion at the end.
 
     The defaults are those of Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed. In
-    chaos Response I scatters by a few per cent at every accuracy. The state
-    that is reached may depend on the ``initial_state``, shape (6,) [m, m/s], which therefore belongs to
-    the record.
+    chaos Response I scatters by a few per cent at every accuracy. The motion that is reached may depend on
+    ``initial_state``, shape (6,) [m, m/s]; record it with the result.
 
     Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
     than one drive period.
@@ -98,7 +97,7 @@ def steady_response(
             line_start = run.motion
             record.watch(watch)
             outcome = run.advance(until, record)
-    # A line is the mean of twice the motion against the drive.
+    # A line is twice the mean of the motion times exp(-i (omega t + phase)).
     scale = 2.0 / line_s if outcome is Outcome.REACHED_END else math.nan
     peaks = (record.peak_x_m, record.peak_p_m) if outcome is Outcome.REACHED_END else (math.nan, math.nan)
     return Response(

@@ -1,4 +1,4 @@
-"""Linux and macOS."""
+"""Functions for Linux and macOS."""
 
 import errno
 import fcntl
@@ -22,12 +22,12 @@ def open_to_write(path: Path) -> int:
 def open_for_all(path: Path) -> int:
     """Open a lock file shared by all users, created if missing; return its descriptor.
 
-    Raises OSError if the path is something else: a link, a second name, a pipe.
+    Raises OSError if the path is not a regular file with a single name, for example a link or a pipe.
     """
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         descriptor = os.open(path, os.O_RDWR | flags)
-    except PermissionError:  # a readable file can be locked
+    except PermissionError:  # reading is enough to lock a file
         descriptor = os.open(path, os.O_RDONLY | flags)
     except FileNotFoundError:
         try:
@@ -80,7 +80,7 @@ def allocate(descriptor: int, offset: int, size: int) -> None:
 
 
 def lock_in_use(descriptor: int) -> None:
-    """Lock a file as used while it is open; others may read. Raises OSError if one locked it exclusively."""
+    """Lock an open file for shared use. Raises OSError if another process has locked it exclusively."""
     fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
 
 
@@ -109,7 +109,7 @@ def lower_priority(by: int) -> None:
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Limit the memory of this process, where the system counts it."""
+    """Limit the memory of this process, where the system supports limits."""
     _, most = resource.getrlimit(resource.RLIMIT_DATA)
     bound = most_bytes if most == resource.RLIM_INFINITY else min(most, most_bytes)
     resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
@@ -128,10 +128,10 @@ def usual_shared_folder() -> Path:
 
 
 def process_start(pid: int) -> str | None:
-    """Return when a process started, as the system writes it; None without such a process.
+    """Return the start time of a process in the system's notation; None if there is no such process.
 
-    A zombie counts as ended. Empty if the process lives and its start is unknown. On Linux, the start of the
-    computer and the container come first (`Place`).
+    A zombie counts as ended. Empty if the process is alive but its start is unknown. On Linux, identifiers
+    of the boot and the container precede the start (`Place`).
     """
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
@@ -139,8 +139,8 @@ def process_start(pid: int) -> str | None:
         return None if Path("/proc/self/stat").exists() else _start_by_ps(pid)
     except ProcessLookupError:
         return None
-    # The name before the last bracket may contain anything; proc(5) counts the state as 3 and the start as
-    # 22.
+    # Split at the last bracket: a process name may contain brackets and spaces. In proc(5) the state is
+    # field 3 and the start is field 22.
     state, *others = text.rpartition(")")[2].split()
     return None if state in "ZX" else f"{_here()}_{others[18]}"
 
@@ -151,7 +151,7 @@ def _here() -> str:
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
         return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"
-    except OSError:  # a system call that a sandbox refuses
+    except OSError:  # a sandbox may refuse the system call
         return "unknown"
 
 

@@ -42,7 +42,7 @@ def write_all(descriptor: int, data: Buffer, offset: int) -> None:
 
 
 class OpenFile:
-    """An existing file, open for writing; its locks end with the process, however it ends.
+    """An existing file, open for writing; the system releases its locks when the process ends.
 
     Raises OSError when it cannot be opened.
     """
@@ -51,32 +51,32 @@ class OpenFile:
         self._descriptor = open_to_write(path)
 
     def lock_in_use(self) -> None:
-        """Lock it as used; others may read. Raises OSError if another process locked it exclusively."""
+        """Lock the file for shared use. Raises OSError if another process has locked it exclusively."""
         lock_in_use(self._descriptor)
 
     def lock_sole_writer(self) -> None:
-        """Lock it for writing by this process only; others may read. Raises OSError if another writes."""
+        """Lock the file for writing; others may read. Raises OSError if another process writes to it."""
         lock_sole_writer(self._descriptor)
 
     def is_locked_alone(self) -> bool:
-        """Lock it exclusively; return False if another process uses it."""
+        """Lock the file exclusively; return False if another process uses it."""
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``, at least into the cache of the system."""
+        """Write ``data`` at ``offset``; it may remain in the system's cache until `sync`."""
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
-        """Return when everything written so far would survive a power cut."""
+        """Flush everything written so far to the disk, so that it survives a power cut."""
         sync_data(self._descriptor)
 
     @property
     def has_a_name(self) -> bool:
-        """Return whether it still has a name in a folder; a removed file cannot be found again."""
+        """Return whether the file still has a name in a folder, that is, was not removed."""
         return os.fstat(self._descriptor).st_nlink > 0
 
     def reserve(self, offset: int, size: int) -> None:
-        """Allocate blocks where the system can; elsewhere only the check of free space protects."""
+        """Allocate disk blocks if the system can; otherwise only a check of free space guards the disk."""
         allocate(self._descriptor, offset, size)
 
     def close(self) -> None:
@@ -104,7 +104,7 @@ def replace_file(path: Path) -> Iterator[Path]:
     try:
         yield coming
         rename(coming, target)
-    except OSError as error:  # an exception of a write names no file or the temporary one
+    except OSError as error:  # name the target in the error, not the temporary file
         error.filename = str(path) if error.filename in (None, str(coming)) else error.filename
         raise
     finally:
@@ -113,7 +113,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 
 def rename(unfinished: Path, final: Path) -> None:
-    """Rename a file, replacing `final`; ignore an error if the file was renamed, as on network folders."""
+    """Rename a file, replacing `final`; ignore errors of network folders if the renaming succeeded."""
     made = unfinished.stat()
     try:
         os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
@@ -131,9 +131,9 @@ class Place(Enum):
 
     HERE = auto()
     CONTAINER = auto()
-    """On this computer since it was switched on, in another container than this program."""
+    """On this computer since its last start, but in another container."""
     ELSEWHERE = auto()
-    """On another computer, or before this one was switched on."""
+    """On another computer, or before the last start of this one."""
 
 
 def place_of(start: str) -> Place:
@@ -145,7 +145,7 @@ def place_of(start: str) -> Place:
 
 
 def is_process(pid: int, start: str) -> bool:
-    """Return whether the process with this start still lives; with `UNKNOWN`, any of that number."""
+    """Return whether the process is alive; if a start is `UNKNOWN`, only the process number is compared."""
     now = process_start(pid)
     return now is not None and (UNKNOWN in (now, start) or now == start)
 
@@ -165,7 +165,7 @@ def state_folder() -> Path:
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:  # a file of that name, a disk without folders
+    except OSError as error:  # for example, a file has that name
         refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
         refused.add_note(f"{VARIABLE} names another folder for locks, bench checks and learnt costs")
         raise refused from error

@@ -1,4 +1,4 @@
-"""Windows: locks apply to bytes of a file, and the system flushes the names in a folder itself."""
+"""Functions for Windows, which locks bytes of a file and flushes the names in a folder itself."""
 
 import ctypes
 import msvcrt
@@ -25,7 +25,7 @@ def open_for_all(path: Path) -> int:
     """Open a lock file shared by all users, created if missing; return its descriptor."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
-    except PermissionError:  # the file of another user: a readable file can be locked
+    except PermissionError:  # another user's file: reading is enough to lock it
         return os.open(path, os.O_RDONLY | os.O_BINARY)
 
 
@@ -47,7 +47,7 @@ def sync_data(descriptor: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Do nothing: the system does it."""
+    """Do nothing: Windows flushes folders itself."""
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
@@ -55,7 +55,7 @@ def allocate(descriptor: int, offset: int, size: int) -> None:
 
 
 def lock_in_use(descriptor: int) -> None:
-    """Lock a file as used while it is open; others may read. Raises OSError if one locked it exclusively."""
+    """Lock an open file for shared use. Raises OSError if another process has locked it exclusively."""
     os.lseek(descriptor, LOCK_BYTE, os.SEEK_SET)
     msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
 
@@ -81,7 +81,7 @@ def lower_priority(by: int) -> None:  # noqa: ARG001 - there are classes of prio
 
 
 def bound_memory(most_bytes: int) -> None:
-    """Do nothing: only a job object could, and a process cannot leave a job."""
+    """Do nothing: only a job object can limit memory, and a process cannot leave its job object."""
 
 
 def usual_state_folder() -> Path:
@@ -95,7 +95,7 @@ def usual_shared_folder() -> Path:
 
 
 def process_start(pid: int) -> str | None:
-    """Return when a process started, as the system writes it; None without such a process."""
+    """Return the start time of a process as a text; None if there is no such process."""
     kernel = ctypes.windll.kernel32
     handle = kernel.OpenProcess(_QUERY_LIMITED_INFORMATION, 0, pid)
     if not handle:

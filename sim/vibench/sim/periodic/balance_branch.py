@@ -73,7 +73,6 @@ def first_guess(
         case PowerSpring():
             return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]
         case _:
-            # Start from the motion without the spring.
             fundamental = np.array([1])
             seen = condense(structure, 2.0 * math.pi * frequency_hz, fundamental)
             return Guess(fundamental, np.array([-1j * amplitude_m * seen.linear]))
@@ -103,14 +102,14 @@ def balance(
     Parameters
     ----------
     structure, spring
-        The linear part, and the force along its direction.
+        The linear part, and the nonlinear force along its direction b.
     frequency_hz, amplitude_m
-        Of U = amplitude sin(2 pi frequency t); positive.
+        Frequency and amplitude of U = amplitude sin(2 pi frequency t); positive.
     options
         Harmonics and tolerance.
     start
         Start of the iteration, which selects one of several motions; by default `first_guess`. Strong
-        contact needs a near one, such as a neighbour's or an integrated orbit's.
+        contact needs a nearby start, such as a neighbouring solution or an integrated orbit.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):
         raise ValueError(
@@ -172,12 +171,12 @@ class BalanceFamily:
     problem: BalanceProblem
     path: DrivePath
     scale: float
-    """Hz, or m, per unit of length."""
+    """Parameter per unit of length [Hz, or m]."""
     options: BalanceOptions
 
     @property
     def tolerance(self) -> float:
-        """Part of the fundamental of p."""
+        """Largest truncation error, relative to the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
@@ -208,7 +207,7 @@ class BalanceFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics, the new ones zero."""
+        """Return the family with twice the harmonics; the new harmonics are zero."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:
@@ -227,7 +226,7 @@ class BalanceFamily:
 def orbit_signs(
     structure: LinearStructure, spring: RestoringForce, found: Balance, kept: HarmonicSet
 ) -> OrbitSigns:
-    """Stability and contacts of a solution, by the exact variational equation along it."""
+    """Return stability and contacts of a solution, from the exact variational equation along it."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
     contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:
@@ -248,8 +247,8 @@ def balance_branch_within(
 ) -> Branch:
     """Follow a solution both ways along a drive path to the ends of a range, ascending [Hz, or m].
 
-    As `periodic_branch_within`; harmonics are added where those left out would matter. Raises ValueError when
-    the start did not converge, or lies outside.
+    As `periodic_branch_within`; harmonics are added where the error requires it. Raises ValueError when
+    the start did not converge, or lies outside the range.
     """
     if start.outcome is BalanceEnd.NO_SOLUTION:
         raise ValueError(
@@ -264,7 +263,7 @@ def balance_branch_within(
 
 
 SPECTRUM_SHARE = 8
-"""Harmonics kept of an orbit's spectrum: one in eight of those that its samples could show."""
+"""Ratio of the samples per period to the harmonics that are kept of an orbit's spectrum."""
 
 
 def orbit_guess(orbit: PeriodicOrbit) -> Guess:

@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Rounding within which a multiplier counts as on the unit circle, as all do without damping."""
+"""Rounding within which a multiplier counts as on the unit circle; without damping all lie there."""
 
 
 class Parameter(StrEnum):
@@ -34,11 +34,11 @@ class BifurcationKind(StrEnum):
     FOLD = "fold"
     """The branch turns back: a swept response jumps here. One multiplier is +1."""
     SYMMETRY_BREAKING = "symmetry breaking"
-    """Two motions that are each other's mirror images leave the symmetric one. One multiplier is +1."""
+    """Two motions, mirror images of each other, branch off the symmetric one. One multiplier is +1."""
     PERIOD_DOUBLING = "period doubling"
-    """A motion of twice the period leaves. One multiplier is -1."""
+    """A motion of twice the period branches off. One multiplier is -1."""
     NEIMARK_SACKER = "Neimark-Sacker"
-    """A quasi-periodic motion leaves. A complex pair of multipliers crosses the unit circle."""
+    """A quasi-periodic motion branches off. A complex pair of multipliers crosses the unit circle."""
     GRAZING = "grazing"
     """A contact begins or ends at zero speed."""
 
@@ -51,12 +51,12 @@ class BranchEvent:
     frequency_hz: float
     amplitude_m: float
     state: Floats
-    """Displacements and velocities at the drive's time zero, shape (2 n,): to go on from there."""
+    """Displacements and velocities at the drive's time zero, shape (2 n,), to start from."""
     index: int
-    """Index of the point of the branch before it."""
+    """Index of the last point of the branch before the event."""
 
     def parameter(self, parameter: Parameter) -> float:
-        """Frequency [Hz] or amplitude [m]."""
+        """Return the frequency [Hz] or the amplitude [m] of the event."""
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
 
@@ -87,11 +87,11 @@ class Branch:
     end: ArcEnd
     """Reason why the branch ends at its last point."""
     begin: ArcEnd | None = None
-    """Reason why it ends at its first point, if followed both ways; None if started there."""
+    """Reason why the branch ends at its first point, if followed both ways; None if started there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """No multiplier outside the unit circle, shape (m,)."""
+        """Whether no multiplier lies outside the unit circle, shape (m,)."""
         return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0 + NEUTRAL)
 
     @property
@@ -115,15 +115,15 @@ POINTWISE = (
 
 # Bifurcations between two points of a branch, from Floquet multipliers.
 #
-# Each test is a real number that changes sign: a multiplier passes -1 (product of mu + 1), a pair passes
-# the unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34
-# (1997) 1), another contact begins or ends (their number). Folds are found by the continuation itself.
+# A test function changes sign where a multiplier passes -1 (product of mu + 1), or a pair passes the unit
+# circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal. 34 (1997) 1). The
+# number of contacts changes where one begins or ends. Folds are found by the continuation itself.
 #
-# A motion that mirrors itself after half a period has the square of a half-period map as its monodromy:
-# there -1 of the half map means that the symmetry breaks, and +1 is a fold.
+# If a motion mirrors itself after half a period, its monodromy matrix is the square of that of a half-period
+# map. A multiplier -1 of the half map means symmetry breaking, and +1 is a fold.
 
 COMPLEX_PART = 1e-6
-"""A pair with less imaginary part than this is a real pair of product one: no motion is born there."""
+"""A pair with a smaller imaginary part is a real pair of product one: no Neimark-Sacker point."""
 
 
 class Symmetry(StrEnum):
@@ -147,7 +147,7 @@ class OrbitSigns:
     joins: BifurcationKind | None = None
     """Bifurcation on the simpler branch where both join."""
     grazing_distance: float = math.inf
-    """Distance of a contact from its start or end (grazing), over the gap or the gap times 2 pi f."""
+    """Distance from grazing (start or end of a contact), over the gap or the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -156,12 +156,12 @@ class OrbitSigns:
 
     @property
     def flip(self) -> float:
-        """Changes sign where a multiplier passes -1."""
+        """Test function that changes sign where a multiplier passes -1."""
         return float(np.prod(self.multipliers + 1.0).real)
 
     @property
     def torus(self) -> float:
-        """Changes sign where a complex pair passes the unit circle; one that lies on it counts as inside."""
+        """Test function that changes sign where a complex pair leaves the closed unit disc."""
         pairs = itertools.combinations(self.multipliers, 2)
         beyond = np.array([a * b - 1.0 for a, b in pairs])
         beyond[np.abs(beyond) < NEUTRAL] = -NEUTRAL
@@ -169,7 +169,7 @@ class OrbitSigns:
 
     @property
     def has_pair_on_circle(self) -> bool:
-        """The pair of product closest to one is complex."""
+        """Whether the pair whose product is closest to one is complex."""
         pairs = list(itertools.combinations(self.multipliers, 2))
         first, _ = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
         return bool(abs(first.imag) > COMPLEX_PART)
@@ -191,11 +191,11 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 NEAR_SIMPLER = 0.5
 """A motion this close to a simpler one, over the gap, may pass through it within a step."""
 IS_SIMPLER = 1e-7
-"""A motion this close to a simpler one, over the gap, is that one: what is between them is rounding."""
+"""A motion this close to a simpler one, over the gap, counts as that one: they differ by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a motion passed through a simpler one between two points, so that its twin follows."""
+    """Return whether a branch passed a simpler motion; beyond it, it repeats, shifted or mirrored."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

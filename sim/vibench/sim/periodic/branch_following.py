@@ -47,7 +47,7 @@ class FrequencyPath:
     """Path along frequency, with a constant amplitude or a recorded level."""
 
     amplitudes_m: tuple[float, ...]
-    """One for every frequency; a single one is constant."""
+    """One amplitude for every frequency, or a single constant one."""
     frequencies_hz: tuple[float, ...] = ()
     """Ascending; the amplitude is a monotone cubic between and constant outside."""
 
@@ -64,7 +64,7 @@ class FrequencyPath:
 
     @property
     def parameter(self) -> Parameter:
-        """Frequency."""
+        """Parameter of the path: the frequency."""
         return Parameter.FREQUENCY
 
     def drive(self, value: float) -> tuple[float, float]:
@@ -74,7 +74,7 @@ class FrequencyPath:
         return value, float(self._curve(self._inside(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """1, and the amplitude's slope [m/Hz]."""
+        """Return 1 and the amplitude's slope [m/Hz]."""
         if len(self.amplitudes_m) == 1 or self._inside(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
@@ -89,7 +89,7 @@ class FrequencyPath:
 
 @dataclass(frozen=True)
 class AmplitudePath:
-    """Along the amplitude, at one frequency."""
+    """Path along the amplitude, at one frequency."""
 
     frequency_hz: float
 
@@ -98,7 +98,7 @@ class AmplitudePath:
 
     @property
     def parameter(self) -> Parameter:
-        """Amplitude."""
+        """Parameter of the path: the amplitude."""
         return Parameter.AMPLITUDE
 
     def drive(self, value: float) -> tuple[float, float]:
@@ -106,7 +106,7 @@ class AmplitudePath:
         return self.frequency_hz, value
 
     def slopes(self, value: float) -> tuple[float, float]:  # noqa: ARG002 - the same everywhere
-        """0 and 1."""
+        """Return 0 and 1: only the amplitude changes."""
         return 0.0, 1.0
 
 
@@ -143,7 +143,7 @@ class Family(Curve, Protocol):
 
     @property
     def path(self) -> DrivePath:
-        """Along which the drive changes."""
+        """Path along which the drive changes."""
         ...
 
     @property
@@ -174,13 +174,13 @@ class _Gathered:
 
 
 RANGE_LENGTH = 10.0
-"""The parameter's range counts as this many units of length, the gap or the spring's length scale as one."""
+"""Length of the parameter's range; the gap or the spring's length scale has length 1."""
 
 
 def branch_range(
     parameter: Parameter, frequency_hz: float, amplitude_m: float, stop: float
 ) -> tuple[float, float]:
-    """Return the start of a branch to ``stop``, and its unit of length [Hz, m]."""
+    """Return the parameter at the start of a branch to ``stop``, and the unit of length [Hz, m]."""
     value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
     if not 0.0 < stop < math.inf or stop == value:
         raise ValueError(f"A branch from {value} to {stop} is not allowed: positive, and two different ends.")
@@ -209,9 +209,9 @@ def follow(
     Parameters
     ----------
     family
-        At the resolution to begin with.
+        Family at its first resolution.
     start
-        On the family.
+        Point on the family.
     toward, bounds
         Sign of the first step, and range, of the family's scaled parameter.
     steps
@@ -234,18 +234,18 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""Distance from grazing, relative to the gap, at which a lost branch ends by grazing."""
+"""A branch that cannot be continued this close to grazing, relative to the gap, ends by grazing."""
 
 
 def _end_branch(gathered: _Gathered, parameter: Parameter) -> Branch:
-    """End a branch that cannot be continued, and name grazing at a rigid stop."""
+    """End a branch that cannot be continued; add an event if it ends by grazing at a rigid stop."""
     if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
         gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
     return _branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT)
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
-    """Follow a family from a point to both ends; a closed branch once."""
+    """Follow a family from a point to both ends; follow a closed branch only once."""
     onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
@@ -278,13 +278,13 @@ def _follow_at(
     steps: ArcSteps,
     gathered: _Gathered,
 ) -> tuple[ArcEnd | None, ArcPoint]:
-    """Follow at one resolution; return why (None: continue finer) and where the branch ended."""
+    """Follow at one resolution; return the reason for its end (None: refine) and the last point."""
     points = trace(family, start, toward, bounds, steps)
     before = next(points)
     first = family.report(before.point)
     signs = first.signs
     if not gathered.reports:
-        # The first point is known already if a finer resolution took over.
+        # After a refinement, the first point was already reported.
         gathered.reports.append(first)
     for here in points:
         if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):
@@ -317,7 +317,7 @@ def _add_simpler_end(
     steps: ArcSteps,
     gathered: _Gathered,
 ) -> None:
-    """End a branch on the simpler motion, after which its twin follows."""
+    """End a branch on the simpler motion; beyond it, the branch would repeat, shifted or mirrored."""
 
     def measure(point: ArcPoint) -> float:
         return float(family.report(point.point).signs.apart @ signs.apart)

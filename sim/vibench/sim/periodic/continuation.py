@@ -1,9 +1,9 @@
 """Follow a curve of solutions through its folds: pseudo-arclength continuation.
 
 n equations in n unknowns and one parameter, r(u, lambda) = 0, define a curve in n + 1 dimensions. Step
-along its tangent, then correct across it (Keller 1977; Allgower and Georg, Introduction to Numerical
-Continuation Methods, SIAM 2003, chapters 2, 6 and 9): a fold is a point like any other, found where the
-tangent's last component changes sign. Unknowns and parameter should be scaled to the order of one.
+along its tangent, then correct perpendicular to it (Keller 1977; Allgower and Georg, Introduction to
+Numerical Continuation Methods, SIAM 2003, chapters 2, 6 and 9). Folds are passed like other points; they lie
+where the tangent's last component changes sign. Unknowns and parameter should be scaled to the order of one.
 """
 
 import math
@@ -99,7 +99,7 @@ SHORTEST_BRACKET = 1e-12
 
 
 def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
-    """Newton iteration in the hyperplane through ``guess`` across ``normal``.
+    """Correct ``guess`` by Newton's method in the hyperplane perpendicular to ``normal``.
 
     Returns the point and the iterations it took; 0 iterations mean that it did not converge.
     """
@@ -138,14 +138,14 @@ def trace(
 ) -> Iterator[ArcPoint]:
     """Follow the curve from a point on it until the parameter leaves its bounds.
 
-    Yields the start, then every point, folds between them; the last says why it is the last.
+    Yields the start, then every point and the folds between points; `end` of the last point is the reason.
 
     Parameters
     ----------
     curve
-        As scaled by the caller.
+        Equations, scaled by the caller.
     start
-        On the curve within the tolerance, shape (n + 1,).
+        Point on the curve within the tolerance, shape (n + 1,).
     toward
         The sign gives the parameter's direction at the start.
     bounds
@@ -165,7 +165,7 @@ def trace(
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
-            # There is nothing smooth between two kinks so close together: stop here.
+            # Two kinks this close together leave no smooth curve between them: stop here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap(curve, here, steps)
@@ -222,7 +222,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # Compare points of this curve, because another sheet may be as near.
+    # Compare points of this curve, because another curve may be as near.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
@@ -231,8 +231,8 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
 def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
     """Cross a kink, where a contact begins and the branch continues or turns back within a rounding error.
 
-    The unknowns continue but the parameter may reverse. So steps follow the tangent, or the tangent with its
-    parameter mirrored, with growing lengths and no limit on the turn.
+    The unknowns continue, but the parameter may reverse. Therefore try steps of growing length along the
+    tangent, and along the tangent with reversed parameter, without a limit on the turn.
     """
     mirrored = here.tangent.copy()
     mirrored[-1] = -mirrored[-1]
@@ -250,7 +250,7 @@ def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the factor to the next step, from the iterations and the turn."""
+    """Return the ratio of the next step's length to the last, from iterations and turn."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))
@@ -294,7 +294,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: an end that is kept twice counts half, so that both ends move.
+        # Illinois method: halve the value of an end that is kept twice, so that both ends move.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
@@ -307,7 +307,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Find the point on the curve at a share of the chord between two; elsewhere if a kink prevents it."""
+    """Find a point of the curve at a share of the chord; try other shares if a kink prevents it."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:

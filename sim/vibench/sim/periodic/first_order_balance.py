@@ -4,12 +4,12 @@ With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs
 P (1 + G N(|P|)) = P_lin: G is the compliance that the spring sees and N its describing function. Squared,
 it is one equation for |P| with a few powers (`vibench.sim.periodic`), so no branch can be missed.
 
-All positive zeros of a sum of a few powers, whatever the exponents.
+`positive_zeros` finds all positive zeros of a sum of a few powers with any exponents.
 
 A polynomial of degree 201 with four terms has at most three positive zeros (Descartes), but companion
-matrices and powers of u lose them. Rolle's theorem finds them all: divided by its lowest power and
-differentiated, a sum of m powers becomes one of m - 1, between whose zeros the sum is monotone. In
-t = ln u, and with every term over the largest, nothing overflows.
+matrices and powers of u lose them. Rolle's theorem finds them all: a sum of m powers, divided by its lowest
+power, is monotone between the zeros of its derivative, a sum of m - 1 powers. In t = ln u, and with every
+term divided by the largest, nothing overflows.
 """
 
 import math
@@ -53,7 +53,7 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return the sum over its largest term; only its sign is used."""
+    """Return the sum divided by its largest term; only the sign is used."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
@@ -95,7 +95,7 @@ FUNDAMENTAL = np.array([1])
 def fundamental_share(exponent: int) -> float:
     """Amplitude of the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1); 3/4 for n = 3, 5/8 for n = 5.
 
-    Whole numbers of any size divided once: correctly rounded for every odd n.
+    Two exact integers are divided, so the result is correctly rounded for every odd n.
     """
     if exponent < 1 or exponent % 2 == 0:
         raise ValueError(
@@ -113,7 +113,7 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """False on the middle one of three branches, which experiments do not show.
+    """False on the middle one of three branches, which is not observed in experiments.
 
     Other instabilities are not included; see `vibench.sim.periodic`.
     """
@@ -131,7 +131,7 @@ def first_order_states(
     structure, spring
         Result of `vibench.sim.periodic.harmonic_balance.structure_of`, and the power law.
     frequency_hz, amplitude_m
-        Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
+        Drive U = amplitude sin(2 pi frequency t): frequency positive, amplitude zero or positive.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
         raise ValueError(
@@ -161,7 +161,7 @@ def first_order_states(
 
 
 def _describing(size: float, spring: PowerSpring) -> float:
-    """N = F_1 / P [N/m] at abs(P) = size * length; infinite where it overflows."""
+    """Return N = F_1 / P [N/m] at abs(P) = size * length; infinite if it overflows."""
     with np.errstate(over="ignore"):
         return float(
             sum(
@@ -172,7 +172,7 @@ def _describing(size: float, spring: PowerSpring) -> float:
 
 
 def _balance_squared(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
-    """|P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
+    """Return |P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
     weights = np.array([fundamental_share(n) * f / spring.length for n, f in spring.terms])
     powers = np.array([float(n) for n, _ in spring.terms])
     coefficients = np.concatenate(

@@ -2,11 +2,10 @@
 
 Small departures d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
 e = dF/d(dp/dt) along the motion; their map over one period is the monodromy matrix, whose eigenvalues
-determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Free
-stretches are one
-matrix exponential each; contacts begin and end exactly where p reaches a stop, and are crossed by
-fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253) that crowd at both ends, where
-the stiffness of a Hertz contact starts like a square root.
+determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). A stretch
+of flight is one matrix exponential. Contacts begin and end exactly where p reaches a stop, and are crossed by
+fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253). Steps are shorter at both ends,
+where the stiffness of a Hertz contact starts like a square root.
 """
 
 import math
@@ -24,11 +23,11 @@ from .restoring_force import RestoringForce
 CONTACT_STEPS = 96
 """Magnus steps across one contact."""
 STEPS_PER_TURN = 8.0
-"""Magnus steps in a radian of the fastest motion that the structure or the pressed spring can make."""
+"""Magnus steps per radian of the fastest motion of the structure or the compressed spring."""
 STEPS_PER_HARMONIC = 16
-"""Magnus steps of a period, over its highest harmonic, where the spring is smooth everywhere."""
+"""Magnus steps per period of the highest harmonic, for a spring that is smooth everywhere."""
 SMOOTH_STEPS = 128
-"""Fewest steps of a period where the spring is smooth everywhere."""
+"""Fewest steps per period, for a spring that is smooth everywhere."""
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of the two Gauss points from the middle of a step of length one."""
 
@@ -43,7 +42,7 @@ class Motion:
     """P_k, shape (m,) [m]."""
 
     def p(self, turn: Floats) -> Floats:
-        """Displacement p at phases ``turn`` [rad] [m]."""
+        """Displacement p [m] at phases ``turn`` [rad]."""
         return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ self.relative)
 
     def rate(self, turn: Floats) -> Floats:
@@ -54,7 +53,7 @@ class Motion:
 
 
 def multipliers(monodromy: NDArray[np.float64]) -> Complex:
-    """Eigenvalues, largest magnitude first."""
+    """Return the eigenvalues, largest magnitude first."""
     values = np.linalg.eigvals(monodromy).astype(np.complex128)
     return values[np.argsort(-np.abs(values), kind="stable")]
 
@@ -80,7 +79,7 @@ def transition(
 
 
 def _state_form(structure: LinearStructure) -> tuple[Floats, Floats]:
-    """Rates of (q, q') without the spring, shape (2n, 2n), and what a force in the spring adds, (2n,)."""
+    """Return the state matrix without the spring, shape (2n, 2n), and the vector of its force, (2n,)."""
     n = structure.size
     system = np.zeros((2 * n, 2 * n))
     system[:n, n:] = np.eye(n)
@@ -90,7 +89,7 @@ def _state_form(structure: LinearStructure) -> tuple[Floats, Floats]:
 
 
 def _fastest(structure: LinearStructure, spring: RestoringForce, motion: Motion, system: Floats) -> float:
-    """Fastest rate of the structure plus that of the spring at its stiffest [rad/s]."""
+    """Return the fastest rate of the structure plus that of the spring at its stiffest [rad/s]."""
     omega = 2.0 * math.pi * motion.frequency_hz
     samples = grid_size(int(motion.harmonics[-1]))
     p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
@@ -142,7 +141,7 @@ def _transitions(
     motion: Motion,
     marks: Floats,
 ) -> Floats:
-    """Transition over all steps between ``marks``: Magnus exponents of order four, all at once."""
+    """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus exponents."""
     widths = np.diff(marks)
     middles = 0.5 * (marks[1:] + marks[:-1])
     early = _rates(middles - GAUSS * widths, system, spring_in, structure, spring, motion)
@@ -152,7 +151,7 @@ def _transitions(
     exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
     steps = _exponentials(exponents)
     while len(steps) > 1:
-        # Pairwise: as many products, but whole arrays at a time.
+        # Multiply in pairs: the same number of products, but on whole arrays.
         pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
         steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
     return np.asarray(steps[0])

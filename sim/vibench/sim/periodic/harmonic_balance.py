@@ -1,9 +1,9 @@
 """Periodic motion by harmonic balance, with any number of harmonics, condensed to p. SI units.
 
-P_k + compliance_k F_k(P) = linear_k U for every harmonic kept (`vibench.sim.periodic`), the
-force by the alternating frequency-time scheme (`vibench.sim.periodic`), solved by damped
-Newton iteration with the exact Jacobian. Contact needs many harmonics (51 to 400); power laws need few. The
-effect of neglected harmonics determines the number, and shows whether the result has converged.
+The equations P_k + compliance_k F_k(P) = linear_k U, one for every harmonic kept, are solved by damped Newton
+iteration with the exact Jacobian. The alternating frequency-time scheme gives the force. Contact needs many
+harmonics (51 to 400); power laws need few. Their number is chosen by the effect of neglected harmonics,
+which also shows whether the result has converged.
 """
 
 import math
@@ -20,9 +20,9 @@ from .restoring_force import RestoringForce
 
 # A linear structure seen from its one nonlinear spring. SI units.
 #
-# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. In harmonic k of the frequency omega the
-# structure answers linearly, so that only the scalar p is unknown (Krack and Gross, Harmonic Balance for
-# Nonlinear Vibration Problems, Springer 2019, section 2.5):
+# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. At harmonic k of the frequency omega the
+# linear equations can be solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic
+# Balance for Nonlinear Vibration Problems, Springer 2019, section 2.5):
 #
 #     P_k = linear_k U - compliance_k F_k,   compliance_k = b.Z_k^-1 b,   Z_k = K - (k w)^2 M + i k w C
 
@@ -32,7 +32,7 @@ Harmonics = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LinearStructure:
-    """Masses, springs and dampers without the nonlinear spring, and where that and the drive act."""
+    """Masses, springs and dampers, with the directions in which nonlinear spring and drive act."""
 
     mass: Matrix
     """M, shape (n, n), regular [kg]."""
@@ -62,7 +62,7 @@ class LinearStructure:
 
 
 def structure_of(specimen: Specimen) -> LinearStructure:
-    """Take the stops away: displacements (x, y, z), p = y - z, driven at m0 through k0 and c0."""
+    """Return the linear structure without stops: q = (x, y, z), p = y - z, driven at m0 by k0 and c0."""
     return LinearStructure(
         mass=specimen.mass_matrix,
         damping=specimen.damping_matrix,
@@ -94,7 +94,7 @@ def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> 
     Parameters
     ----------
     structure
-        Its stiffness must be regular if harmonic 0 is requested.
+        Structure; its stiffness must be regular if harmonic 0 is requested.
     omega
         Angular frequency of the drive, positive [rad/s].
     harmonics
@@ -128,19 +128,19 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
 
 # Between harmonics and time: the alternating frequency-time scheme for one spring. SI units.
 #
-# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, theta = omega t in [0, 2 pi). The force is
-# evaluated on a grid in time and brought back by FFT, and so are its slopes: their Fourier coefficients
-# S_m and E_m make the exact Jacobian,
+# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, theta = omega t in [0, 2 pi). The force and
+# its slopes are evaluated on a grid in time and transformed by FFT. The Fourier coefficients S_m and E_m of
+# the slopes give the exact Jacobian,
 # dF_k = sum_l (S_{k-l} + i l w E_{k-l}) dP_l + (S_{k+l} - i l w E_{k+l}) dP_l*
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Grid points over the highest harmonic: what aliases back lies 15 times above it."""
+"""Grid points per period of the highest harmonic: only components 15 times above it alias."""
 FEWEST_SAMPLES = 1024
 
 
 class ForceHarmonics(NamedTuple):
-    """The spring's force, in harmonics, and how it answers a change of the motion's harmonics."""
+    """Harmonics of the spring's force, and their derivatives by the harmonics of the motion."""
 
     force: Complex
     """F_k of the harmonics kept, shape (m,) [N]."""
@@ -153,12 +153,12 @@ class ForceHarmonics(NamedTuple):
 
 
 def grid_size(highest: int) -> int:
-    """Count the samples of a period that resolve harmonics up to ``highest``: a power of two."""
+    """Return the samples per period, a power of two, that resolve harmonics up to ``highest``."""
     return max(FEWEST_SAMPLES, 1 << (SAMPLES_PER_HARMONIC * highest - 1).bit_length())
 
 
 def waveform(phasors: Complex, harmonics: Harmonics, samples: int) -> Floats:
-    """One period of Re sum P_k exp(i k theta) on an even grid, shape (samples,)."""
+    """Return one period of Re sum P_k exp(i k theta) on an even grid, shape (samples,)."""
     spectrum = np.zeros(samples // 2 + 1, dtype=np.complex128)
     spectrum[harmonics] = 0.5 * samples * phasors
     if harmonics[0] == 0:
@@ -167,7 +167,7 @@ def waveform(phasors: Complex, harmonics: Harmonics, samples: int) -> Floats:
 
 
 def phasors_of(wave: Floats) -> Complex:
-    """All harmonics of one period on an even grid, shape (samples/2 + 1,): the inverse of `waveform`."""
+    """Return all harmonics of a period on an even grid, shape (samples/2 + 1,): inverse of `waveform`."""
     spectrum = 2.0 / len(wave) * np.fft.rfft(wave)
     spectrum[0] *= 0.5
     return spectrum
@@ -215,7 +215,7 @@ def _force_harmonics(
 
 
 def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float) -> Complex:
-    """All force harmonics that the grid resolves, shape (samples/2 + 1,): to judge what was left out."""
+    """Return all force harmonics that the grid resolves, shape (samples/2 + 1,), to estimate the error."""
     samples = grid_size(int(harmonics[-1]))
     p, rate = motion_on_grid(phasors, harmonics, omega, samples)
     return phasors_of(spring.force(p, rate))
@@ -224,16 +224,16 @@ def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, o
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12
 ROUNDING = 1e-12
-"""Newton has converged when no equation is off by more than this part of the spring's length scale."""
+"""Newton's iteration has converged when all residuals are below this part of the spring's length scale."""
 
 
 class HarmonicSet(StrEnum):
     """Harmonics of a solution."""
 
     ODD = "odd"
-    """Motions that mirror themselves after half a period: all that a symmetric specimen begins with."""
+    """Motions that mirror themselves after half a period, as of a symmetric specimen at low levels."""
     ALL = "all"
-    """Any motion of the drive's period, a mean included."""
+    """Any motion of the drive's period, including a mean."""
 
 
 class BalanceEnd(StrEnum):
@@ -245,7 +245,7 @@ class BalanceEnd(StrEnum):
 
 
 def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
-    """Harmonic numbers, ascending."""
+    """Return the harmonic numbers, ascending."""
     if highest < 1:
         raise ValueError(f"Highest harmonic {highest} is not allowed: it must be 1 or more.")
     return np.arange(1, highest + 1, 2) if kept is HarmonicSet.ODD else np.arange(highest + 1)
@@ -261,15 +261,15 @@ class BalanceProblem:
 
     @property
     def size(self) -> int:
-        """Real unknowns."""
+        """Number of real unknowns."""
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
     def packed(self, phasors: Complex) -> Vector:
-        """Phasors [m] as unknowns."""
+        """Convert phasors [m] to unknowns."""
         return _real(phasors, self.harmonics) / self.spring.length
 
     def phasors(self, unknowns: Vector) -> Complex:
-        """Unknowns as phasors, shape (m,) [m]."""
+        """Convert unknowns to phasors, shape (m,) [m]."""
         scaled = unknowns * self.spring.length
         count = len(self.harmonics)
         imaginary = np.zeros(count)
@@ -279,7 +279,7 @@ class BalanceProblem:
     def linearised(
         self, unknowns: Vector, omega: float, amplitude_m: float
     ) -> tuple[Vector, Table, Vector, Vector]:
-        """Residual, its Jacobian, and its derivatives by omega and by the drive amplitude.
+        """Return the residual, its Jacobian, and its derivatives by omega and by the drive amplitude.
 
         Shapes (n,), (n, n), (n,), (n,). Not finite where the force overflows.
         """
@@ -313,7 +313,7 @@ class BalanceProblem:
 
 
 def _real(phasors: Complex, harmonics: Harmonics) -> Vector:
-    """Real parts, then imaginary parts; a mean has none."""
+    """Return real parts, then imaginary parts; a mean has no imaginary part."""
     return np.concatenate([phasors.real, phasors.imag[int(harmonics[0] == 0) :]])
 
 
@@ -355,7 +355,7 @@ class Balance:
 
 
 def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
-    """Largest magnitude of a waveform: the grid's, refined by the parabola through its neighbours."""
+    """Return the largest magnitude on the grid, refined by a parabola through the neighbouring points."""
     wave = np.abs(waveform(phasors, harmonics, samples))
     top = int(np.argmax(wave))
     before, here, after = wave[top - 1], wave[top], wave[(top + 1) % samples]
@@ -382,7 +382,7 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
             if trial_error < error:
                 break
         else:
-            # At rounding level no step helps any more: that is convergence, elsewhere it is not.
+            # No step reduces the error: converged if the error is at rounding level, else failed.
             return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
     return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
@@ -395,7 +395,7 @@ def size_of(values: Vector) -> float:
 
 
 def with_harmonics(phasors: Complex, known: Harmonics, wanted: Harmonics) -> Complex:
-    """Carry phasors over to another set of harmonics: what is not known is zero."""
+    """Return phasors for another set of harmonics; unknown ones are zero."""
     carried = np.zeros(max(int(known[-1]), int(wanted[-1])) + 1, dtype=np.complex128)
     carried[known] = phasors
     return carried[wanted]

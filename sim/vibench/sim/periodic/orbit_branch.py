@@ -25,7 +25,7 @@ from .continuation import ArcSteps
 from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, describe_orbit
 
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
-"""A residual below 1e-9 of the gap: what the flow at reference accuracy allows."""
+"""The tolerance is 1e-9 of the gap, the smallest that the flow at reference accuracy allows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +35,18 @@ class OrbitFamily:
     mapping: PeriodMap
     path: DrivePath
     reference: Harmonic
-    """Drive that scales states."""
+    """Drive from which the scales of states follow."""
     scale: float
-    """Hz, or m, per unit of length."""
+    """Parameter per unit of length [Hz, or m]."""
 
     @property
     def tolerance(self) -> float:
-        """Return None: the flow is exact."""
+        """No limit: the flow is exact."""
         return math.inf
 
     @property
     def scales(self) -> Vector:
-        """Measure of a state, shape (6,)."""
+        """Scales of a state, shape (6,)."""
         return state_scales(self.mapping.specimen, self.reference)
 
     def drive_at(self, point: Vector) -> Harmonic:
@@ -62,7 +62,7 @@ class OrbitFamily:
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state, own = self.drive_at(point), self.state_at(point), self.scales
-        # The map scales velocities by the drive at the point, this family by one drive throughout.
+        # The map scales velocities by the drive at the point, this family by its reference drive.
         ratio = state_scales(self.mapping.specimen, drive) / own
         gone = (self.mapping.image(state, drive) - state) / own
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
@@ -70,7 +70,7 @@ class OrbitFamily:
         return gone, np.column_stack([derivative - np.eye(6), along])
 
     def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
-        """D image / d parameter, over the scales of the drive [1/Hz or 1/m]."""
+        """Return d image / d parameter, over the scales of the drive [1/Hz or 1/m]."""
         by_frequency, by_amplitude = self.path.slopes(value)
         slope = np.zeros(6)
         if by_frequency != 0.0:
@@ -95,7 +95,7 @@ class OrbitFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
-        """None: there is no finer resolution."""
+        """Return None: there is no finer resolution."""
         return None
 
 
@@ -125,12 +125,12 @@ def periodic_branch_within(
 
     Returns the whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` are
     the reasons for its ends. A closed branch is followed once. Raises ValueError when the orbit did not
-    converge, or lies outside.
+    converge, or lies outside the range.
 
     Parameters
     ----------
     orbit
-        Its drive lies on the path, within the range.
+        Periodic motion whose drive lies on the path, within the range.
     path
         `FrequencyPath` or `AmplitudePath`.
     low, high

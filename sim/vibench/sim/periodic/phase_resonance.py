@@ -2,9 +2,9 @@
 
 At a phase resonance the fundamental of m0 lags the base by a given angle, usually a quarter of a period
 (Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u drives the motion relative to
-the base by m w^2 u, in phase with u; so the relative motion lags by a quarter of a period. Shooting with the
-phase as a seventh equation and the frequency as a seventh unknown finds it on any motion; pseudo-arclength
-continuation follows it over the level.
+the base by m w^2 u, in phase with u; so the relative motion lags by a quarter of a period. Shooting, with the
+phase as a seventh equation and the frequency as a seventh unknown, finds the phase resonance.
+Pseudo-arclength continuation follows it over the level.
 """
 
 import math
@@ -43,27 +43,27 @@ SCAN_POINTS = 400
 
 @dataclass(frozen=True, eq=False)
 class PhaseResonanceFamily:
-    """Motions that keep a phase; the last two components are the logarithms of frequency and amplitude."""
+    """Motions with a given phase; the last two components are the logarithms of frequency and amplitude."""
 
     mapping: PeriodMap
     reference: Harmonic
-    """The drive by which states, frequencies and amplitudes are measured."""
+    """Drive from which the scales of states, frequencies and amplitudes follow."""
     phase_rad: float
     of: PhaseReference
 
     @property
     def path(self) -> DrivePath:
-        """Along amplitude; the frequency follows."""
+        """Path along amplitude; the frequency follows from the phase."""
         return AmplitudePath(self.reference.frequency_hz)
 
     @property
     def tolerance(self) -> float:
-        """None: the flow is exact."""
+        """No limit: the flow is exact."""
         return math.inf
 
     @property
     def scales(self) -> Vector:
-        """Measure of a state, shape (6,)."""
+        """Scales of a state, shape (6,)."""
         return state_scales(self.mapping.specimen, self.reference)
 
     def amplitude_m(self, point: Vector) -> float:
@@ -108,7 +108,7 @@ class PhaseResonanceFamily:
         return family.report(np.append(point[:6] * self.scales / family.scales, 1.0))
 
     def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
-        """None: there is no finer resolution."""
+        """Return None: there is no finer resolution."""
         return None
 
 
@@ -123,22 +123,22 @@ def phase_resonance_branch(
     """Follow a mode's phase resonance from the motion without contacts over the level of the base.
 
     Returns the branch over amplitude, with the frequency and the multipliers of each motion; it may turn
-    back. Raises ValueError when there is no damping, no mode in the band has this phase, or several do, no
-    motion is found at the lower level, it already reaches the stops, or `of` is not a word of
-    `PhaseReference`.
+    back. Raises ValueError without damping, when the motion without contacts does not have this phase exactly
+    once in the band, when no motion is found at the lower level, or it reaches the stops there, or when `of`
+    is not a word of `PhaseReference`.
 
     Parameters
     ----------
     specimen
         Any contact law; two equal stops, or none.
     band_hz
-        Where the phase of the motion without contacts is met once: around one mode [Hz].
+        Band around one mode, where the motion without contacts has this phase once [Hz].
     levels_m
-        Drive amplitudes, ascending; the lower one so low that m1 keeps between its stops [m].
+        Drive amplitudes, ascending [m]; at the lower one, m1 must not reach its stops.
     of, phase_rad
-        The motion of m0, and its phase over the base, both as displacements.
+        Reference of the motion of m0, and its phase relative to the base, both as displacements.
     steps
-        Along the branch: half a unit is a quarter of a decade of level, or of frequency 5 %.
+        Step lengths along the branch: half a unit is a quarter of a decade of level, or 5 % of frequency.
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     if not any(specimen.dampings):
@@ -160,7 +160,7 @@ def phase_resonance_branch(
     guess = np.concatenate([state / family.scales, [0.0, 0.0]])
     start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
     if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
-        # Contacts that act at every p move it away from the linear motion.
+        # A power law acts at every p, so the motion may be far from the linear one.
         raise ValueError(
             f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
             "beginning with the linear one: give a lower level to begin with, or a wider band."
@@ -181,7 +181,7 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    # Falling: motion lags more as the frequency rises through a mode.
+    # Only falling values: the motion lags more as the frequency rises through a mode.
     found_hz = [
         float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)

@@ -28,7 +28,7 @@ class RestoringForce(Protocol):
 
     @property
     def is_odd(self) -> bool:
-        """F(-p, -v) = -F(p, v)."""
+        """Whether F(-p, -v) = -F(p, v)."""
         ...
 
     def force(self, p: Floats, rate: Floats) -> Floats:
@@ -46,10 +46,10 @@ class RestoringForce(Protocol):
 
 @dataclass(frozen=True)
 class PowerSpring:
-    """A sum of odd powers, F = sum F_i (p / length)^n_i: no coefficient that overflows."""
+    """A sum of odd powers, F = sum F_i (p / length)^n_i; this form has no overflowing coefficients."""
 
     length: float
-    """Where the terms have the forces given [m]."""
+    """Displacement at which the terms have the given forces [m]."""
     terms: tuple[tuple[int, float], ...]
     """(n_i, F_i [N]) with n_i odd."""
 
@@ -66,12 +66,12 @@ class PowerSpring:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """None: a power law is smooth."""
+        """No kinks: a power law is smooth."""
         return ()
 
     @property
     def is_odd(self) -> bool:
-        """Odd powers only."""
+        """True, because all powers are odd."""
         return True
 
     def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
@@ -99,7 +99,7 @@ class GapSpring:
     exponent: float
     """1 for a linear stop, 3/2 for Hertz."""
     upper: float
-    """The stop at positive p [m]."""
+    """Position of the stop at positive p [m]."""
     lower: float
     """The stop at negative p, as a positive distance [m]; infinite for none."""
     loss: float = 0.0
@@ -120,17 +120,17 @@ class GapSpring:
 
     @property
     def length(self) -> float:
-        """The nearer stop."""
+        """Gap of the nearer stop [m]."""
         return min(self.upper, self.lower)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """The stops that exist."""
+        """Positions of the stops [m]."""
         return tuple(stop for stop in (-self.lower, self.upper) if math.isfinite(stop))
 
     @property
     def is_odd(self) -> bool:
-        """Equal gaps."""
+        """Whether the gaps are equal."""
         return self.upper == self.lower
 
     def force(self, p: Floats, rate: Floats) -> Floats:
@@ -166,12 +166,12 @@ class NoForce:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """None."""
+        """No kinks."""
         return ()
 
     @property
     def is_odd(self) -> bool:
-        """Zero is odd."""
+        """True, because zero is an odd function."""
         return True
 
     def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere

@@ -1,4 +1,4 @@
-"""Periodic motions with impacts by shooting: a state that the exact flow brings back to itself. SI units.
+"""Periodic motions with impacts by shooting: states to which the exact flow returns. SI units.
 
 Newton's iteration on the period map finds stable and unstable motions alike, of any number of drive
 periods (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 6.4).
@@ -30,15 +30,15 @@ from .harmonic_balance import phasors_of, size_of
 
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
-# A mirrored motion comes back with all signs changed after half a drive period, so that it is a fixed point
-# of the half map: the flow over half a period, then the mirror. The derivative by the state is exact: it is
-# carried along with the motion, so that it holds up to a grazing contact (on a rigid stop it grows beyond
-# all bounds there, as the map's own does). Those by frequency and amplitude are fourth-order central
-# differences at reference accuracy, with steps far above its error (1e-10) and far below the gap: five to
-# seven digits, and only Newton's iteration uses them.
+# A mirrored motion returns with all signs changed after half a drive period. It is a fixed point of the half
+# map: the flow over half a period, then a change of sign. The derivative by the state is exact, because it is
+# propagated with the motion; towards a grazing contact on a rigid stop it tends to infinity. The derivatives
+# by frequency and amplitude are fourth-order central differences at reference accuracy. Their steps are far
+# above the error of the flow (1e-10) and far below the gap. They have five to seven digits, and only Newton's
+# iteration uses them.
 
 DIFFERENCE = 1e-5
-"""Step of a difference, over the parameter."""
+"""Step of a difference, relative to the parameter."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Fourth-order central difference."""
 
@@ -62,7 +62,7 @@ class PeriodMap:
     specimen: Specimen
     shape: OrbitShape = OrbitShape.REPEATED
     periods: int = 1
-    """Drive periods of the whole motion."""
+    """Period of the motion in drive periods."""
 
     def __post_init__(self) -> None:
         if self.periods < 1:
@@ -74,12 +74,12 @@ class PeriodMap:
 
     @property
     def turns(self) -> float:
-        """Drive periods that the map takes."""
+        """Duration of the map in drive periods."""
         return 0.5 * self.periods if self.shape is OrbitShape.MIRRORED else float(self.periods)
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Map of a motion of half the period, or of one that mirrors itself, which this one may become."""
+        """Map of a simpler motion (half the period, or mirrored), which this motion may become."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -101,7 +101,7 @@ class PeriodMap:
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
-        """D image / d state, both over their scales, shape (6, 6)."""
+        """Return d image / d state, both over their scales, shape (6, 6)."""
         if not self._may_start(state):
             return np.full((6, 6), math.nan)
         scales = state_scales(self.specimen, drive)
@@ -111,7 +111,7 @@ class PeriodMap:
         return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """D image / d ln frequency, over the scales, shape (6,)."""
+        """Return d image / d ln frequency, over the scales, shape (6,)."""
         scales = state_scales(self.specimen, drive)
         drives = [
             replace(drive, frequency_hz=drive.frequency_hz * (1.0 + offset * DIFFERENCE))
@@ -121,7 +121,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
 
     def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """D image / d ln amplitude, over the scales, shape (6,)."""
+        """Return d image / d ln amplitude, over the scales, shape (6,)."""
         scales = state_scales(self.specimen, drive)
         factors = [1.0 + offset * DIFFERENCE for offset in OFFSETS]
         drives = [replace(drive, amplitude_m=drive.amplitude_m * factor) for factor in factors]
@@ -129,7 +129,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
 
     def _may_start(self, state: Vector) -> bool:
-        """Return whether a start is not beyond a rigid stop, as in a diverging iteration."""
+        """Return whether a start is possible; a diverging iteration may go beyond a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -155,7 +155,7 @@ MOST_HALVINGS = 8
 RETURNED = 1e-9
 """Largest closure error of a periodic motion, over the state's scale."""
 FLOW_ERROR = 1e-10
-"""Error of a period at reference accuracy, over the state's scale; the measured one is a tenth
+"""Error of a period at reference accuracy, over the state's scale; the measured error is a tenth of it
 (docs/accuracy.md)."""
 SAMPLES = 4096
 """Samples of a drive period from which responses are taken."""
@@ -191,12 +191,12 @@ class PeriodicOrbit:
 
     @property
     def floquet_multipliers(self) -> Complex:
-        """Over the whole period of the motion, largest first, shape (6,)."""
+        """Multipliers over the whole period of the motion, largest first, shape (6,)."""
         return self.signs.over_period
 
     @property
     def is_stable(self) -> bool:
-        """No multiplier outside the unit circle."""
+        """Whether no multiplier lies outside the unit circle."""
         return bool(abs(self.floquet_multipliers[0]) < 1.0 + NEUTRAL)
 
     @property
@@ -224,7 +224,7 @@ def periodic_orbit(
     shape, periods
         How it repeats: see `OrbitShape`; ``periods`` is for a repeated one.
     start
-        x, y, z, vx, vy, vz at time zero, shape (6,); None takes where a run from rest is after 400 periods.
+        x, y, z, vx, vy, vz at time zero, shape (6,); None: the state after 400 periods from rest.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         raise ValueError(
@@ -263,9 +263,9 @@ def _damped_step(
 
 
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
-    """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
+    """Return stability and responses of a motion from ``state`` with closure error ``gone``, over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # where the run was lost before the end
+    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN if the run was lost before the end
     moved[: len(run.states)] = run.states[: len(moved)]
     waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
@@ -286,9 +286,9 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 
 
 def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
-    """Largest magnitudes, shape (n,), of periodic waves, shape (m, n): by the cubics between samples.
+    """Return largest magnitudes, shape (n,), of periodic waves, shape (m, n), by cubics between samples.
 
-    Two samples of a wave and of its rate define a cubic (Hermite); it turns where its slope is zero.
+    Two samples of a wave and of its rate define a cubic (Hermite); its extremes are where its slope is zero.
     """
     found = np.abs(waves).max(axis=0)
     ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
@@ -299,7 +299,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
         cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
-            # The form without cancellation; of the two turns the one within the step.
+            # Both extremes, in a form without cancellation; only one within the step counts.
             places = np.stack([-first / (square + root), -first / (square - root)])
         inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
         tops = start + inside * (first + inside * (square + inside * cubic))
@@ -308,7 +308,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
 
 
 def _missing(derivative: Table, gone: Vector) -> float:
-    """Return the error bound: errors of flow and closure, through the inverse of the map."""
+    """Return the error bound: errors of flow and closure times the norm of (map - identity)^-1."""
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
@@ -336,7 +336,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the distance of the nearest contact from its start or end, over the gap or gap times 2 pi f."""
+    """Return the smallest distance from grazing, over the gap or the gap times 2 pi f."""
     match specimen.contact:
         case NoContact() | PowerLaw():
             return math.inf
@@ -364,7 +364,7 @@ class PhaseReference(StrEnum):
     """Absolute: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Return the motion whose phase counts, over that of the base, from m0's displacement over it."""
+        """Return the motion whose phase is used, over the base's motion, from m0's transmissibility."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 

@@ -96,10 +96,10 @@ class CostLedger:
         self._saved_s = time.monotonic()
         self._is_new = False
         self._lately = deque[float](maxlen=MEMORY)
-        """Recent deviation of all kinds, because a slower machine affects all."""
+        """Recent deviations of all kinds of run: a slower machine affects all kinds."""
 
     def expected(self, kind: str, planned_s: float) -> Expected:
-        """Return the expected time of planned work of a kind; a new kind uses the longest known prefix."""
+        """Return the expected time of planned work; a new kind uses the data of a prefix of its name."""
         with self._lock:
             known, drift = self._known(kind), self._drift
         factor = UNKNOWN_FACTOR
@@ -183,7 +183,7 @@ def cost_ledger() -> CostLedger:
         physics_digest(),
     )
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
-    with contextlib.suppress(OSError):  # then nothing is saved
+    with contextlib.suppress(OSError):  # without this folder nothing is saved
         state_folder()
     ledger = CostLedger(state_place() / "costs" / f"{name}.json")
     atexit.register(ledger.save)
@@ -213,7 +213,7 @@ def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> No
 def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     """Return the expected time of a solver for a scene, from recent runs [s].
 
-    Raises ValueError when the specimen cannot be followed in time.
+    Raises ValueError when the specimen cannot be simulated.
     """
     plan = plan_scene(scene)
     return _expected_cost(plan, solver, plan.planned_s).time_s
@@ -222,7 +222,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
 def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     """Return the expected time of a solver for a scene whose motion never repeats, from recent runs [s].
 
-    Raises ValueError when the specimen cannot be followed in time.
+    Raises ValueError when the specimen cannot be simulated.
     """
     plan = plan_scene(scene)
     return _expected_cost(plan, solver, plan.longest_planned_s).time_s

@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
-Both have three steps, so that many scenes can be batched: `way` is followed first; `watch` classifies and
-returns any further motion to follow; `seen` observes the end. Between the steps, `StatesAlone.follow` follows
-one motion, and `in_batches` the motions of many scenes. SI units.
+Both have three steps, so that many scenes can be batched: `way` is the motion to follow first; `watch`
+classifies it and returns any motion to follow further; `seen` observes the end. Between the steps,
+`StatesAlone.follow` follows one motion, and `in_batches` follows the motions of many scenes. SI units.
 """
 
 import math
@@ -42,19 +42,19 @@ class SceneRun:
     blocks: tuple[Block, ...]
     """Blocks of the watched motion; the last ones form the window."""
     was_settled: bool
-    """The motion repeated before the window began."""
+    """Whether the motion repeated before the window began."""
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
-    """When it was found to be settled; None if not checked or not found."""
+    """Time at which the motion was found to be settled; None if not checked or not found."""
     ended: str
-    """Reason for its end."""
+    """Reason for the end of the run."""
     path: tuple[Stretch, ...]
     """Stretch from the start until the motion settled or was certainly chaotic."""
     grew: bool
-    """A propagated small change has grown enough to prove chaos."""
+    """Whether a propagated small change has grown enough to prove chaos."""
     wandered_until_s: float
-    """Last time at which it changed from period to period."""
+    """Last time at which the motion changed from period to period."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
     """Relative change of the responses if the lines used the whole window, shape (4,); zero unless the motion
     was only found to repeat in the window."""
@@ -63,9 +63,9 @@ class SceneRun:
 class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
-    It is checked once per drive period. If it does not repeat after the transient should have decayed, a
-    small change is propagated and extremes are kept by block: only growth and statistics describe a motion
-    that never repeats.
+    The motion is checked once per drive period. If it does not repeat when the transient should have decayed,
+    a small change is propagated and extremes are kept by block, because only growth and statistics describe
+    a motion that never repeats.
     """
 
     def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
@@ -81,7 +81,7 @@ class FixedCourse:
         """Return None: nothing more is followed."""
 
     def seen(self) -> SceneRun:
-        """Observe its end."""
+        """Observe the end of the motion and classify it."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
         last = follow_with_section(run, duration.duration_s - duration.window_s)
@@ -115,9 +115,9 @@ def classify(
 ) -> SceneRun:
     """Return the kind of a motion from its window and the stretches before it.
 
-    Watched stretches before it are blocks as long as those of the window. A motion that comes back is
-    periodic only if Newton's iteration finds a stable motion there: chaos passes by unstable ones, and
-    slowly by where two motions have just vanished in a fold.
+    Watched stretches before the window are blocks as long as those of the window. A motion that repeats is
+    periodic only if Newton's iteration finds a stable motion nearby. Chaos also comes close to unstable
+    periodic motions, and stays long near those that have just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -200,12 +200,12 @@ class SettlingCourse:
     """Run of a motion until it repeats or certainly never will; then it is observed.
 
     A repeating motion is observed over one of its periods, any other over a window. Because chaos can die
-    out, its states alone are followed further, as far as a budget allows.
+    out, it is followed further by its states alone, as far as a budget allows.
 
     Parameters
     ----------
     run, pace
-        The motion, and what decides how long is long.
+        The motion, and its time scales and tolerances.
     window_s
         Observed time of a motion that does not repeat; rounded to equal parts of whole drive periods.
     longest_s
@@ -213,7 +213,7 @@ class SettlingCourse:
     alone_s
         Nominal cost for following chaos further by its states alone; zero disables this.
     by_itself_s
-        Time before which it is not followed in a batch; see `StatesAlone`.
+        Time before which the motion is not followed in a batch; see `StatesAlone`.
     """
 
     def __init__(
@@ -242,7 +242,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Follow it until it repeats or certainly never will; return the motion to follow further, if any."""
+        """Follow the motion until it repeats or never will; return the motion to follow further, if any."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -278,7 +278,7 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Return it for following until its end or a budget; the last ``watched`` stretches were observed."""
+        """Return the motion to follow further in a budget; the last ``watched`` stretches were observed."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
@@ -286,7 +286,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Return the findings; if the motion was followed further, after a last window."""
+        """Return the findings; observe a last window first if the motion was followed further."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None

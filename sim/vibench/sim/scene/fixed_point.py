@@ -10,7 +10,7 @@ from .followed_run import FollowedRun
 TOLERANCE = 1e-10
 """Tolerance of the map: far below the distance at which a motion counts as settled."""
 RETURNED = 1e-10
-"""A motion is periodic when it comes back this close, over its size."""
+"""A motion is periodic when it returns this close, relative to its size."""
 ITERATIONS = 8
 
 
@@ -19,11 +19,11 @@ class FixedPoint:
     """A stable periodic motion."""
 
     run: FollowedRun
-    """A run on it."""
+    """Run on this motion."""
     away: Floats
     """Inverse of the identity minus the scaled derivative of the map, shape (6, 6)."""
     distance: float
-    """Distance of the given run from it, over the size of the motion."""
+    """Distance of the given run from this motion, over the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:

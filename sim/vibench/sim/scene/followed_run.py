@@ -29,15 +29,15 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 
-# Nominal cost of following a motion on the machine of docs/accuracy.md, the measure of budgets. SI units.
-# It is not measured at run time, so that a scene with a budget has the same result everywhere.
+# Nominal cost of following a motion on the machine of docs/accuracy.md; the unit of budgets. SI units. It is
+# not measured at run time, so that a scene with a budget has the same result everywhere.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
 """Cost of one second of motion between contacts, and under a force at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 """Cost of an impact: in closed form, by Gauss points, and step by step [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""The same with a propagated small change; a collision is then resolved step by step."""
+"""Factors of the cost of contacts if a small change is propagated, because collisions then need steps."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 """Tolerance below which contacts cost more, and the factor."""
 STEP = 1e-9
@@ -108,7 +108,7 @@ class Stretch:
 class FollowedRun:
     """A running motion of a specimen, advanced in place.
 
-    Raises ValueError when the specimen cannot be followed in time, or not from this start.
+    Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class FollowedRun:
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
         self.cost_s = 0.0
-        """Nominal cost since its start; see `nominal_cost_s`."""
+        """Nominal cost since the start; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
 
     @property
@@ -132,7 +132,7 @@ class FollowedRun:
 
     @property
     def time_s(self) -> float:
-        """Now."""
+        """Current time of the motion [s]."""
         return self._run.time_s
 
     @property
@@ -152,7 +152,7 @@ class FollowedRun:
 
     @property
     def periods(self) -> int | None:
-        """Return the whole drive periods so far; None between two."""
+        """Return the number of whole drive periods so far; None within a period."""
         whole = round(self.time_s * self.drive.frequency_hz)
         return whole if whole / self.drive.frequency_hz == self.time_s else None
 
@@ -255,15 +255,15 @@ class FollowedRun:
         return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
 
     def _size(self) -> float:
-        """Return the natural logarithm of the small change; NaN without one.
+        """Return the natural logarithm of the size of the small change; NaN without one.
 
-        Its size is its energy without stops, which only a stop can increase: the exchange of displacement and
-        velocity in a fast mode does not count as growth.
+        The size is the root of its energy without stops, which only a stop can increase: the exchange of
+        displacement and velocity in a fast mode does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan
         change = self._run.changes[0]
-        # Strong damping may shrink it below the smallest float.
+        # Strong damping may shrink the energy below the smallest float.
         energy = max(change @ self._metric @ change, sys.float_info.min)
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
@@ -271,7 +271,7 @@ class FollowedRun:
 def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
     """Follow motions of one specimen in a batch, each for whole drive periods, by their states alone.
 
-    The result is None for a motion that was lost; it stays where it was.
+    The result is None for a lost motion, which stays at its previous state.
     """
     starts_s = [run.time_s for run in runs]
     found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
@@ -284,8 +284,8 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
 BLOCKS = 10
 """Number of parts of a window, from which its scatter is estimated."""
 FIRST, LAST = 2, 3
-"""Parts at both ends of a window in which growth proves lasting chaos: half of them are late, with or without
-a stretch before the window."""
+"""Number of first and last parts of a window whose growth proves lasting chaos: half of them are late, with
+or without a stretch before the window."""
 
 
 @dataclass(frozen=True)
@@ -309,10 +309,10 @@ class ObservedWindow:
     stretches: tuple[Stretch, ...]
     """Followed parts."""
     blocks: tuple[Block, ...]
-    """Blocks, equal to within a drive period."""
+    """Blocks, equally long to within a drive period."""
     line_periods: int
-    """Whole drive periods before the end over which lines are taken: as many as the window contains, a
-    multiple of the motion's own period."""
+    """Number of whole drive periods before the end over which lines are taken: the largest multiple of the
+    motion's period in the window."""
     line_x_m: complex
     """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
     line_p_m: complex
@@ -368,9 +368,9 @@ def observe_window(
 ) -> ObservedWindow:
     """Observe a motion through a window that begins now and contains at least one drive period.
 
-    Lines of a motion that repeats after ``cycle`` drive periods are taken over a whole multiple of them, if
-    the window contains one: over other lengths, its other lines leak in. If ``is_chaos`` of the first parts,
-    a small change is only propagated at both ends of the window.
+    Lines of a motion that repeats after ``cycle`` drive periods are taken over a multiple of ``cycle``, if
+    the window contains one: over other lengths, other lines leak in. If ``is_chaos`` is True for the first
+    parts, a small change is only propagated at both ends of the window.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -444,7 +444,7 @@ class LineSpectrum:
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:
     """Follow a window again with samples, and return the spectrum of its whole periods.
 
-    Sampling changes nothing: it is the same motion to the last digit, even in chaos.
+    Sampling does not change the motion: it is the same to the last digit, even in chaos.
     """
     run, periods = window.begins.apart(), window.line_periods
     frequency = run.drive.frequency_hz

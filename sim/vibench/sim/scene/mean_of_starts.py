@@ -1,4 +1,4 @@
-"""The mean over starts that nobody can distinguish: its error, and what would reduce it. SI units."""
+"""Mean over indistinguishable starts: its error, and how to reduce the error. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -32,9 +32,9 @@ class Start:
     repeats: Repetition | None
     """Period if the motion is nearly periodic: all its windows are alike."""
     impacts: int
-    """Impacts in the first window, as the next."""
+    """Impacts in the first window."""
     section: Floats
-    """States once a drive period, shape (n, 6)."""
+    """States once a drive period in the first window, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
         """Return the mean of the responses over the first windows, shape (4,)."""
@@ -46,8 +46,8 @@ def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
 
     Student's interval for 19 cases of 20, with the smallest and the largest value counted twice (Agresti and
     Coull, Am. Stat. 52 (1998) 119), so that a rare motion counts once a start reaches it. If most starts
-    reached one repeating motion and ``others`` did not, their share may be up to the upper end of Wilson's
-    interval: the larger of the two errors counts, since both are intervals of that share.
+    reached one repeating motion and ``others`` did not, the share of the others may reach the upper end of
+    Wilson's interval. The larger of the two errors is used, since both are intervals of that share.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
@@ -69,12 +69,12 @@ def error_of(starts: Sequence[Start]) -> Floats:
 
 
 def windows_of(starts: Sequence[Start]) -> int:
-    """Return the number of windows that all starts have; those of a periodic motion are alike."""
+    """Return the number of windows that all starts have; periodic motions need only one."""
     return min((len(each.windows) for each in starts if each.repeats is None), default=1)
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return the starts that did not reach the most common motion; None if that does not repeat."""
+    """Return how many starts did not reach the most common motion; None if that does not repeat."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None
@@ -112,6 +112,6 @@ def windows_help(starts: Sequence[Start], lead: float) -> bool:
 
 
 def more_needed(starts: Sequence[Start], error: float) -> float:
-    """Return the factor of additional motion for the requested error."""
+    """Return the factor by which more motion must be followed for the requested error."""
     power = 2.0 if others_of(starts) is None else 1.0
     return 1.05 * math.pow(float(error_of(starts).max()) / error, power)

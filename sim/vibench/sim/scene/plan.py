@@ -1,4 +1,4 @@
-"""Plan of a scene before it is run, with only what it requires. SI units."""
+"""Plan of a scene before it is run: method, reasons and cost. SI units."""
 
 import math
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observ
 if TYPE_CHECKING:
     from .cost import Expected
 
-# Without contact every displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0: at most
-# abs(S) + sum abs(m_j) for ever. A bound on p below the gap proves that no stop is ever touched.
+# Without contact every displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0, at most
+# abs(S) + sum abs(m_j). A bound on p below the gap proves that no stop is ever touched.
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +124,12 @@ DECAYED_SHARE = 1e-9
 """Largest transient, relative to the steady motion, that a closed form neglects."""
 
 CLOSED_FORM_S = 5e-4
-"""Planned time for a closed form [s], as the next three. The actual times of a machine are learnt from runs
+"""Planned time for a closed form [s]. The actual times of a machine are learnt from runs
 (`vibench.sim.scene.cost`)."""
 FLIGHT_S, PERIOD_S, IMPACT_S = 5e-5, 1e-7, 1e-6
-"""Time for a second of flight, for a drive period of it, and for an impact [s]."""
+"""Planned time for a second of flight, for a drive period of flight, and for an impact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
-"""Time for a second under a force at every p, and for a drive period of it [s]."""
+"""Planned time for a second, and for a drive period, under a force that acts at every p [s]."""
 TANGENT = 1.5
 """Time with a tangent vector over the time without."""
 SETTLING_S = 10.0
@@ -155,7 +155,7 @@ class ScenePlan:
     planned_s: float
     """Estimated work [s] on a nominal reference machine."""
     longest_planned_s: float
-    """The same if the motion never repeats and is followed to the end of an automatic duration."""
+    """Estimated work if the motion never repeats and is followed to the end of an automatic duration."""
     kind: str
     """Kind for learning run times, with all its prefixes."""
     largest_p_m: float
@@ -175,7 +175,7 @@ class ScenePlan:
 
     @property
     def cost_s(self) -> float:
-        """The same without uncertainty [s]."""
+        """Expected time without its uncertainty [s]."""
         return self.cost.time_s
 
     def explain(self) -> str:
@@ -186,13 +186,13 @@ class ScenePlan:
 def plan_scene(scene: Scene) -> ScenePlan:
     """Plan a scene without running it.
 
-    Raises ValueError when the specimen cannot be followed in time.
+    Raises ValueError when the specimen cannot be simulated.
     """
     return plan_of(scene, linear_motion(scene.specimen, scene.drive, scene.start.state))
 
 
 def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
-    """Plan a scene whose motion, as long as nothing is touched, is ``motion``."""
+    """Plan a scene whose motion is ``motion`` as long as no stop is touched."""
     method = _method(scene.specimen, motion, scene.duration)
     if method is Method.CLOSED_FORM:
         why = _reason_of_closed_form(scene.specimen, motion)

@@ -23,7 +23,7 @@ class MotionKind(StrEnum):
     """Kind of a motion, from its states once per drive period."""
 
     PERIODIC = "periodic"
-    """It repeats after `Prediction.period` drive periods."""
+    """It repeats after `ScenePrediction.period` drive periods."""
     QUASI_PERIODIC = "quasi-periodic"
     """It neither repeats nor depends sensitively on its start."""
     CHAOTIC = "chaotic"
@@ -59,8 +59,8 @@ class FoundMotion:
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude, of the first repeating start, else the mean over starts; so
-    are the next three."""
+    """Largest abs(x) over the drive amplitude, of the first repeating start, else the mean over starts;
+    likewise the next three."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
@@ -110,7 +110,7 @@ class TargetReport:
     windows: int
     """Number of consecutive windows of each start in the average."""
     is_met: bool
-    """The error is at most the requested one."""
+    """Whether the error is at most the requested one."""
     needed_s: tuple[float, float, float] | None
     """Time for the requested error: estimate and both ends of its interval. None if unknown, or if more time
     does not reduce the error."""
@@ -140,7 +140,7 @@ def _seconds(time_s: float) -> str:
 
 
 def _short(value: float) -> str:
-    """Return two digits, without an exponent if the number is no longer without."""
+    """Return a number with two significant digits."""
     return f"{float(f'{value:.2g}'):g}"
 
 
@@ -175,7 +175,7 @@ class ScenePrediction:
     impacts: int
     """Contacts that began within the window."""
     impact_rate_hz: float
-    """The same, per second."""
+    """Impacts per second within the window."""
     motion: MotionKind
     period: int | None = None
     """Period of a periodic motion, in drive periods."""
@@ -186,7 +186,7 @@ class ScenePrediction:
     settled_s: float | None = None
     """Time when the motion was found to be settled; None if the duration was given."""
     ended: str
-    """Reason for its end."""
+    """Reason for the end of the run."""
     integration_error: float | None = None
     """Part of the error that a stricter accuracy would reduce."""
     scatter: float | None = None
@@ -194,7 +194,7 @@ class ScenePrediction:
     lyapunov_per_s: float | None = None
     """Largest Lyapunov exponent [1/s]."""
     lyapunov_error_per_s: float | None = None
-    """Its standard error [1/s]."""
+    """Standard error of the exponent [1/s]."""
     start: str
     """Name of the initial state: "rest", or the scene's name."""
     final_state: State
@@ -202,7 +202,7 @@ class ScenePrediction:
     method: Method
     accuracy: str
     response_i_error: float | None = None
-    """Relative error, as the next three; see `vibench.sim.scene.solve.solve_scene`."""
+    """Relative error; see `vibench.sim.scene.solve.solve_scene`, also for the next three."""
     response_ii_error: float | None = None
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
@@ -213,7 +213,7 @@ class ScenePrediction:
     spectrum_hz: Floats | None = None
     """Frequencies of the lines, if a spectrum was requested, shape (lines,)."""
     spectrum: Floats | None = None
-    """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
+    """Amplitude of x at each frequency over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
     """Whether the start determined which motion was reached."""
     ensemble: Ensemble | None = None

@@ -62,10 +62,10 @@ KNOWN = 0.03
 MOST_PUSH = 1000.0
 """Largest gap, in drive amplitudes, for drawing other starts."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
-"""Drive periods before the first check of the motion; then each time its time has doubled, up to this
-interval; then after this share of its time."""
+"""The motion is checked after LOOK_PERIODS drive periods, then whenever its time has doubled, at most LOOK_S
+apart, and later after each LOOK_SHARE of its time."""
 LOOKS = 8
-"""The same for another start before its window begins."""
+"""Number of checks of another start before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
 """Relative tolerance of states for a motion that repeats."""
@@ -97,7 +97,7 @@ class _Orbit:
 
     period: int
     run: FollowedRun
-    """On it."""
+    """Run on this motion."""
     section: Floats
     """States once a drive period, shape (period, 6)."""
     responses_m: Floats
@@ -124,7 +124,7 @@ class _Path:
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     """Yield results of a scene with a target, each better than the previous one.
 
-    Raises ValueError when the scene has no target, the specimen cannot be followed in time, or not even one
+    Raises ValueError when the scene has no target, the specimen cannot be simulated, or not even one
     drive period could be followed in the requested time.
 
     """
@@ -147,7 +147,7 @@ def refined(scene: Scene) -> ScenePrediction:
 
 
 class _Refinement:
-    """A scene whose motion is followed in time."""
+    """A scene whose motion is integrated in time."""
 
     def __init__(self, scene: Scene, motion: LinearMotion, clock: _Clock) -> None:
         assert scene.target is not None
@@ -249,7 +249,7 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The nominal cost, equal on every machine, sets the parts unless it is far too low.
+            # The nominal cost, equal on every machine, sets the length of parts unless it is far too low.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
@@ -306,7 +306,7 @@ class _Refinement:
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Find a stable motion of this many drive periods, or a divisor, near the present state."""
+        """Find a stable motion of this many drive periods, or a divisor of them, near the present state."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
@@ -325,7 +325,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # Effect of rounding the state at the end of a period, through the inverse of the map.
+        # Effect of rounding the state at the end of a period, amplified by the inverse of the map.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -369,7 +369,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """Return the relative remaining distance of the motion, from its change in a forgetting time."""
+        """Estimate the relative distance from the final motion, by the change in one forgetting time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -399,7 +399,7 @@ class _Refinement:
         return _reported(found, self._target, self._clock, 1, None)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
-        """Return the result in a stated window for a motion that does not repeat but depends on its start."""
+        """Return the result in a stated window for a non-repeating motion that its start determines."""
         main, twin, periods = self._main, self._twin, self._window_periods
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:

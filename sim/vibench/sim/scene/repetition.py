@@ -23,7 +23,7 @@ MOST_PERIODS = 32
 FEWEST_BETWEEN = 8
 """Fewest drive periods between compared states."""
 SLOWEST_RATIO = 0.99
-"""Smallest assumed shrinkage of a change between two comparisons."""
+"""Largest assumed ratio of a change to the previous one, for the slowest settling."""
 NEARLY = 0.01
 """Largest relative change of a settling motion from one of its periods to the next."""
 TINY = 1e-300
@@ -32,9 +32,9 @@ DISTINCT = 20.0
 """Difference, in tolerances, between a motion of several periods and one of fewer; with a smaller difference
 it may still be settling."""
 CERTAIN_GROWTH = 12.0
-"""Growth of a small change by e^12 = 160 000: more than shear causes."""
+"""Growth of a small change by e^12 = 160 000: more than shear of regular motions causes."""
 NEUTRAL = 0.1
-"""Growth per forgetting time that counts as none; the specimen's damping alone gives -1."""
+"""Growth per forgetting time that counts as zero; the specimen's damping alone gives -1."""
 DRIFT_PARTS = 6
 """Number of consecutive parts over which the changes of a drift grow or shrink: by chance in 2 cases of
 720."""
@@ -48,7 +48,7 @@ class Repetition:
 
     period: int
     distance: float
-    """Remaining distance relative to its size."""
+    """Remaining distance relative to the size of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,8 @@ def repetition(
 ) -> Repetition | None:
     """Find the fewest drive periods after which the end of a section repeats; None if it does not.
 
-    States one forgetting time apart are compared twice: a small change per period may be a slow drift that
-    goes far. The shrinkage of the change gives the remaining distance.
+    States one forgetting time apart are compared twice, because a small change per period may belong to a
+    slow drift over a long way. The ratio of the two changes gives the remaining distance.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def repetition(
     omega
         Angular frequency of the drive [rad/s], which scales velocities to displacements.
     forgetting_periods
-        Drive periods in which the slowest mode without contact fades by e.
+        Drive periods in which the slowest mode without contact decays by a factor of e.
     sharpness
         Tolerances.
     """
@@ -211,8 +211,8 @@ EXACTLY = 1e-9
 """Distance at which the rest of a settling motion is skipped: smaller than the error of any accuracy
 level."""
 STEPPING = 100.0
-"""Noise over the tolerance for integration in steps, which fall differently in each period. Measured: at most
-70 (p^7 at 130 Hz and 20 um)."""
+"""Noise over the tolerance for integration in steps, which differ from period to period. Measured: at most 70
+(p^7 at 130 Hz and 20 um)."""
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ class Pace:
     forgetting_s: float
     """Time in which the slowest mode without contact decays by e, at most the longest waiting time."""
     fading_s: float
-    """The same without that limit; for undamped modes, the limit."""
+    """Time of this decay without the limit; for undamped modes, the limit."""
     sharpness: Sharpness
     nearly: Sharpness
     """Sharpness of the least accurate level."""
@@ -259,13 +259,13 @@ class Pace:
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Return the drive periods over which lines are taken: the motion's own, if it has nearly settled.
 
-        The limit for nearly is equal at every accuracy level, so that lines are comparable.
+        The limit for "nearly" is equal at every accuracy level, so that lines are comparable.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether a small change grew in each half of these stretches as only in chaos."""
+        """Return whether a small change grew enough in each half of these stretches to prove chaos."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC

@@ -17,7 +17,7 @@ from .followed_run import Block
 from .shares import student_quantile
 
 COVERED = 0.975
-"""Share of one tail and the middle: 19 cases of 20 with both tails."""
+"""Probability below the upper end of a symmetric interval for 19 cases of 20."""
 FEWEST_BLOCKS = 4
 """Fewest extremes for an estimate."""
 
@@ -43,9 +43,9 @@ class WindowScatter:
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
     """Find the scatter of the largest of ``blocks_in_window`` blocks; None for too few blocks.
 
-    It is the geometric mean of two deviations. That of the blocks is too large, because extremes of longer
-    windows deviate less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001), section
-    3.1). That of the bootstrap is too small, because it never exceeds the largest observed value.
+    The scatter is the geometric mean of two deviations. The deviation of the blocks is too large, because
+    extremes of longer windows deviate less (Coles, An Introduction to Statistical Modeling of Extreme Values
+    (2001), section 3.1). The bootstrap's is too small, because it never exceeds the largest observed value.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:
@@ -68,7 +68,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
     """Return the relative difference of the responses of two windows in 19 cases of 20, shape (4,).
 
-    ``blocks`` are those before one window and, last, its own. None for too few.
+    ``blocks`` are the blocks before a window, then those of the window. None for too few.
     """
     lines = blocks[-blocks_in_window:]
     along = [window_scatter([block.peak_x_m for block in blocks], blocks_in_window)]
@@ -88,8 +88,8 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 def _lines_apart(parts: Complex) -> float:
     """Return the relative difference of the amplitudes of two lines in 19 cases of 20.
 
-    A line is the mean of its parts. Consecutive parts may be correlated: the error of the mean is the larger
-    one of all parts and of means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A deviation
+    A line is the mean of its parts. Consecutive parts may be correlated: use the larger of the errors from
+    all parts and from means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A deviation
     perpendicular to the mean changes the amplitude only by its square over twice the amplitude.
     """
     line = complex(parts.mean())

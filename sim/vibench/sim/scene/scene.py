@@ -20,7 +20,7 @@ BUDGET_S = 1.0
 """Default budget of a scene in addition to its own run."""
 CLEAR, FEWEST, MOST = 8, 16, 64
 """Number of starts, including the requested one: the first value if all settle on one motion or chaos
-certainly lasts; the last if they reach several motions and the budget allows."""
+certainly lasts; the last if they reach several motions and the budget allows; else the second."""
 
 
 class Observable(StrEnum):
@@ -71,7 +71,7 @@ class FixedDuration:
 
 @dataclass(frozen=True)
 class AutomaticDuration:
-    """Follow the motion until it has settled, then observe a period of it, or a window if it has none."""
+    """Follow the motion until it has settled, then observe one period, or a window if it never repeats."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -120,12 +120,12 @@ class Rest:
 
     @property
     def state(self) -> State:
-        """Zeros."""
+        """State at rest: zeros."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def name(self) -> str:
-        """How results call it."""
+        """Name of the start in results."""
         return "rest"
 
 
@@ -138,7 +138,7 @@ class Given:
     state: State
     """x, y, z, vx, vy, vz, absolute [m, m/s]."""
     name: str = "given"
-    """How results call it."""
+    """Name of the start in results."""
     kind: Literal["given"] = "given"
 
     def __post_init__(self) -> None:

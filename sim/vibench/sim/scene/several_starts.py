@@ -50,15 +50,15 @@ class ReachedMotion:
     """Motion reached from one start."""
 
     run: FollowedRun
-    """At its end."""
+    """Run at its end."""
     motion: MotionKind
     period: int | None
     responses_m: Floats
     """Largest x, line of x, largest p, line of p, shape (4,)."""
     scatter: WindowScatter | None
-    """Scatter of the largest x, where nothing repeats."""
+    """Scatter of the largest x, if the motion does not repeat."""
     wandered_until_s: float
-    """Last time at which it changed from period to period."""
+    """Last time at which the motion changed from period to period."""
     growth: Growth
     """Growth of a propagated small change; over no time if the motion repeats."""
 
@@ -77,9 +77,9 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     Parameters
     ----------
     begin
-        The motion where it began.
+        The motion at its start.
     path
-        Stretch from there until it had settled.
+        Stretches from its start until it had settled.
     """
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
@@ -95,7 +95,7 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Return for each state, shape (n, 6), whether m1 is at a stop (batches return the next flight there)."""
+    """Return for each state, shape (n, 6), whether m1 is at a stop, where batches extrapolate states."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -108,17 +108,17 @@ class Draw:
     clear: int = CLEAR
     """Number of starts, including the requested one, in clear cases."""
     fewest: int = FEWEST
-    """Number in other cases."""
+    """Number of starts in other cases."""
     most: int = MOST
-    """Number if those reached more than one motion."""
+    """Number of starts if they reached more than one motion."""
     seed: int = SEED
     budget_s: float = math.inf
-    """Nominal cost of all of them."""
+    """Limit of the nominal cost of all starts."""
 
 
 NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
-"""Total excess time of all starts that are followed further."""
+"""Margin that is added to the remaining total time of all starts [s]."""
 
 
 class SeveralStarts:
@@ -241,7 +241,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # Including the unused budget of other starts.
+                continue  # Use the remaining budget of other starts.
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
@@ -318,7 +318,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     Motions are compared by period and all four responses; by responses alone if one start arrived too late to
     be classified. For motions that do not repeat, only the largest value is compared, within the scatter of
     windows: two chaotic motions that differ by less count as one. Some starts on weak chaos appear undecided
-    or quasi-periodic, but scatter equally: of two kinds, the smaller scatter counts.
+    or quasi-periodic, but scatter equally: for two kinds, the smaller scatter is used.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
@@ -393,8 +393,8 @@ def ensemble_of(
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
     """Count the starts of each motion, and mark those that may still change to another.
 
-    Lasting chaos may: one chaotic motion can become another as suddenly as a periodic one, and only periodic
-    motions count as an escape.
+    Even lasting chaos may change if there are several chaotic motions: one can suddenly become another, and
+    the escape rate only counts changes to periodic motions.
     """
     is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
     return [
@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return chaotic only if no chaos died out and it certainly lasts."""
+    """Return the kind of a motion; chaotic only if no chaos died out and it certainly lasts."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
@@ -421,7 +421,7 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the relative difference of another draw from the mean of these in 19 cases of 20."""
+    """Return the relative difference of one more draw from the mean of a group in 19 cases of 20."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
@@ -447,11 +447,11 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
     Parameters
     ----------
     scene
-        What was asked.
+        Requested scene.
     begin
-        The motion where it began.
+        The motion at its start.
     seen
-        Its end and findings.
+        End of the motion, and findings.
     motion
         Motion without stops.
     """

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 EXPONENT_S = 25.0
 """Longest averaging time of an exponent [s]."""
 EXPONENT_PRECISION = 0.2, 0.01
-"""Absolute [1/s] and relative."""
+"""Required absolute [1/s] and relative standard error of an exponent."""
 
 
 class Question(StrEnum):
@@ -58,7 +58,7 @@ class Question(StrEnum):
     ANSWER = "answer"
     """Responses with errors, and motions from other starts if they depend sensitively on the start."""
     MOTION = "motion"
-    """Only the motion and its responses, for maps, whose neighbouring points show more than errors."""
+    """Only the motion and its responses, for maps, where neighbouring points show more than errors."""
 
 
 QuestionWord = Literal["answer", "motion"]
@@ -66,7 +66,7 @@ QuestionWord = Literal["answer", "motion"]
 
 @dataclass(frozen=True)
 class InBatches:
-    """Solve scenes as `solve_scenes` does."""
+    """Solver that uses `solve_scenes`."""
 
     question: Question = Question.ANSWER
 
@@ -79,13 +79,13 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     """Solve a scene as planned, with error estimates.
 
     Each response has an error: its largest relative difference from a repeated run at a far stricter
-    accuracy. ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md). For a settled
-    motion it is twice the difference from a run with a far smaller tolerance, continued from the end until
-    the transient has decayed; otherwise, twice the difference from such a run from the start. If the two runs
-    diverge, a repeated run is another random draw: the error is then the difference of two draws in 19 cases
-    of 20.
+    accuracy. ``error_estimate`` is the largest of the four. Errors are measured (docs/accuracy.md). For a
+    settled motion, the error is twice the difference from a run with a far smaller tolerance, continued from
+    the end until the transient has decayed; otherwise, twice the difference from such a run from the start.
+    If the two runs diverge, a repeated run is another random draw: the error is then the difference of two
+    draws in 19 cases of 20.
 
-    Raises ValueError when the specimen cannot be followed in time, or not from such a start.
+    Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
     question = chosen(Question, question)
     if scene.target is not None:
@@ -108,10 +108,10 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without errors and other starts.
 
-    It is the motion that `solve_scene` describes, in a third of the time or less. Chaos is followed as long
+    The motion is that of `solve_scene`, and takes a third of the time or less. Chaos is followed as long
     as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
-    Raises ValueError when the specimen cannot be followed in time, or not from such a start.
+    Raises ValueError when the specimen cannot be simulated, or not from this start.
     """
     return solve_scene(scene, Question.MOTION)
 
@@ -126,15 +126,15 @@ class Solved:
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for it [s], with its share of batches. NaN if it includes loading of
-    modules."""
+    """Processor time of this thread for the scene [s], with its share of batches. NaN if the time includes
+    loading of modules."""
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
     """Solve several scenes like `solve_scene`, in batches where states alone are enough.
 
     The result of each does not depend on the others. In chaos it is another draw than that of `solve_scene`.
-    Raises ValueError when one of them cannot be followed in time, or not from its start.
+    Raises ValueError when one of them cannot be simulated, or not from its start.
     """
     found: list[Solved] = []
     together: list[Scene] = []
@@ -192,9 +192,9 @@ def solve_ensemble(
 ) -> Ensemble | None:
     """Solve a scene from this many starts a millionth of the gap apart.
 
-    `solve_scene` does so itself with sensitive dependence on the start, but with few starts. More starts give
-    narrower intervals; another seed gives another draw. Raises ValueError for fewer than 4 starts, or when
-    the specimen cannot be followed in time.
+    If the motion depends sensitively on the start, `solve_scene` does the same with few starts. More starts
+    give narrower intervals; another seed gives another draw. Raises ValueError for fewer than 4 starts, or
+    when the specimen cannot be simulated.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def solve_ensemble(
     seed
         Seed of the small changes of the start.
     budget_s
-        Processor time for all of them, counted as the budget of a scene; infinite for no limit.
+        Processor time for all starts, counted as the budget of a scene; infinite for no limit.
 
     Returns
     -------
@@ -288,7 +288,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
 
 
 class _Begun:
-    """Scene whose motion is followed in time and then evaluated.
+    """Scene whose motion is integrated in time and then evaluated.
 
     Parameters
     ----------
@@ -430,7 +430,7 @@ def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pa
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind; with an automatic duration, chaos only if it lasts."""
+    """Return the kind; with an automatic duration, chaotic only if chaos lasts."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:

@@ -1,8 +1,8 @@
 """Measured errors of the responses of a scene. SI units.
 
-In a settled motion the errors of earlier steps decay. It is continued from its end with a far smaller
+In a settled motion the errors of earlier steps decay. The motion is continued from its end with a far smaller
 tolerance until they have decayed, and compared. A motion that has not settled accumulates errors. It is
-repeated from its start with that tolerance and observed in the same window. If the two runs diverge, a
+repeated from its start with the smaller tolerance and observed in the same window. If the two runs diverge, a
 repeated run is another random draw. The difference of two draws is then estimated from the parts of the
 window if the motion is stationary, else from a few indistinguishable starts.
 """
@@ -37,14 +37,14 @@ LOOKS = 8
 SAFETY = 2.0
 """Ratio of the stated to the measured error."""
 ROUNDING = 1e-11
-"""Relative error of an exact answer."""
+"""Relative error of an exact result, by rounding."""
 ROUNDED = 1e-13
-"""Displacement of the start of a compared run, over the drive amplitude: some times the accumulated rounding
-of a run, because its effect is one draw of many."""
+"""Displacement of the start of a compared run, over the drive amplitude: several times the accumulated
+rounding of a run, because its effect is one draw of many."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """y and z are displaced equally, because p may have no clearance."""
 SLOWEST_RATIO = 0.9
-"""Smallest assumed shrinkage of a difference between two checks."""
+"""Largest assumed ratio of a difference to that of the check before, for the slowest settling."""
 FIRST_LOOK = 16
 """Drive periods before two runs from one start are first compared; then each time the time has doubled."""
 PARTED = 0.05
@@ -94,7 +94,7 @@ def stated_errors(
         Method for following other starts.
     """
     answer = seen.window.responses_m
-    # At a stricter accuracy it may not repeat yet; its lines then use another length.
+    # At a stricter accuracy the motion may not repeat yet; its lines then use another length.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -142,7 +142,7 @@ class _StrictRun:
     responses_m: Floats | None
     """Responses in the window, shape (4,), if reached."""
     is_together: bool
-    """It never diverged."""
+    """Whether it never diverged from the result's run."""
 
 
 def _difference_of_draws(
@@ -168,7 +168,7 @@ def _more_starts(
 ) -> list[Floats]:
     """Follow a few more starts, and observe the same window of them; NaN where one is lost.
 
-    The stricter run is one of them: all others share the step errors made before starts diverge.
+    The stricter run is one of them, because all others share the step errors made before starts diverge.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
@@ -191,8 +191,8 @@ def error_of_settled(
 ) -> Floats:
     """Return the relative errors of the responses of a repeating motion; NaN if the comparison failed.
 
-    The result, and that of the next periods (with other steps), are compared with a stricter run. That run is
-    followed twice as long, because a motion may settle more slowly than its modes.
+    The responses of this and the next periods (with other steps) are compared with a stricter run. That run
+    is followed twice as long, because a motion may settle more slowly than its modes.
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
@@ -238,7 +238,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Lines over the same number of periods.
+    # Take lines over the same number of periods.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 

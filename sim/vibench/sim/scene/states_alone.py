@@ -35,7 +35,7 @@ REMEMBERED = 16.0
 
 
 class StatesAlone:
-    """A run without a tangent, checked at intervals.
+    """A run without a tangent, checked for repetition at intervals.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class StatesAlone:
     every
         Keep every n-th state in `path`; None keeps none.
     by_itself_s
-        Time before which it is not followed in a batch [s], because errors persist on the way to the
-        attractor. A whole number of drive periods, where batches begin.
+        Time before which the motion is not followed in a batch [s], because errors persist on the way to
+        the attractor. A whole number of drive periods, where batches begin.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class StatesAlone:
         self.path: list[Stretch] = []
         """Followed stretch, with the kept states."""
         self.repeats: Repetition | None = None
-        """Repetition, once found; then it is followed no further."""
+        """Repetition, once found; then the motion is followed no further."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """States once per drive period, up to now."""
         self._settled_s: float | None = None
@@ -81,12 +81,12 @@ class StatesAlone:
 
     @property
     def is_over(self) -> bool:
-        """Return whether it repeats or was lost."""
+        """Return whether the motion repeats or was lost."""
         return self.repeats is not None or self.run.outcome is not Outcome.REACHED_END
 
     @property
     def wandered_until_s(self) -> float:
-        """Return the last time at which it changed from period to period; now, if it does not repeat."""
+        """Return the last time at which the motion changed between periods; now if it does not repeat."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
@@ -95,7 +95,7 @@ class StatesAlone:
         return self
 
     def follow(self, at_most_s: float = math.inf) -> None:
-        """Follow it until it repeats or reaches its end, at most to ``at_most_s``."""
+        """Follow the motion until it repeats or reaches its end, at most to ``at_most_s``."""
         run, frequency_hz, until_s = self.run, self._pace.frequency_hz, min(self.until_s, at_most_s)
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Return the whole drive periods of the next round in a batch; 0 between periods or in contact."""
+        """Return the number of drive periods of the next batch round; 0 within a period or in contact."""
         run = self.run
         if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
             return 0
@@ -141,7 +141,7 @@ class StatesAlone:
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Follow it further; return the growth of a small change (none over zero time)."""
+        """Follow the motion further; return the growth of a small change (none over zero time)."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -161,9 +161,9 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
 
 
 WORTH_A_FIT_S = 3000.0
-"""Time of motion of one specimen above which a fit of its collisions, which takes a second, pays [s]."""
+"""Total time of motion of one specimen above which a fit of its collisions (one second) saves time [s]."""
 AUTOMATIC_S = 10.0
-"""Assumed length of an automatic duration there [s]."""
+"""Assumed length of an automatic duration in this comparison [s]."""
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
@@ -178,7 +178,7 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
 """Time and most drive periods between two checks of a batch: their states are kept in memory."""
 HELD_STATES, FULL = 1 << 20, 16
-"""Most states of all motions in a batch, and the number of motions that fill the SIMD lanes."""
+"""Most states of all motions in a batch, and the number of motions that fill the SIMD registers."""
 TRIES = 8
 """Most drive periods followed without a batch until one ends in flight, where batches begin."""
 

@@ -1,10 +1,10 @@
 """Amplifier, coil and table under a voltage, with the specimen's push, moved step by step.
 
-The specimen stands on the table and pushes back on it: base and specimen answer the voltage together.
-A `LoadedShaker` takes numbers (`Amplifier`, `Shaker`, a specimen) and the mean voltage of each step, and
-gives means over the step (docs/decisions/0006-virtual-rig.md). An amplifier without numbers passes every
-voltage on: so the table is driven by a voltage that was recorded at the coil. `linear_motion` gives the same
-under sines in closed form, impacts to first order. SI units.
+The specimen exerts a force on the table, so base and specimen respond to the voltage together.
+A `LoadedShaker` takes an `Amplifier`, a `Shaker`, a specimen and the mean voltage of each step, and
+returns means over the step (docs/decisions/0006-virtual-rig.md). The default amplifier passes every voltage
+unchanged, for voltages recorded at the coil. `linear_motion` gives the motion under sines in closed form,
+with impacts to first order. SI units.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025

@@ -1,9 +1,9 @@
 """Amplifier, coil, table and specimen under sines: exact while no stop is touched, else to first order.
 
-While collisions hold abs(p) at the gap, the fundamental of the stops' force is that of a spring between m1
-and m2 which leaves p as large as the gap (first-order harmonic balance, as in Gong et al. 2025, eq. 5, with
-stops that neither yield nor lose energy). The force acts along one coordinate, so the motion follows in
-closed form from the free one and from that of a unit force.
+While collisions hold abs(p) at the gap, the fundamental of the stops' force equals the force of a spring
+between m1 and m2 that reduces p to the gap (first-order harmonic balance, as in Gong et al. 2025, eq. 5,
+with rigid stops without loss). The force acts along one coordinate, so the motion follows in closed form
+from the motion without stops and the response to a unit force.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """What a voltage, and what the stops, move at each of n frequencies; columns SINE_COLUMNS."""
+    """Response to the voltage and to the stops' force at each of n frequencies; columns SINE_COLUMNS."""
 
     per_volt: ComplexArray
-    """Per volt at the amplifier's input while no stop is touched, shape (n, 5)."""
+    """Motion per volt at the amplifier's input while no stop is touched, shape (n, 5)."""
     per_newton: ComplexArray
-    """Per newton by which the stops push m1 up and m2 down, shape (n, 5)."""
+    """Motion per newton by which the stops push m1 up and m2 down, shape (n, 5)."""
 
     @property
     def lever(self) -> ComplexArray:
-        """Per metre of a p that the stops bring about, shape (n, 5)."""
+        """Motion per metre of a p imposed by the stops, shape (n, 5)."""
         return self.per_newton / self.per_newton[:, [_P]]
 
     @property
     def stuck(self) -> ComplexArray:
-        """Per volt while the stops hold m1 to m2, shape (n, 5)."""
+        """Motion per volt while m1 sticks to m2, shape (n, 5)."""
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
     def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
@@ -47,7 +47,7 @@ class LinearMotion:
         volts
             At the amplifier's input, peak, shape (n,) or one for all [V].
         gap_m
-            Clearance that p is held in; infinite without stops.
+            Clearance to which the stops limit abs(p) [m]; infinite without stops.
         """
         free = (
             self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
@@ -56,10 +56,10 @@ class LinearMotion:
         return np.asarray(free + self.per_newton * push[:, None])
 
     def volts_for(self, base_m: ArrayLike, gap_m: float) -> FloatArray:
-        """Give the amplitudes at the amplifier's input that hold the base's at ``base_m``, shape (n,) [V]."""
+        """Return the amplitudes at the amplifier's input for a base amplitude ``base_m``, shape (n,) [V]."""
         free, by_push = self.per_volt, self.per_newton
         per_base = free[:, _P] / free[:, _BASE]
-        # What the stops do to p while the voltage keeps the base where it is.
+        # Response of p to the stops' force while the voltage keeps the base motion unchanged.
         on_held_base = by_push[:, _P] - per_base * by_push[:, _BASE]
         held_m = np.asarray(base_m, dtype=np.float64)
         push = _push(per_base * held_m, on_held_base, gap_m)
@@ -77,9 +77,9 @@ def linear_motion(
     Parameters
     ----------
     amplifier, shaker
-        Their band edges, gain and linear parts; not what clips or ends the stroke.
+        Only band edges, gain and linear parts are used; clipping and stroke limits are ignored.
     specimen
-        On the table; None for a bare one, whose m0 and p are zero.
+        Specimen on the table; None for a bare table, with m0 and p zero.
     frequency_hz
         Zero and above, shape (n,) [Hz].
     """
@@ -113,7 +113,7 @@ def linear_motion(
 
 
 def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray) -> ComplexArray:
-    """Table, m0, m1 and m2 in one matrix, shape (n, 4, 4) [N/m]."""
+    """Return the dynamic stiffness of table, m0, m1 and m2, shape (n, 4, 4) [N/m]."""
     s_of = s[:, None, None]
     stiffness = np.zeros((s.size, 4, 4), dtype=np.complex128)
     stiffness[:, 1:, 1:] = (
@@ -126,9 +126,9 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
-    """Return the stops' force that leaves a free p as large as the gap, as a spring would, shape (n,) [N].
+    """Return the stops' force that reduces a free p to the gap, as a spring would, shape (n,) [N].
 
-    With K the spring, p / (1 + K H) has the gap's size: one positive root of a quadratic.
+    The stiffness K follows from abs(p / (1 + K H)) = gap: the positive root of a quadratic.
     """
     excess = np.maximum((np.abs(p) / gap_m) ** 2 - 1.0, 0.0)
     size = np.maximum(np.abs(receptance) ** 2, np.finfo(np.float64).tiny)

@@ -1,8 +1,8 @@
-"""Amplifier, coil and table, and the specimen that pushes back on it, step by step under a voltage.
+"""Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
 All quantities are means over a step: the voltage is held, and the integrals of base acceleration and m0's
-velocity are known at both ends. Means do not alias events within a step and lie at its centre, so channels
-agree in phase.
+velocity are known at both ends. Means do not alias impacts within a step and refer to its centre, so all
+channels agree in phase.
 """
 
 import math
@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 STOP_STIFFNESS_N_PER_M = 2e5
 """Stiffness of the rubber stops that end the stroke; assumed: 45 N press 0.2 mm into them."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Damping of the same; assumed: the table comes back with about half its energy."""
+"""Damping of these stops; assumed: the table rebounds with about half its energy."""
 
 
 @dataclass(frozen=True)
@@ -66,18 +66,18 @@ class StateSpace:
     A: FloatArray
     """Shape (3, 3)."""
     B: FloatArray
-    """Shape (3, 2): columns for the voltage at the coil [V] and an outside force on the table [N]."""
+    """Shape (3, 2): columns for the voltage at the coil [V] and an external force on the table [N]."""
 
 
 @dataclass(frozen=True)
 class Shaker:
-    """An electrodynamic shaker: a coil and a suspended table, which rubber stops hold within its stroke.
+    """An electrodynamic shaker: a coil and a suspended table, with rubber stops at the ends of the stroke.
 
-    ValueError when a number is not allowed.
+    Raises ValueError when a number is not allowed.
     """
 
     moving_mass_kg: float
-    """Everything rigid that the coil moves, fixture included, without the specimen [kg]."""
+    """Mass of coil, table and fixture, without the specimen [kg]."""
     suspension_stiffness_n_per_m: float
     suspension_damping_ns_per_m: float
     force_constant_n_per_a: float
@@ -126,7 +126,7 @@ _CONTACT_TOLERANCE = Accuracy.STANDARD.tolerance
 
 @dataclass(frozen=True)
 class ShakenMotion:
-    """What happened in a stretch of steps; arrays of one value a step, means over the step."""
+    """Motion in a stretch of steps; each array has one value per step, the mean over it."""
 
     amplifier_voltage: FloatArray
     """Voltage at the coil [V]."""
@@ -141,7 +141,7 @@ class ShakenMotion:
 
     @classmethod
     def of(cls, count: int, end_rows: int, block: int = 0) -> Self:
-        """Make room for this many steps, for the ends of the first of them, and for blocks of contacts."""
+        """Allocate arrays for ``count`` steps, the first ``end_rows`` ends, and blocks of contacts."""
         ends, begun = (
             np.empty((end_rows, len(MOTION_COLUMNS))),
             np.empty(math.ceil(count / block) if block else 0),
@@ -150,16 +150,16 @@ class ShakenMotion:
 
 
 class MotionFailed(ArithmeticError):
-    """The motion is no longer finite, or a contact makes no progress; nothing can follow it."""
+    """The motion is no longer finite, or a contact makes no progress; the shaker cannot continue."""
 
 
 class LoadedShaker:
     """Amplifier, shaker and specimen, moved by the voltage at the amplifier's input.
 
-    Coil and table are solved exactly for a voltage and a force that are held over a step; the specimen
-    exactly between its impacts, which are resolved inside a step (native/cubic.hpp). The specimen's
-    force on the table is extrapolated over the step; that it is held misplaces the table by about
-    (omega h)^2 / 12 of its share (docs/decisions/0006-virtual-rig.md). One thread at a time.
+    Coil and table are solved exactly for a voltage and a force that are held over a step. The specimen is
+    solved exactly between impacts, which are resolved inside a step (native/cubic.hpp). The specimen's
+    force on the table is extrapolated and held over the step, with a relative error of the motion due to it
+    of about (omega h)^2 / 12 (docs/decisions/0006-virtual-rig.md). One thread at a time.
     """
 
     def __init__(
@@ -172,20 +172,20 @@ class LoadedShaker:
     ) -> None:
         """Start with the table at rest.
 
-        Raises ValueError when the step is not positive and finite, or the specimen cannot start so.
+        Raises ValueError when the step is not positive and finite, or the start is not possible.
 
         Parameters
         ----------
         amplifier, shaker, specimen
-            What is moved. A specimen of any contact law.
+            Parts of the model; the specimen may have any contact law.
         step_s
-            Length of a step [s]; a hundredth of the shortest period of interest errs by 1e-3.
+            Length of a step [s]; a hundredth of the shortest period of interest gives an error of 1e-3.
         start
             The specimen's x, y, z, vx, vy, vz [m, m/s], absolute, shape (6,).
         """
         engine = native_engine()
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
-        """Structure that the engine moves."""
+        """Structure that the engine advances."""
         self.step_s = step_s
         """Length of a step [s]."""
         self._place(specimen, start)
@@ -243,7 +243,7 @@ class LoadedShaker:
     ) -> ShakenMotion:
         """Advance by as many steps as ``drive_v`` has values.
 
-        Raises MotionFailed when the motion is no longer finite; this shaker cannot go on.
+        Raises MotionFailed when the motion is no longer finite; the shaker cannot continue.
 
         Parameters
         ----------
@@ -271,7 +271,7 @@ class LoadedShaker:
         self.account(native_engine().call("move_shaker", self.structure), len(drive_v))
 
     def prepare(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
-        """Lend the engine the arrays of a stretch."""
+        """Set the arrays of a stretch that the engine reads and fills."""
         native_engine().fill(
             self.structure,
             drive=drive_v,
@@ -293,5 +293,5 @@ class LoadedShaker:
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:
-    """Mean of exp(-t) from zero to the argument: 1 where nothing decays."""
+    """Return the mean of exp(-t) from zero to the argument; 1 for no decay."""
     return -math.expm1(-steps_per_time_constant) / steps_per_time_constant if steps_per_time_constant else 1.0

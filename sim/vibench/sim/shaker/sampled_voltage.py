@@ -51,12 +51,12 @@ class DrivenTable:
     m0_sensor: Gain = identity
     """Sensor of m0's velocity; a delay is a falling phase."""
     base_low_cut_hz: float = 0.0
-    """-3 dB of the coupling of the base's channel, first order; 0 where direct voltage passes."""
+    """-3 dB frequency of the AC coupling of the base's channel, first order [Hz]; 0 for DC coupling."""
 
 
 @dataclass(frozen=True, eq=False)
 class SampledMotion:
-    """Outputs of the sensors, shape (samples,), in single precision, far below converter noise."""
+    """Outputs of the sensors, shape (samples,), in single precision (error far below converter noise)."""
 
     base_acceleration: Singles
     """[m/s2]"""
@@ -65,7 +65,7 @@ class SampledMotion:
     impact_times_s: FloatArray
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
     impacts: FloatArray
-    """Number of contacts up to these, shape (blocks + 1,)."""
+    """Number of contacts up to these times, shape (blocks + 1,)."""
 
 
 def follow_voltage(
@@ -82,9 +82,9 @@ def follow_voltage(
     Parameters
     ----------
     table
-        What is moved.
+        Amplifier, shaker, specimen and sensors.
     volts
-        Voltage at the amplifier's input, or at the coil where the amplifier has no numbers [V], shape
+        Voltage at the amplifier's input, or at the coil with the default amplifier [V], shape
         (samples,), finite. Best with silence at both ends.
     start
         The specimen's x, y, z, vx, vy, vz [m, m/s], absolute.
@@ -106,7 +106,7 @@ def follow_voltage(
         motion = shaken.move(fine, block=block)
         impacts.append(motion.begun)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
-        # The last samples wait for the motion behind them, but at the end.
+        # The last samples need the motion that follows them, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]
@@ -121,7 +121,7 @@ def follow_voltage(
 
 
 class _Resampling:
-    """Resamples samples to steps, and means over steps to samples behind a sensor and a converter.
+    """Resample samples to steps, and means over steps to samples after a sensor and a converter.
 
     Means lie half a step after the resampled voltage and are evaluated there: both shifts cancel.
     """
@@ -148,7 +148,7 @@ class _Resampling:
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
     def samples(self, means: FloatArray, gains: Sequence[Gain]) -> FloatArray:
-        """Return the samples behind a sensor of each gain, shape of ``means`` (sensors, steps)."""
+        """Return the samples after a sensor of each gain, shape of ``means`` (sensors, steps)."""
         count = means.shape[1] // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
         padded = np.zeros((len(gains), size * self._ratio))
@@ -159,12 +159,12 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return the factors of the lines of ``samples`` samples, to steps or from them behind a sensor."""
+        """Return factors of the spectral lines of ``size`` samples: to steps, or from them after a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
             mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
-            # One up to 0.45 cycles per sample, a cosine edge to nothing at half a cycle.
+            # 1 up to 0.45 cycles per sample, then a cosine edge down to 0 at half a cycle.
             edge = ((frequency_hz / self._sample_rate_hz) - _PASS_PART) / (0.5 - _PASS_PART)
             band = np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
             if gain is None:
@@ -175,7 +175,7 @@ class _Resampling:
         return known
 
     def _held(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the coil's mean current under a held voltage over that without: 1 - (omega h)^2 / 12."""
+        """Return the ratio of mean coil currents, held over continuous voltage: 1 - (omega h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s
         turns = self._sample_rate_hz * self._ratio * time_constant_s

@@ -19,7 +19,7 @@ class Accuracy(StrEnum):
 
     @property
     def tolerance(self) -> float:
-        """Relative error allowed in one step of a contact; below the promise because errors add up."""
+        """Relative error allowed in one step of a contact; smaller than `promise` because errors add up."""
         return _TOLERANCES[self]
 
     @property

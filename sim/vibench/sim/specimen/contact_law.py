@@ -1,8 +1,8 @@
 """Contact laws between m1 and its stops: their union type and their table. Each law has its own file.
 
-A law that yields, F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at the indentation d, needs nothing else: the
-native engine, the independent solution and harmonic balance take its `stops`. A force of another shape
-needs a type of its own in native/contact.hpp.
+A new compliant law, F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at the indentation d, needs no other change: the
+native engine, the independent solution and harmonic balance use its `stops`. A force of another form also
+needs a type in native/contact.hpp.
 """
 
 from collections.abc import Mapping
@@ -29,14 +29,14 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = {
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
-    """Return the contact law of a model's name, for example ``hertz`` or ``rigid:0.8``.
+    """Return the contact law for a name, for example ``hertz`` or ``rigid:0.8``.
 
-    Raises ValueError when the name is not one of the forms, or its numbers are not allowed.
+    Raises ValueError when the name is unknown, or its numbers are not allowed.
 
     Parameters
     ----------
     text
-        A word of `CONTACT_LAWS`, and what its form asks for behind a colon.
+        A name in `CONTACT_LAWS`, followed by a colon and the numbers of the law, if any.
     contact_stiffness, gap_m
         Contact that a fitted law approximates: k_contact [N/m^1.5] and clearance [m].
     """

@@ -38,7 +38,7 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """A sine of constant displacement whose frequency moves; from phase zero, up or down."""
+    """A sine of constant displacement amplitude and rising or falling frequency; starts at phase zero."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -58,7 +58,7 @@ class _Sweep:
 
 @dataclass(frozen=True)
 class LinearSweep(_Sweep):
-    """A sine of constant displacement whose frequency changes by equal hertz in every second.
+    """A sine of constant displacement amplitude whose frequency changes at a constant rate.
 
     Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
     """
@@ -74,7 +74,7 @@ class LinearSweep(_Sweep):
 
 @dataclass(frozen=True)
 class LogarithmicSweep(_Sweep):
-    """A sine of constant displacement that spends equal times in every octave.
+    """A sine of constant displacement amplitude that spends equal times in every octave.
 
     Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
     """
@@ -92,7 +92,7 @@ class LogarithmicSweep(_Sweep):
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Measured or computed displacement, joined by the cubic spline on the sample grid (C2, not-a-knot).
+    """Measured or computed displacement, interpolated by a cubic spline (C2, not-a-knot).
 
     Sample 0 is time zero; the drive exists up to its last sample.
     """

@@ -13,9 +13,9 @@ _SCALES = {"": 1.0, "%": 0.01, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def number_of(text: str, *units: str) -> float:
-    """Return the number in a `text`, alone or with one of these `units` [SI].
+    """Return the number in `text` in SI units [SI], alone or followed by one of these `units`.
 
-    Python's `float` also reads ``1_0`` and digits of other scripts, which are slips here. Raises ValueError.
+    Raises ValueError, also for ``1_0`` and digits of other scripts, which Python's `float` accepts.
     """
     found = _NUMBER.fullmatch(text)
     if found is None or found[2] not in ("", *units):
@@ -25,7 +25,7 @@ def number_of(text: str, *units: str) -> float:
 
 
 class NumberWith:
-    """Read numbers, and texts of a number, alone or with one of these `units`; limits apply to both."""
+    """Accept a number, or text with a number and possibly one of `units`; limits apply to both."""
 
     def __init__(self, *units: str) -> None:
         self._units = units
@@ -62,7 +62,7 @@ def _with_numbers_only(schema: Any) -> Any:
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:
-            # Keys of a table are text, also where they count.
+            # Keys of a table are always text in TOML and JSON, also keys of type int.
             return {**schema, "values_schema": _with_numbers_only(values)}
         case dict():
             return {key: _with_numbers_only(value) for key, value in schema.items()}
@@ -83,6 +83,6 @@ class FrozenModel(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of the model, in which numbers are numbers."""
+        """Return the schema of the model, which accepts only numbers as numbers."""
         schema: CoreSchema = _with_numbers_only(handler(source))
         return schema

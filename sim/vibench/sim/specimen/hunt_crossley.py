@@ -14,8 +14,8 @@ class HuntCrossley:
     """Hertz contact that loses energy: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
 
     Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
-    forces m1 leaves more slowly than 1/loss at any speed of approach, so that the stop never pulls. Springs
-    that pull m1 off faster make the force of this law negative.
+    forces m1 leaves more slowly than 1/loss at any approach speed, so the force never becomes negative. If
+    springs pull m1 off faster, the force becomes negative and the stop pulls.
     """
 
     OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
@@ -25,7 +25,7 @@ class HuntCrossley:
     stiffness: float
     """[N/m^1.5]."""
     loss: float
-    """chi [s/m]; about 3/2 of (1 - restitution) per approach speed while that is small. Zero is Hertz."""
+    """chi [s/m]; for small loss about 3/2 (1 - restitution) / approach speed. Zero gives Hertz."""
     kind: Literal["hunt_crossley"] = "hunt_crossley"
 
     def __post_init__(self) -> None:

@@ -13,9 +13,9 @@ from .state import VX, VZ, Complex, Table, Vector, X, Z
 
 
 def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
-    """Flight as d/dt s = A s + b f, with s = (x, y, z, vx, vy, vz) and f = k0 U + c0 dU/dt.
+    """Return A, shape (6, 6), and b, shape (6,), of the motion in flight: d/dt s = A s + b f.
 
-    Returns A, shape (6, 6), and b, shape (6,).
+    The state is s = (x, y, z, vx, vy, vz), and f = k0 U + c0 dU/dt.
     """
     system = _first_order(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
     entry = np.zeros(6)
@@ -24,7 +24,7 @@ def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
 
 
 def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
-    """Displacements above velocities: the matrix of their rates, shape (2n, 2n)."""
+    """Return the state matrix, displacements before velocities, shape (2n, 2n)."""
     inverse, size = np.linalg.inv(mass), len(mass)
     system = np.zeros((2 * size, 2 * size))
     system[:size, size:] = np.eye(size)
@@ -34,7 +34,7 @@ def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
 
 
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
-    """Displacement of every mass, and of p, over the base displacement, without contact.
+    """Return the transmissibility without contact: displacements of the masses and p over the base's.
 
     (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping. Raises ValueError when a frequency
     is negative or not finite.
@@ -42,7 +42,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     Parameters
     ----------
     specimen
-        Its contact law and gap play no part.
+        Contact law and gap are ignored.
     frequency_hz
         Shape (n,) [Hz]; zero and above.
 
@@ -57,7 +57,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     (m0, m1, m2), squared = specimen.masses, omega**2
     springs, dampers = specimen.stiffnesses, specimen.dampings
     k0, k1, k2 = (k + 1j * omega * c for k, c in zip(springs, dampers, strict=True))
-    # m1 and m2 eliminated without differences of nearly equal stiffnesses.
+    # Eliminate m1 and m2 without differences of nearly equal stiffnesses.
     pair = k1 * (k2 - squared * m2) - squared * m1 * (k1 + k2 - squared * m2)
     carried = (m1 + m2) * k1 - squared * m1 * m2
     per_force = k0 / ((k0 - squared * m0) * pair - k2 * squared * carried)
@@ -77,11 +77,11 @@ class ModalForm(NamedTuple):
 
 
 COINCIDENT = 1e7
-"""Condition of the eigenvectors beyond which two modes count as one (critical damping to 14 digits)."""
+"""Condition number of the eigenvectors beyond which two modes coincide (critical damping to 14 digits)."""
 PROPORTIONAL = 1e-12
-"""Modal damping off the diagonal below this part of the largest is rounding: the undamped modes are modes."""
+"""Off-diagonal modal damping below this part of the largest is rounding: the modes are then uncoupled."""
 CRITICAL = 1e-12
-"""abs(1 - damping ratio^2) below which a mode has no pair of distinct rates."""
+"""abs(1 - damping ratio^2) below which a mode counts as critically damped."""
 WIDEST = 1e10
 """Ratio of natural frequencies beyond which double precision does not resolve the slowest mode."""
 REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
@@ -89,7 +89,7 @@ REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per ce
 
 @lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Diagonalise the specimen without contact, for any damping; its arrays are not to be written to.
+    """Diagonalise the specimen without contact, for any damping; do not write to the returned arrays.
 
     Raises ValueError as `diagonal_form`.
     """
@@ -99,11 +99,11 @@ def modal_form(specimen: Specimen) -> ModalForm:
 def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     """Diagonalise M s'' + C s' + K s = 0 with a diagonal M.
 
-    The undamped modes come from a symmetric problem, whose vectors are orthogonal however near two
-    frequencies are. They stay modes where damping is proportional to the springs, or none.
+    The undamped modes come from a symmetric problem, so they are orthogonal even if two frequencies nearly
+    coincide. With damping zero or proportional to the springs, they are also the damped modes.
 
-    Raises ValueError when two modes coincide (critical damping), for then no full set of modes exists, and
-    when natural frequencies lie too far apart.
+    Raises ValueError when two modes coincide (critical damping), because then no full set of modes exists,
+    or when natural frequencies lie too far apart.
     """
     root = np.sqrt(np.diag(mass))
     try:
@@ -127,14 +127,14 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
 
 
 def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table) -> ModalForm:
-    """Rates, shapes and rows of q'' + damping q' + omega^2 q = 0 in every mode."""
+    """Return the modal form where each mode satisfies q'' + damping q' + omega^2 q = 0."""
     parts = [part for mode in zip(omega, 0.5 * damping, shapes.T, rows, strict=True) for part in _mode(*mode)]
     rates, moved, read = zip(*parts, strict=True)
     return ModalForm(np.asarray(rates, np.complex128), np.array(moved), np.array(read))
 
 
 def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
-    """Split one mode q = row.displacement into its terms: one of a pair, or two that do not oscillate."""
+    """Return the terms of one mode q = row.displacement: one for a conjugate pair, or two real ones."""
     turn = (omega - decay) * (omega + decay)
     if abs(turn) <= CRITICAL * omega**2:
         raise ValueError(REFUSAL)
@@ -157,8 +157,8 @@ def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> 
 
 
 def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
-    """Do as `_undamped_shapes` where damping couples the undamped modes."""
-    # In the coordinates q and q' / omega, fast modes beside slow ones do not make the condition large.
+    """Return the modal form where damping couples the undamped modes."""
+    # The coordinates q and q' / omega keep the condition number small when fast and slow modes coexist.
     values, vectors = np.linalg.eig(
         np.block(
             [
@@ -185,9 +185,9 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
 
 
 def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tuple[Complex, complex]:
-    """Phasors of the steady motion without contact under U = amplitude sin(omega t).
+    """Return phasors of the steady motion without contact under U = amplitude sin(omega t).
 
-    Returns the motion S, shape (6,), s(t) = Re(S exp(i omega t)), and the base force, likewise [N].
+    The motion S has shape (6,), s(t) = Re(S exp(i omega t)); the second phasor is the base force [N].
     """
     base = -1j * amplitude_m
     displacement = base_transmissibility(specimen, omega / (2.0 * np.pi))[0, :3] * base
@@ -195,12 +195,12 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
     return np.concatenate([displacement, 1j * omega * displacement]), force
 
 
-# How a specimen answers its base when p is free, and when the stops decide p: closed forms. SI units.
+# Response of a specimen to its base with p free, or with p imposed by the stops, in closed form. SI units.
 #
 # The stops push m1 and m2 apart with equal and opposite forces, so x follows from the base U and from p
-# alone: x = stuck U + lever p, with ``stuck`` the answer while m1 sticks to m2 and ``lever`` that of x to a
-# p forced by the stops. While collisions hold abs(p) at about the gap, abs(x) is at most abs(stuck U) +
-# abs(lever) gap, as far as the fundamental carries the motion.
+# alone: x = stuck U + lever p. Here ``stuck`` is the response while m1 sticks to m2, and ``lever`` is the
+# response to a p imposed by the stops. While collisions hold abs(p) at about the gap, abs(x) is at most
+# abs(stuck U) + abs(lever) gap, if the fundamental dominates the motion.
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,11 +214,11 @@ class BaseResponse:
     stuck_x: Complex
     """x while m1 sticks to m2, over U."""
     lever: Complex
-    """x over a p that the stops bring about while the base rests."""
+    """x over p, with p imposed by the stops and the base at rest."""
 
 
 def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
-    """Answer of x and p at each of the frequencies, shape (n,) [Hz]; zero and above."""
+    """Return the response of x and p at each frequency, shape (n,) [Hz]; zero and above."""
     free = base_transmissibility(specimen, frequency_hz)
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     dynamic = (
@@ -234,23 +234,23 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
 # The specimen with m1 held on m2 by a rigid stop: two bodies, solved exactly. SI units.
 #
 # While m1 sticks to a stop, m1 and m2 move as one: y = z + side * gap, and the spring and damper between
-# them are inside a rigid body. What is left is linear with two displacements, x and z, and one condition:
-# the stop can only push. The native engine follows the motion and finds where that condition ends.
+# them are inside a rigid body. The motion of x and z is linear, as long as the stop pushes. The native
+# engine follows the motion and finds the instant at which the stop would have to pull.
 #
-# The motion is one table: a term a row, modes first, the drive last.
+# The motion is stored in one table with a row for each term: modes first, the drive last.
 
 RATE = 0
-"""Column of l_j [1/s]."""
+"""Column of the rates [1/s]."""
 SHAPE = slice(1, 7)
-"""Columns of the motion of a unit phasor in x, y, z, vx, vy, vz; y without the gap, which is a constant."""
+"""Columns of x, y, z, vx, vy, vz for a unit phasor; y without the constant gap."""
 ROW = slice(7, 13)
-"""Columns of the left row, which reads x, z, vx, vz of a state and nothing else; zero for the drive."""
+"""Columns of the left eigenvector, nonzero only at x, z, vx, vz; zero for the drive."""
 PULL = 13
-"""Column of what a unit phasor adds to the force k2 (z - x) + c2 (vz - vx) by which m2 pulls at m0 [N]."""
+"""Column of the force k2 (z - x) + c2 (vz - vx) by which m2 pulls m0, for a unit phasor [N]."""
 COLUMNS = 14
 
 PLACES = [X, Z, VX, VZ]
-"""Where the four unknowns of the bound motion stand in a state."""
+"""Indices of the four unknowns of the bound motion in a state."""
 
 
 def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Complex:

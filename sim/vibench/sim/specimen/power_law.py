@@ -60,7 +60,7 @@ class PowerLaw:
 
     @property
     def stops(self) -> Stops:
-        """None: the force acts at every p, not at a stop."""
+        """No stops: the force acts at every p."""
         return Stops()
 
 
@@ -80,9 +80,9 @@ def fit_power_law(
     exponents
         Odd, in any order: (5,) or (3, 5, 7).
     contact_stiffness, gap_m, indentation_m
-        k_contact [N/m^1.5] of the Hertz contact, and the place of equal force.
+        k_contact [N/m^1.5] of the Hertz contact, and the p = gap + indentation at which forces are equal.
     shares
-        Part of the force that each power takes; they must add up to 1. The paper does not state it; the
+        Part of the force for each power; they must add up to 1. The paper does not state them; the
         default is equal parts.
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
@@ -97,7 +97,7 @@ def fit_power_law(
 
 
 def _parse(detail: str, reference: Reference) -> PowerLaw:
-    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; behind a colon the indentation."""
+    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; an indentation may follow a colon."""
     powers, _, indentation = detail.partition(":")
     terms = [term.partition("@") for term in powers.split("+")]
     try:

@@ -36,7 +36,7 @@ class Specimen:
         "stiffness_matrix": "N m-1",
         "damping_matrix": "N s m-1",
     }
-    """Units of values whose name says none."""
+    """Units of values whose names do not state one."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
@@ -50,7 +50,7 @@ class Specimen:
     """Clearance between m1 and each stop at rest [m]; infinite for no stop at positive p."""
     contact: ContactLaw
     lower_gap_m: float | None = None
-    """Clearance of the stop at negative p where it differs; infinite for none there."""
+    """Clearance of the stop at negative p, if different; infinite for no stop there."""
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("mass m", "kg", self.masses)
@@ -101,9 +101,9 @@ class Specimen:
 
     @property
     def damping_ratios(self) -> NDArray[np.float64]:
-        """Damping ratio of each mode without contact, in the order of its frequency, shape (3,).
+        """Damping ratio of each mode without contact, ordered by frequency, shape (3,).
 
-        ``-Re(s) / abs(s)`` of its pair of poles. Above 1 the mode does not oscillate.
+        ``-Re(s) / abs(s)`` of the pair of poles. Above 1 the mode does not oscillate.
         """
         root = np.sqrt(np.asarray(self.masses))
         values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
@@ -118,11 +118,11 @@ _ROUNDING = 1e-12
 
 
 def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
-    """Return the ratios of modes that the dampers couple: own frequencies [rad/s], modal damping [1/s]."""
+    """Return damping ratios of coupled modes from undamped frequencies [rad/s] and modal damping [1/s]."""
     poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
-    # Of modes that do not oscillate the slowest pole belongs to the fastest: their product is the square of
-    # the mode's frequency, and their sum the damping.
+    # Overdamped modes: the slowest pole is paired with the fastest. Their product is the square of the
+    # mode's frequency, and their sum is the damping.
     pairs = list(zip(still[: still.size // 2], still[: still.size // 2 - 1 : -1], strict=True))
     found = [(math.sqrt(slow * fast), 0.5 * (slow + fast) / math.sqrt(slow * fast)) for slow, fast in pairs]
     found += [(abs(pole), -pole.real / abs(pole)) for pole in poles if pole.imag > 0.0]
@@ -130,7 +130,7 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""(x, y, z) of a unit of x and of z while m1 sticks to m2."""
+"""Columns: (x, y, z) for unit x and for unit z, while m1 sticks to m2."""
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
@@ -149,13 +149,13 @@ def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
 PAPER_MASSES: Triple = (5.8e-3, 2.1e-3, 2.0e-3)
 """Gong et al. 2025, section 2 [kg]."""
 PAPER_FREQUENCIES_HZ: Triple = (322.0, 100.0, 390.6)
-"""f0, f1, f2 of the single oscillators, k_i = m_i (2 pi f_i)^2; same place."""
+"""f0, f1, f2 of the single oscillators, k_i = m_i (2 pi f_i)^2; section 2 of the paper."""
 STEEL = Elasticity(206e9, 0.27)
-"""The sphere m1; same place."""
+"""Sphere m1; section 2 of the paper."""
 ALUMINIUM = Elasticity(67e9, 0.3)
-"""The stops; same place."""
+"""Stops; section 2 of the paper."""
 PAPER_RADIUS_M = 4.4e-3
-"""Radius in the paper (2.1 g of steel would be 4.0 mm)."""
+"""Radius in the paper; a steel sphere of 2.1 g would have 4.0 mm."""
 
 
 def gong2025(
@@ -171,9 +171,9 @@ def gong2025(
     ----------
     damping_time_s
         c_i = damping_time_s * k_i [s]. The paper does not state it. The default is the only value
-        found for which both of its statements on chaos hold.
+        found for which both statements of the paper on chaos hold.
     gap_m
-        Clearance at each stop [m], or (lower, upper); a power law is fitted at the nearer.
+        Clearance at each stop [m], or (lower, upper); a power law is fitted at the smaller one.
     contact
         ``"hertz"``: the paper's stops; ``"linear"``: no stops; ``"power:5"`` and others: see
         `vibench.sim.specimen`.
@@ -225,7 +225,7 @@ def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
 
 
 def energy_metric(specimen: Specimen) -> Floats:
-    """Return the matrix of twice the energy without stops, shape (6, 6)."""
+    """Return the matrix E for which s' E s is twice the energy of state s without stops, shape (6, 6)."""
     metric = np.zeros((6, 6))
     metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
     return metric

@@ -1,6 +1,6 @@
 """Description of a specimen: its numbers and their sources, in a file or in a table of another file.
 
-A description is complete: nothing is assumed. It may start from another one (``model``, by name or by
+A description is complete: there are no default values. It may start from another one (``model``, by name or
 path) and state only differences, as the tables of rigs, studies and imports do.
 """
 
@@ -38,10 +38,10 @@ from .specimen import Gaps, Specimen, Triple
 from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
-"""Key of the described specimen that a table starts from."""
+"""Key that names the specimen from which a table starts."""
 FOLDER = "folder"
-"""Key of a validation's context: the folder that a path in ``model`` is relative to, given by the reader
-of a file. Without it only shipped specimens can be named, so that a recording opens no other file."""
+"""Key in pydantic's validation context: the folder to which a path in ``model`` is relative. Without it only
+shipped specimens can be named, so that a recording cannot open other files."""
 SOURCES = "sources"
 SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
@@ -53,7 +53,7 @@ USUAL_SPECIMEN = "gong2025"
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
 """Pairs of alternative keys: a specimen has exactly one of each pair."""
 _ANY_GAP_M = 1e-5
-"""Any gap, to find out whether a contact law is known."""
+"""Arbitrary gap, to check whether a contact law is known."""
 PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
 NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
@@ -80,7 +80,7 @@ class Material(_Described):
 
     @property
     def elasticity(self) -> Elasticity:
-        """Return the elastic constants without units."""
+        """Return the elastic constants as `Elasticity`."""
         return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
 
 
@@ -149,16 +149,16 @@ class SpecimenDescription(_Described):
     sources: dict[str, str] = Field(default={})
     """Source of each number, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
-    """Default value of a table."""
+    """Default keys and values of a table."""
 
     def __hash__(self) -> int:
-        # A table of sources has no hash; its text contains all of it.
+        # The dict of sources cannot be hashed; the JSON text contains everything.
         return hash(self.model_dump_json())
 
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, said: object, info: ValidationInfo) -> object:
-        """Fill in from the specimen that a table names; a name alone means that specimen."""
+        """Complete a table from the specimen that it names; a name alone means that specimen."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match said:
             case str():
@@ -179,7 +179,7 @@ class SpecimenDescription(_Described):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Report errors of the bodies where they are given; pydantic would first report a missing number."""
+        """Report the error in the given bodies; pydantic would first report that it is not a number."""
         try:
             return handler(said)
         except ValidationError as error:
@@ -231,7 +231,7 @@ class SpecimenDescription(_Described):
         damping_time_s
             c_i = damping_time_s * k_i [s].
         gap_m
-            Clearance at both stops [m], or (lower, upper). A power law is fitted at the nearer one.
+            Clearance at both stops [m], or (lower, upper). A power law is fitted at the smaller one.
         """
         gap = self.gap_m if gap_m is None else gap_m
         lower, upper = gap if isinstance(gap, tuple) else (None, gap)
@@ -353,7 +353,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace given values. `about`, each given key's alternative and its source are removed."""
+    """Replace the given values; remove `about`, and the alternative and the source of each given key."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     replaced |= {"about"} if said else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
@@ -365,7 +365,7 @@ def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Mapping[str, Any]) -> None:
-    """Warn of springs and dampings that change because they follow from given values."""
+    """Warn of springs and dampers that change because they are computed from given values."""
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))

@@ -1,4 +1,4 @@
-"""Common parts of the contact laws: numbers for the engine, and their names in one word. SI units."""
+"""Common parts of the contact laws: numbers for the engine, and names in files. SI units."""
 
 import math
 from collections.abc import Callable
@@ -26,24 +26,24 @@ class Stops(NamedTuple):
     loss: float = 0.0
     """[s/m]."""
     restitution: float | None = None
-    """Restitution of rigid stops; None for elastic stops and without stops."""
+    """Restitution of rigid stops; None for elastic stops or no stops."""
 
     @property
     def term(self) -> tuple[float, float]:
-        """Stiffness and exponent of the steepest term of a law that yields."""
+        """Stiffness and exponent of the term with the highest power of a compliant law."""
         if self.contact_stiffness:
             return self.contact_stiffness, HERTZ_EXPONENT
         return self.linear_stiffness, 1.0
 
     @property
     def spring_beside(self) -> float:
-        """Stiffness of the linear term where it is not the only one [N/m]."""
+        """Stiffness of the linear term if there is also a Hertz term, else 0 [N/m]."""
         return self.linear_stiffness if self.contact_stiffness else 0.0
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Contact that fitted laws approximate: the paper's, and its clearance."""
+    """Hertz contact and clearance that fitted laws approximate."""
 
     stiffness: float
     """k_contact [N/m^1.5]."""
@@ -55,7 +55,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class LawWord(Generic[Law_co]):
-    """A row of `CONTACT_LAWS`: the form of a law's name, and how the law is made from it."""
+    """Entry of `CONTACT_LAWS`: form of a law's name, and a function that parses it."""
 
     form: str
     """Allowed forms, for messages."""
@@ -64,11 +64,11 @@ class LawWord(Generic[Law_co]):
     example: str
     """Example of the form, for pictures."""
     made: Callable[[str, Reference], Law_co]
-    """Makes the law from the text behind the colon; raises `UnreadableLawError` for an unreadable number."""
+    """Create the law from the text after the colon; raises `UnreadableLawError` for an unreadable number."""
 
 
 class UnreadableLawError(ValueError):
-    """The text behind a law's name does not have the law's form."""
+    """The text after a law's name does not have the law's form."""
 
 
 def number_in(detail: str) -> float:
@@ -80,7 +80,7 @@ def number_in(detail: str) -> float:
 
 
 def require_nothing(detail: str) -> None:
-    """Refuse text behind the name of a law without parameters."""
+    """Refuse text after the name of a law without parameters."""
     if detail:
         raise UnreadableLawError(detail)
 

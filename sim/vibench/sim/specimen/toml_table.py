@@ -17,7 +17,7 @@ def toml_table(path: Path) -> dict[str, Any]:
     Raises UnreadableTomlError when the file is missing, is not text, or is not TOML.
     """
     try:
-        # Editors on Windows begin a file with a byte-order mark.
+        # Some editors on Windows begin a file with a byte-order mark.
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UnreadableTomlError(

@@ -1,7 +1,7 @@
 """A Dask cluster as workers: any number of processes on any number of machines.
 
-Dask runs a task again when its worker dies, and moves work between workers; a scene's answer does not
-depend on where it is computed, so that neither changes a result. Workers must have the same software.
+Dask runs a task again if its worker dies, and moves tasks between workers. Neither changes a result, because
+the result of a scene does not depend on the worker. Workers must have the same software.
 """
 
 import queue
@@ -27,7 +27,7 @@ RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 
 Answer = tuple[str, tuple[Solved, ...]]
-"""Software of the worker, and what it computed."""
+"""Software of the worker, and its results."""
 
 
 def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
@@ -36,10 +36,10 @@ def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
 
 
 class ClusterExecutor:
-    """The workers behind a Dask scheduler.
+    """The workers of a Dask scheduler.
 
-    Raises ClusterLost if the scheduler does not answer, there is no worker, or a worker has no or another
-    vibench.
+    Raises ClusterLost if the scheduler does not answer, there is no worker, or a worker does not have
+    the same software.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class ClusterExecutor:
 
     @property
     def slots(self) -> int:
-        """Threads of all workers, as of a moment ago; 0 while the scheduler does not answer."""
+        """Recent number of threads of all workers; 0 while the scheduler does not answer."""
         if not self._is_in_contact():
             return 0
         now_s = time.monotonic()
@@ -78,7 +78,7 @@ class ClusterExecutor:
         return self._slots
 
     def submit(self, bundle: Bundle) -> None:
-        """Hand a bundle to the scheduler."""
+        """Submit a bundle to the scheduler."""
         self._submitted += 1
         key = f"{self._prefix}-{self._submitted}"
         future = self._client.submit(solve_bundle, bundle.scenes, self._solver, key=key, pure=False)
@@ -86,7 +86,7 @@ class ClusterExecutor:
         future.add_done_callback(partial(self._note, bundle))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return finished bundles; a bundle dropped by the scheduler is empty."""
+        """Return finished bundles; one dropped by the scheduler has no results."""
         arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()
@@ -106,7 +106,7 @@ class ClusterExecutor:
         self._client.close()
 
     def _note(self, bundle: Bundle, future: Future) -> None:
-        """Queue the future, in a thread of the client."""
+        """Put a finished bundle into the queue; called in a thread of the client."""
         self._arrived.put((bundle, future))
 
     def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:

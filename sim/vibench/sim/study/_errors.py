@@ -1,8 +1,8 @@
-"""The errors of a study: each says what was given, what is allowed, and what to do next."""
+"""Errors of a study. Each message states what was given, what is allowed, and what to do next."""
 
 
 class StudyError(Exception):
-    """A study cannot be run, stored, resumed or opened; the text is one sentence for the user."""
+    """A study cannot be run, stored, resumed or opened; the message is one sentence for the user."""
 
 
 class InvalidStudy(StudyError, ValueError):

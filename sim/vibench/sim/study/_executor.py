@@ -1,6 +1,6 @@
 """Interface between the queue and workers: local threads or remote processes.
 
-Costs of scenes exclude one-time costs of a process: loading modules, tables of its law.
+Times of scenes exclude one-time work of a process: loading modules and making tables.
 """
 
 import math
@@ -38,15 +38,15 @@ class Reply:
     solved: tuple[Solved, ...]
     """Results of the scenes in order; fewer after a cancellation or an error."""
     error: BaseException | None = None
-    """Error, if there are fewer."""
+    """Error, if there are fewer results."""
 
 
 class Executor(Protocol):
-    """Executor of bundles. Workers may be lost, but no bundle; replies come in any order."""
+    """Executor of bundles. Workers may be lost, but no bundle is lost; replies come in any order."""
 
     @property
     def description(self) -> str:
-        """What it is, for the record."""
+        """Description of the executor for the record."""
 
     @property
     def slots(self) -> int:
@@ -58,14 +58,14 @@ class Executor(Protocol):
     def replies(self, timeout_s: float) -> Sequence[Reply]:
         """Return replies; waits for the first, at most ``timeout_s``.
 
-        Raises ClusterLost when nothing can come back any more.
+        Raises ClusterLost when no more replies can arrive.
         """
 
     def cancel(self) -> Sequence[Reply]:
-        """Start nothing more and end soon; replies so far stay available. Legal at any time."""
+        """Start no further scenes; return remaining replies. May be called at any time."""
 
     def close(self) -> None:
-        """Release all workers. Legal at any time."""
+        """Release all workers. May be called at any time."""
 
 
 Solver: TypeAlias = SceneSolver
@@ -77,7 +77,7 @@ _solved_before: set[Kind] = set()
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
     """Solve scenes, in batches or one by one; return each with its processor time.
 
-    Times are learnt. The first scenes of a kind may load modules and create tables; their times are not used.
+    Times are recorded for estimates, except those of first scenes of a kind: they may load modules.
     """
     for group in [scenes] if isinstance(solver, InBatches) else [[scene] for scene in scenes]:
         kinds: list[Kind] = [
@@ -122,12 +122,12 @@ class ThreadExecutor:
 
     @property
     def description(self) -> str:
-        """What it is, for the record."""
+        """Description of the executor for the record."""
         return f"{self._workers} thread(s)"
 
     @property
     def slots(self) -> int:
-        """Threads."""
+        """Number of threads."""
         return self._workers
 
     def submit(self, bundle: Bundle) -> None:

@@ -1,7 +1,7 @@
-"""File of a running study, which survives a kill.
+"""File of a running study, which remains valid if the process is killed.
 
-Order of a commit: cells -> sync -> states -> sync. If process or power end at any moment, a point with the
-state done has all its cells.
+Order of a commit: cells -> sync -> states -> sync. If the process or the power fails at any moment, a point
+with the state DONE has all its cells.
 
 HDF5 creates the file with all metadata and space for all results, then closes it. Afterwards only bytes at
 known offsets are written, so that no crash can leave the file inconsistent.
@@ -27,14 +27,14 @@ from ._software import software
 from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
-"""Longest time of a reader [s]; a writer keeps a file open during its run."""
+"""Longest wait for a reader to close the file, and time between tries [s]; a writer keeps it open longer."""
 
 
 def sole_writer(path: Path) -> OpenFile:
     """Open a file for writing, locked while it is open.
 
-    Readers have the file open only briefly. Raises StudyError when another process has it open for longer,
-    as a writer does, or it cannot be opened.
+    Readers open the file only briefly. Raises StudyError when another process keeps it open longer, as a
+    writer does, or it cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -75,12 +75,12 @@ HEAD_BYTES = 2_000_000
 
 
 def make_file(path: Path, plan: layout.GridPlan) -> None:
-    """Create a plan's file, all points missing, or leave nothing.
+    """Create a plan's file with all points missing; after an error, leave no file.
 
     Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
     """
     try:
-        path.open("xb").close()  # two runs cannot both have the name
+        path.open("xb").close()  # only one of two runs can create the file
     except FileExistsError:
         raise StudyError(
             f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
@@ -161,7 +161,7 @@ def _scale(file: h5py.File, axis: layout.StudyAxis) -> h5py.Dataset:
 
 
 def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h5py.Dataset:
-    """Create a contiguous dataset in its place, filled with what stands for missing."""
+    """Create a contiguous dataset for a column, filled with the value for missing."""
     whole = shape if column.components == 1 else (*shape, column.components)
     kind = np.dtype(column.dtype)
     stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
@@ -179,7 +179,7 @@ def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
-    """Set attributes, text as UTF-8 of fixed length, which old readers understand."""
+    """Set attributes; text is UTF-8 of fixed length, which old readers can read."""
     for name, value in values.items():
         match value:
             case str():
@@ -193,8 +193,8 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 class FileStore:
     """Store in a study's file; a context manager that closes it.
 
-    Raises StudyError when the file is another study's, is being written by another run, or is not a study's
-    file.
+    Raises StudyError when the file belongs to another study, is being written by another run, or is not a
+    file of a study.
     """
 
     def __init__(
@@ -215,7 +215,7 @@ class FileStore:
 
     @classmethod
     def created(cls, path: Path, plan: layout.GridPlan) -> Self:
-        """Create the file first; refuses a name that is taken."""
+        """Create the file and its store; raises StudyError if the file exists."""
         make_file(path, plan)
         return cls(path, plan)
 
@@ -232,9 +232,9 @@ class FileStore:
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Commit answers in a safe order.
+        """Commit answers: first cells, then states.
 
-        Raises StudyError when the disk refuses; what was committed before is kept.
+        Raises StudyError after a write error; earlier commits are kept.
         """
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
@@ -248,7 +248,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store filled-in points as whole columns, in a safe order."""
+        """Store filled-in points as whole columns: first cells, then states."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())

@@ -1,6 +1,6 @@
 """Content of a study's file: a grid of points over named axes, columns with units, and the layout.
 
-``docs/studies.md`` describes it for users of h5py, xarray or MATLAB.
+``docs/studies.md`` describes the file for users of h5py, xarray or MATLAB.
 """
 
 import math
@@ -16,10 +16,10 @@ from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
-"""Incremented whenever an older reader would misunderstand the file."""
+"""Incremented when older readers would misread the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""Superblock 0: what every HDF5 reader since 1.8 understands, MATLAB's included."""
+"""Superblock 0, which every HDF5 reader since 1.8 can read, including MATLAB."""
 
 STUDY = "study_json"
 STATE = "state"
@@ -37,11 +37,11 @@ class PointState(IntEnum):
     DONE = 1
     """The run reached its end."""
     STOPPED = 2
-    """The run did not reach its end; ``outcome`` says why. Its numbers may be NaN."""
+    """The run did not reach its end; ``outcome`` contains the reason. Numbers may be NaN."""
     FAILED = 3
-    """The scene could not be computed; ``message`` says why. Its numbers are NaN."""
+    """The scene could not be computed; ``message`` contains the reason. Numbers are NaN."""
     FILLED = 4
-    """Filled in a map, not computed: its neighbours agree, and its numbers lie between theirs."""
+    """Filled in on a map, not computed: neighbours agree, and numbers are interpolated between them."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ Cell = float | int | bytes | tuple[float, ...]
 
 REAL, WHOLE = "<f8", "<i4"
 MISSING_WHOLE = -1
-"""Missing whole number or flag; CF's ``_FillValue``."""
+"""Value for a missing whole number or flag; ``_FillValue`` of the CF conventions."""
 COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
@@ -94,13 +94,13 @@ class Column:
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """Number of components; above one, there is another axis at the end."""
+    """Number of components; if more than one, the array has another axis at the end."""
     along: str = COORDINATE
     """Name of that axis."""
 
     @property
     def missing(self) -> float | int | bytes:
-        """Return the value that marks a missing one."""
+        """Return the value that marks a missing result."""
         match self.dtype[:2]:
             case "<f":
                 return math.nan
@@ -113,7 +113,7 @@ class Column:
 
 
 def _meanings(kind: type[Enum]) -> tuple[str, ...]:
-    """One word for each member, as CF wants flags to be named."""
+    """Return one word for each member, as the CF conventions require for flags."""
     return tuple(member.name.lower() for member in kind)
 
 
@@ -146,7 +146,7 @@ NUMBERS = {
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
 }
-"""By the field of `ScenePrediction` that they keep."""
+"""Columns by the field of `ScenePrediction` that they store."""
 
 
 def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] = ()) -> Column:
@@ -163,13 +163,13 @@ FOUND_NUMBERS = {
     "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
     "starts": _of_motion("found_starts", WHOLE, "starts that came to this motion"),
 }
-"""By the field of `FoundMotion` that they keep."""
+"""Columns by the field of `FoundMotion` that they store."""
 FOUND_SHARE = {
     "share": _of_motion("found_share", REAL, "share of starts that come to this motion"),
     "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
     "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
 }
-"""By the field of `Share` that they keep."""
+"""Columns by the field of `Share` that they store."""
 ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "starts followed where the start is forgotten"),
     "asked": Column("found_asked", WHOLE, "1", "place of the motion that the start asked for came to"),
@@ -177,7 +177,7 @@ ENSEMBLE_NUMBERS = {
     "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
     "followed_s": Column("followed_in_all", REAL, "s", "time that all starts together were followed"),
 }
-"""By the field of `Ensemble` that they keep."""
+"""Columns by the field of `Ensemble` that they store."""
 ESCAPE_NUMBERS = {
     "rate_per_s": Column("escape_rate", REAL, "s-1", "rate at which chaos dies out"),
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
@@ -185,7 +185,7 @@ ESCAPE_NUMBERS = {
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
     "chaotic_s": Column("chaotic_time", REAL, "s", "time that all starts together were in chaos"),
 }
-"""By the field of `EscapeRate` that they keep."""
+"""Columns by the field of `EscapeRate` that they store."""
 OTHERS = (
     Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
     Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),
@@ -214,7 +214,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Grid:
-    """A grid of points, numbered with the last axis running fastest (C order)."""
+    """A grid of points, numbered in C order: the index of the last axis changes fastest."""
 
     shape: tuple[int, ...]
     is_ordered: tuple[bool, ...]
@@ -222,11 +222,11 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return math.prod(self.shape)
 
     def place(self, number: int) -> tuple[int, ...]:
-        """Index of a point along each axis."""
+        """Return the index of a point along each axis."""
         place = []
         for length in reversed(self.shape):
             number, index = divmod(number, length)
@@ -234,7 +234,7 @@ class Grid:
         return tuple(reversed(place))
 
     def neighbours(self, number: int) -> Iterator[int]:
-        """Points one step away along the ordered axes."""
+        """Yield the points one step away along the ordered axes."""
         stride, rest = 1, number
         for length, is_ordered in zip(reversed(self.shape), reversed(self.is_ordered), strict=True):
             rest, index = divmod(rest, length)
@@ -288,13 +288,13 @@ class GridPlan(FrozenModel, ABC):
 
     @property
     def grid(self) -> Grid:
-        """All points."""
+        """Grid of all points."""
         return Grid(
             tuple(len(axis.values) for axis in self.axes), tuple(axis.is_ordered for axis in self.axes)
         )
 
     def coordinates(self, number: int) -> dict[str, float | str]:
-        """Values of the axes at a point."""
+        """Return the values of the axes at a point."""
         place = self.grid.place(number)
         return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
 

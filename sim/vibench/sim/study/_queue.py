@@ -18,12 +18,12 @@ from ._executor import Bundle, Executor, Reply
 from ._grid import TAKEN, Grid, PointState
 from ._store import Arrays, PointAnswer, Store, is_failed, states
 
-# Which points of a study may be computed now: those whose predecessor is done, longest first.
+# A point may be computed when its predecessor is done; ready points are started longest first.
 #
-# How long each point of a study will take: first as planned, then as its neighbours took.
+# The time of a point is first estimated from its plan, later from the times of its neighbours.
 
 SHORTEST_S = 1e-6
-"""Shortest time of a point, to keep ratios finite."""
+"""Shortest time of a point [s], to keep ratios finite."""
 
 
 class Costs:
@@ -45,7 +45,7 @@ class Costs:
         return float(self._estimate_s[number])
 
     def learn(self, number: int, taken_s: float) -> Iterator[int]:
-        """Record the time of a point; return the neighbours whose estimates change."""
+        """Record the time of a point; yield the neighbours whose estimates change."""
         self._taken_s[number] = max(taken_s, SHORTEST_S)
         for each in self._grid.neighbours(number):
             if np.isnan(self._taken_s[each]):
@@ -57,7 +57,7 @@ class Costs:
     def left_s(self, is_missing: NDArray[np.bool_]) -> float:
         """Return the worker time of missing points, shape (points,) [s].
 
-        Plans without a finished neighbour are scaled by the ratio of actual to planned times so far.
+        Planned times of points without a finished neighbour are scaled by actual over planned time so far.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
@@ -67,14 +67,14 @@ class Costs:
 
 
 NOBODY = -1
-"""Predecessor of a point that depends on none."""
+"""Predecessor of a point that depends on no other."""
 
 
 class PointScheduler:
-    """Remaining work in the order of starting.
+    """Remaining points in the order of starting.
 
-    Starting the longest first keeps all workers busy to the end; a point counts with the planned time of
-    all that wait for it in its chain. Each point is taken once, unless it is put back.
+    Starting the longest first keeps all workers busy to the end; the time of a point includes all points
+    that wait for it in its chain. Each point is taken once, unless it is put back.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
@@ -112,7 +112,7 @@ class PointScheduler:
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Take the longest ready point, and short ones with it up to ``worth_s``."""
+        """Take the longest ready point, and further short ones up to ``worth_s`` in total."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -168,7 +168,7 @@ class PointScheduler:
         heapq.heappush(self._queue, (-self._weight(number), number))
 
     def _pop(self) -> int | None:
-        """Longest point that is ready; entries overtaken by an answer or a better estimate are dropped."""
+        """Return the longest ready point; drop entries with an outdated estimate or an answer."""
         while self._queue:
             weight, number = heapq.heappop(self._queue)
             if self._is_ready(number) and -weight == self._weight(number):
@@ -176,7 +176,7 @@ class PointScheduler:
         return None
 
     def _times_behind(self) -> NDArray[np.float64]:
-        """Planned time of everything that waits for a point, directly or through others, shape (points,)."""
+        """Return the planned time of all points that wait for a point, directly or not, shape (points,)."""
         behind = np.zeros(len(self._after))
         for last in np.flatnonzero(self._next == NOBODY):
             number, sum_s = int(last), 0.0
@@ -189,17 +189,17 @@ class PointScheduler:
 
 
 MOST_IN_BUNDLE = 64
-"""Most results that may be lost with their worker."""
+"""Most points in a bundle: all their results are lost if a worker is lost."""
 SHARE = 8
-"""Largest bundle relative to the remaining work per worker, so that all end together."""
+"""Remaining work per worker over the largest bundle, so that all workers end at about the same time."""
 QUEUED_PER_SLOT = 2
-"""Bundles per worker: one running and the next, so that it never waits."""
+"""Bundles per worker: one that is computed and one that waits, so that no worker is idle."""
 LOOK_S = 0.2
 """Interval of checks for a cancellation [s]."""
 
 
 class StudyEnd(StrEnum):
-    """How a session ended."""
+    """End of a session."""
 
     COMPLETE = "complete"
     CANCELLED = "cancelled"
@@ -213,21 +213,21 @@ class Points(Protocol):
 
     @property
     def grid(self) -> Grid:
-        """All of them."""
+        """Grid of all points."""
 
     @property
     def after(self) -> NDArray[np.int64]:
-        """Point that each one continues, or NOBODY, shape (points,)."""
+        """Point that each point continues, or NOBODY, shape (points,)."""
 
     @property
     def planned_s(self) -> Floats:
-        """Time that each point is planned to take, shape (points,)."""
+        """Planned time of each point, shape (points,)."""
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute from the results so far; called again when all have an answer."""
+        """Return the points to compute, given the results so far; called again when all have an answer."""
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
-        """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
+        """Return the scene of a point whose predecessor, if any, is done; ValueError if not allowed."""
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
         """Return the values of a prediction that the file stores."""
@@ -243,7 +243,7 @@ def run_points(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute all points that are wanted and that the store misses, until ``cancelled``; as `run_study`."""
+    """Compute all wanted points that are missing in the store, until ``cancelled``; see `run_study`."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)
@@ -299,7 +299,7 @@ class _Session:
             self._out += 1
 
     def keep(self, replies: Sequence[Reply]) -> None:
-        """Keep all answers in one commit, and note what they mean for the rest."""
+        """Store all answers in one commit, and update the remaining work."""
         answers = [answer for reply in replies for answer in self._answers(reply)]
         if answers:
             self._store.keep(answers)
@@ -314,7 +314,7 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Workers need time to start, so their pace is measured afterwards.
+            # Workers need time to start, so their speed is measured after the first answers.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:
@@ -324,7 +324,7 @@ class _Session:
         return Progress(released - self._scheduler.left, released, self._left_s(), note)
 
     def _left_s(self) -> float | None:
-        """Time that the rest takes, at the pace of the workers since the first answer."""
+        """Return the remaining time, from the speed of the workers since the first answer."""
         if not self.is_unfinished:
             return 0.0
         if self._taken_s == 0.0:
@@ -332,7 +332,7 @@ class _Session:
         return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
 
     def _look(self) -> None:
-        """Add up the work that is left, now and then: there may be millions of points."""
+        """Update the remaining work, but not at every call: there may be millions of points."""
         now_s = time.monotonic()
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s

@@ -26,18 +26,18 @@ Plan = TypeVar("Plan", bound=GridPlan)
 
 @dataclass(frozen=True)
 class Places:
-    """Byte offsets of everything that is written later."""
+    """Byte offsets of the datasets that are written during a run."""
 
     columns: Mapping[str, int]
     session_columns: Mapping[str, int]
     n_sessions: int
     sessions: int
-    """How many sessions there have been."""
+    """Number of sessions so far."""
 
 
 @dataclass(frozen=True)
 class Session:
-    """One go at a study."""
+    """One session: the first run of a study, or a resumption."""
 
     started_utc: str
     software_json: str
@@ -45,13 +45,13 @@ class Session:
 
 
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
-    """Read what was requested; raises StudyError when the file is none of a plan of this ``kind``."""
+    """Read the plan of a file; raises StudyError when the file does not contain this ``kind`` of plan."""
     with _open_store(path, kind) as file:
         return _plan(path, file, kind)
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Read every answer, each of shape (points, ...); a point that is under way counts as missing.
+    """Read all columns, each of shape (points, ...); points that are being computed count as missing.
 
     Raises StudyError when the file cannot be read, or is of another kind than the plan.
     """
@@ -60,7 +60,7 @@ def read_arrays(path: Path, plan: GridPlan) -> Arrays:
 
 
 def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
-    """Read who computed, and when."""
+    """Read the sessions: time, software and executor."""
     with _open_store(path, kind) as file:
         group = file[layout.SESSIONS]
         rows = range(int(group[layout.N_SESSIONS][0]))
@@ -69,7 +69,7 @@ def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
 
 
 def places_of(path: Path, plan: GridPlan) -> Places:
-    """Find the places of everything that is written later."""
+    """Return the byte offsets of the datasets that are written during a run."""
     with _open_store(path, type(plan)) as file:
         group = file[layout.SESSIONS]
         return Places(
@@ -100,14 +100,14 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 @contextmanager
 def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    # h5py, which answers in memory do without.
+    # Imported here, because results in memory do not need h5py.
     from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     if not path.is_file():
         raise StudyError(f"{path} does not exist, or is not a file; give the path of a {kind.called}'s file.")
     try:
-        # With HDF5's usual lock, which the writer's allows: a process that has the file open elsewhere, in
-        # xarray for example, cannot open it with another one.
+        # Use HDF5's default lock, which the writer's lock allows: HDF5 refuses another kind of lock if this
+        # process has already opened the file, for example in xarray.
         file = open_hdf5(path)
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
@@ -150,9 +150,9 @@ def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
 
 Value = float | str
 SHOWN_VALUES = 8
-"""Values of an axis that a message lists."""
+"""Number of values of an axis that a message lists."""
 SAME = 1e-9
-"""A number this close to a value of an axis, relatively, means that value."""
+"""Relative tolerance within which a number is taken as a value of an axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +161,9 @@ class GridResults(Generic[Plan]):
 
     plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
-    """One row a point, by column; as the file holds them."""
+    """Arrays by column, with one row per point, as in the file."""
     sessions: tuple[Session, ...] = ()
-    """Who computed, and when; empty for a study that was kept in memory."""
+    """Sessions that computed the results; empty for a study in memory."""
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
@@ -177,16 +177,16 @@ class GridResults(Generic[Plan]):
 
     @property
     def is_complete(self) -> bool:
-        """Whether every point has an answer, good or bad."""
+        """Whether every point has a result or an error."""
         return bool(np.all(states(self.arrays) != PointState.MISSING))
 
     @property
     def kept(self) -> int:
-        """How many points have an answer, good or bad."""
+        """Number of points with a result or an error."""
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
 
     def values(self, name: str, **fixed: Value) -> Floats:
-        """One quantity over the axes, NaN where it is not known.
+        """Return one quantity over the axes, NaN if unknown.
 
         Raises InvalidStudy when there is no such column, axis or value.
 
@@ -195,7 +195,7 @@ class GridResults(Generic[Plan]):
         name
             A column, such as ``"response_i"``; numbers only.
         **fixed
-            Axes that take one value and vanish: ``amplitude=5e-6, model="hertz"``.
+            Axes with a fixed value, which the result does not have: ``amplitude=5e-6, model="hertz"``.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"
@@ -213,7 +213,7 @@ class GridResults(Generic[Plan]):
         return np.asarray(whole[self._place(fixed)])
 
     def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
-        """Where, and why, there is no answer: the scene could not be computed, or its run was lost."""
+        """Yield position and reason of each failure: a scene that is not allowed, or a lost run."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.STOPPED) | (state == PointState.FAILED)):
             why = ENDED if state[number] == PointState.STOPPED and ENDED in self.arrays else MESSAGE
@@ -241,7 +241,7 @@ class StudyResults(GridResults[Study]):
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:
-        """Yield the answers of all points that were computed, in the order of the arrays."""
+        """Yield the predictions of all computed points, in the order of the arrays."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.DONE) | (state == PointState.STOPPED)):
             yield self._prediction(int(number))
@@ -269,9 +269,9 @@ class StudyResults(GridResults[Study]):
 
 
 def open_study(path: Path | str) -> StudyResults:
-    """Read a study's file, finished or growing.
+    """Read the file of a study, complete or still being computed.
 
-    Raises StudyError when it is not a study's file, or another version's.
+    Raises StudyError if it is not the file of a study, or of another version.
     """
     path = Path(path)
     study = read_plan(path, Study)
@@ -279,7 +279,7 @@ def open_study(path: Path | str) -> StudyResults:
 
 
 def results_of(study: Study, arrays: Arrays) -> StudyResults:
-    """Return what a store in memory holds."""
+    """Return the results in a memory store."""
     return StudyResults(study, {name: values.copy() for name, values in arrays.items()})
 
 

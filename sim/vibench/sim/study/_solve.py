@@ -42,41 +42,41 @@ from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of, cut_text
 from ._study import GivenStart, Start, Study, continued_from, study_solver
 
-# A study's points as scenes: what each one begins from, and what is kept of its answer.
+# Scenes of a study's points: their starts, and the stored part of their results.
 #
-# The identity of a scene: a digest of everything it says, the same in every process on every machine.
+# The identity of a scene is a digest of its content, the same in every process on every machine.
 
 _scenes = TypeAdapter(Scene)
 
 
 def scene_identity(scene: Scene, continued: str = "") -> str:
-    """Digest of a scene's content.
+    """Return the digest of a scene's content.
 
     Parameters
     ----------
     scene
-        Numbers count to the last bit; the order of fields does not.
+        Scene. Every bit of its numbers affects the digest; the order of fields does not.
     continued
-        Identity of the scene whose end is this one's start, if it continues one. It stands for the state and
-        the phase at the start, which follow from it.
+        Identity of the scene that this one continues, if any. It replaces state and phase at the start, which
+        follow from it.
     """
     content = _scenes.dump_python(scene, mode="python")
     # A name does not change the motion.
     content["start"].pop("name", None)
     if content["target"] is None:
-        # Files from before there were targets know their scenes.
+        # Keep the digests of files that are older than targets.
         del content["target"]
     if continued:
         content["start"] = {"continues": continued}
         del content["drive"]["phase_rad"]
-    # Python writes floats with the shortest exact digits, and infinity as a word.
+    # Python writes the shortest digits that represent a float exactly, and infinity as a word.
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
 
 
 PLANNED = 2000
-"""Most points that are planned individually; in a larger study, every n-th point stands for those up to the
-next."""
+"""Most points that are planned individually; in a larger study, every n-th point represents those up to
+the next."""
 
 
 def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
@@ -102,14 +102,14 @@ def planned_times(grid: Grid, planned: Callable[[int], float]) -> Floats:
 
 
 def continued_point(before: int, arrays: Arrays) -> int:
-    """Return a point's predecessor, ``before``; NOBODY where ``arrays`` have no finite end of it."""
+    """Return ``before``, or NOBODY if ``arrays`` contain no finite final state of this predecessor."""
     if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
         return NOBODY
     return before
 
 
 def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
-    """Phase [rad] at which the drive of ``before`` stopped, by ``arrays``: the next one goes on there."""
+    """Return the phase [rad] at the end of point ``before`` in ``arrays``; the next point continues there."""
     turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
     return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
 
@@ -125,8 +125,8 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Worker time of a bundle, worth a few milliseconds of transfer on a cluster; and of a bundle that fills the
-SIMD lanes."""
+"""Worker time of a bundle [s], long compared with a transfer on a cluster of a few milliseconds; and of a
+bundle for SIMD batches."""
 
 
 class Expansion:
@@ -155,7 +155,7 @@ class Expansion:
     def scene(self, number: int, arrays: Arrays) -> Scene:
         """Return the scene of a point whose predecessor, if any, is done.
 
-        If the predecessor has no finite final state, the point begins at rest, and its ``continues`` says so.
+        If the predecessor has no finite final state, the point starts at rest: ``continues`` is NOBODY.
         Raises ValueError when a scene of these numbers is not allowed.
         """
         before = self._predecessor(number, arrays)
@@ -196,7 +196,7 @@ class Expansion:
         return end_phase(self._study.frequencies_hz[self.grid.place(before)[-1]], before, arrays)
 
     def unchained(self, number: int) -> Scene:
-        """Make the scene of a point that continues no other."""
+        """Return the scene of a point that does not continue another."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
         match start:
@@ -324,7 +324,7 @@ def run_study(
 
     Results do not depend on the executor or the order: scenes are independent, and a point that continues
     another waits for it. An error in a scene becomes the result of that point. Raises StudyError when the
-    store or the executor fails; what was kept before is kept.
+    store or the executor fails; results stored before are kept.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Stores of a running study, and the store in memory; the store in a file imports h5py."""
+"""Interface of stores of a running study, and the store in memory."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,9 +25,9 @@ class PointAnswer:
     number: int
     state: layout.PointState
     cells: dict[str, layout.Cell]
-    """Values by column; others stay missing."""
+    """Values by column; other columns stay missing."""
     taken_s: float = math.nan
-    """Processor time, where it is known."""
+    """Processor time [s]; NaN if unknown."""
 
 
 def empty_arrays(plan: layout.GridPlan) -> Arrays:
@@ -41,15 +41,15 @@ def empty_arrays(plan: layout.GridPlan) -> Arrays:
 def put(
     arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
 ) -> Iterator[tuple[layout.Column, bytes]]:
-    """Write an answer's cells into the arrays; each comes back as the bytes of the file.
+    """Write an answer's cells into the arrays; yield each column with its bytes for the file.
 
-    The state is not among them: it is written when the cells are safe.
+    The state is not included: it is written after the cells.
     """
     for column in columns:
         if column.name in answer.cells:
             values = arrays[column.name]
             values[answer.number] = answer.cells[column.name]
-            # A slice: numpy strips the padding of a single text.
+            # Use a slice, because numpy strips the padding of a single text.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
@@ -63,12 +63,12 @@ def is_failed(state: NDArray[np.uint8] | layout.PointState) -> NDArray[np.bool_]
 
 
 def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
-    """State of every point, shape (points,)."""
+    """Return the state of every point, shape (points,)."""
     return np.asarray(arrays[layout.STATE], dtype=np.uint8)
 
 
 class Store(Protocol):
-    """Store of answers. Points with an initial answer are not computed."""
+    """Store of answers. Points that already have an answer are not computed."""
 
     @property
     def arrays(self) -> Arrays:
@@ -78,10 +78,10 @@ class Store(Protocol):
         """Record the start of a session and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store answers safely before returning."""
+        """Store answers; return when they are safe."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store filled-in points, by column; their state says so."""
+        """Store filled-in points, by column, with the state FILLED."""
 
 
 class MemoryStore:
@@ -94,14 +94,14 @@ class MemoryStore:
         """Do nothing: a store in memory has no sessions."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Keep answers."""
+        """Store answers."""
         for answer in answers:
             for _ in put(self.arrays, self._columns, answer):
                 pass
             self.arrays[layout.STATE][answer.number] = answer.state
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Fill in many points that are not computed."""
+        """Store filled-in points, by column, with the state FILLED."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
@@ -127,7 +127,7 @@ def _cells_of(value: object, columns: Mapping[str, layout.Column]) -> dict[str, 
 
 
 def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
-    """Cells of an ensemble; those of its motions have a place for each."""
+    """Return the cells of an ensemble; those of its motions have one component per motion."""
     if ensemble is None:
         return {}
     kept = ensemble.motions[: layout.MOST_FOUND]
@@ -145,13 +145,13 @@ def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, layout.Cell]:
 
 
 def _fill_places(column: layout.Column, values: list[float | None]) -> layout.Cell:
-    """Fill the places of a column, those of absent values and of absent motions with what is missing."""
+    """Return the components of a column; absent values and motions are marked as missing."""
     filled = [column.missing if value is None else value for value in values]
     return tuple(filled + [column.missing] * (layout.MOST_FOUND - len(filled)))  # type: ignore[arg-type]
 
 
 def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
-    """Make the ensemble of a point from its cells; None where it has none."""
+    """Return the ensemble of a point from its cells; None if it has no ensemble."""
     if _number(arrays[layout.STARTS][number]) is None:
         return None
     ensemble = {
@@ -195,7 +195,7 @@ def prediction_at(
     arrays
         Columns of a study, each of shape (points,).
     number
-        Which point.
+        Number of the point.
     frequency_hz, amplitude_m, accuracy, start
         Values of the study at this point.
     """
@@ -218,7 +218,7 @@ def prediction_at(
 
 
 def cut_text(text: str) -> bytes:
-    """UTF-8 bytes of a text, as many as a column holds, cut between characters."""
+    """Return a text as UTF-8 bytes, cut between characters to the size of a column."""
     return text.encode()[: layout.TEXT_BYTES].decode(errors="ignore").encode()
 
 

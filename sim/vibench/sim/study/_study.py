@@ -32,9 +32,9 @@ WHOLE = 1e-9
 
 
 def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
-    """List `start`, `start` + `step`, ... up to `stop`, which is included when it is hit, in one unit [Hz].
+    """List `start`, `start` + `step`, ... up to `stop`, which is included when it is hit [Hz].
 
-    Raises ValueError when nothing, or too much, would be listed.
+    Raises ValueError when the range is empty or too long.
     """
     if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
         raise ValueError(
@@ -48,10 +48,10 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 
 
 def expand_ranges(given: object) -> object:
-    """Replace tables with start, stop and step by their values; anything else is left to its validator."""
+    """Replace tables with start, stop and step by their values, also in lists; keep anything else."""
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
-            # Not isinstance: true is an int too.
+            # Not isinstance, because true is also an int.
             if not {type(start), type(stop), type(step)} <= {float, int}:
                 raise ValueError(
                     f"a range from {start!r} to {stop!r} by {step!r} is not allowed: give three numbers"
@@ -84,7 +84,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 MOST_POINTS = 10_000_000
 """Most points: a file of 2 GB."""
 AS_DESCRIBED = "as described"
-"""Label of an axis whose values only the specimen defines."""
+"""Label of an axis whose values are defined by the specimen only."""
 
 
 class Start(StrEnum):
@@ -124,11 +124,11 @@ NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), After
 Frequencies = Annotated[Positive, BeforeValidator(expand_ranges)]
 
 TargetError = Annotated[float, Field(gt=0.0, le=1.0), NumberWith("%")]
-"""Relative: 0.01, or "1 %"."""
+"""Relative error: 0.01, or "1 %"."""
 TargetTime = Annotated[float, Field(gt=0.0, lt=math.inf), NumberWith("ms", "s", "min", "h")]
-"""In seconds, or "200 ms", "2 s", "5 min"."""
+"""Time in seconds, or with a unit: "200 ms", "2 s", "5 min"."""
 StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
-"""What has one number a point."""
+"""Observables with one number per point."""
 
 
 def _own_law(said: dict[str, Any]) -> tuple[str, ...]:
@@ -146,13 +146,13 @@ def _own_gap(said: dict[str, Any]) -> tuple[float, ...] | None:
 
 
 def _described_specimen(said: dict[str, Any]) -> SpecimenTable:
-    """Return the specimen of a study that is being read; the usual one where its own is not allowed."""
+    """Return the specimen of a study that is being read; the default one if that was not valid."""
     found: SpecimenTable = said.get("specimen") or usual_specimen()
     return found
 
 
 AXES_OF_SPECIMEN = 3
-"""The first axes of a study: contact law, damping, gap."""
+"""Number of first axes of a study that define the specimen: contact law, damping, gap."""
 
 
 class Study(GridPlan):
@@ -210,7 +210,7 @@ class Study(GridPlan):
 
     @model_validator(mode="after")
     def _scenes_are_allowed(self) -> Self:
-        """Refuse an unknown model or a too short window before any point."""
+        """Refuse an unknown model or a too short window before any point is computed."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
                 self.scene((model, 0, gap, 0, 0, 0), Rest())
@@ -282,7 +282,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis of numbers, or of the label for values that only the specimen defines."""
+    """Return an axis of numbers, or with one label if the specimen defines the value."""
     return (
         StudyAxis(name, (AS_DESCRIBED,), "", long_name)
         if values is None
@@ -291,12 +291,12 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
 
 
 def continued_from(frequency_hz: float) -> str:
-    """Name of a start that is the end of another point."""
+    """Return the name of a start at the end of another point."""
     return f"end at {frequency_hz:g} Hz"
 
 
 OTHER_STARTS = 8
-"""Scenes that a point counts for if it may depend sensitively on its start: the fewest starts."""
+"""Number of runs counted for a point if its motion may depend sensitively on the start."""
 
 
 def study_solver(study: Study) -> Solver:
@@ -313,10 +313,10 @@ def study_solver(study: Study) -> Solver:
 
 
 MOST_GAPS = 1000.0
-"""Base amplitude in gaps above which a warning is due: 45 mm at the paper's gap exceeds the stroke of any
+"""Base amplitude, in gaps, above which a warning is given: 45 mm at the paper's gap exceeds the stroke of any
 shaker."""
 WIDEST_M = 0.1
-"""Clearance above which a warning is due: a specimen on a shaker is hardly larger."""
+"""Clearance above which a warning is given: a specimen on a shaker is hardly larger."""
 _MICRO = 1e-6
 
 
