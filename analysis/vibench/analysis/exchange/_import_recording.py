@@ -251,7 +251,7 @@ def _peak(source: Source, channel: SourceChannel) -> float:
 def _power_of_two_above(peak: float, name: str) -> float:
     """Return the smallest power of two that is not below a peak in the file of this name.
 
-    ¶ Raises UnusableData when a recording cannot store the peak.
+    Raises UnusableData when a recording cannot store the peak.
     """
     if not LEAST_PEAK < peak < MOST_PEAK:
         if peak == 0:

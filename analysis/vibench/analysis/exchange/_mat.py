@@ -188,9 +188,9 @@ FEWEST_SAMPLES = 2
 
 @contextmanager
 def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
-    """Open a file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``. ¶ Raises
+    """Open a file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``.
 
-    ValueError when it is damaged.
+    Raises ValueError when it is damaged.
     """
     if h5py.is_hdf5(path):
         with open_hdf5_source(path) as source:

@@ -227,7 +227,7 @@ def _least_squares(
 def streamed_response(
     channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest = DEFAULT_REQUEST
 ) -> NoiseResponse:
-    """Estimate the transmission from all usable non-periodic noise. ¶
+    """Estimate the transmission from all usable non-periodic noise.
 
     Raises NotEnoughData when less than two segments are left.
     """

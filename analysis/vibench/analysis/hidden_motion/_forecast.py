@@ -59,7 +59,7 @@ class Forecaster:
     ) -> Forecast | None:
         """Forecast the motion after ``at``; ``states`` are those of the newest samples.
 
-        None if the base hardly moves or does not follow the sine.
+        None if the filter cannot follow the forecast base motion to its end.
         """
         rate = motion.sample_rate_hz
         numbers = motion.first_sample + at.sample - np.arange(states.shape[0] - 1, -1, -1)

@@ -43,7 +43,7 @@ _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
-"""Relative error of squared frequencies due to the converter clock (50 ppm), invisible in recordings."""
+"""Relative standard error of a squared frequency by a converter clock within 50 ppm, which nothing shows."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,

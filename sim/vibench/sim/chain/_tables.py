@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Lengths of windows, the longest first [s]."""
     clash: Vector
-    """Least distance of cells that may both be in contact in such a window; shape (windows,)."""
+    """Cells at most this far apart may not both be in contact in such a window; shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:

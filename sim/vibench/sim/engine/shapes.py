@@ -177,7 +177,7 @@ AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
 def _course() -> Table:
     """Return the map from F at the points and the end of a step to coefficients in powers of (s - 1).
 
-    Shape (POINTS + 1, POINTS); entries beyond the degree are zero.
+    Shape (GAUSS_POINTS + 1, GAUSS_POINTS); entries beyond the degree are zero.
     """
     weights = np.append(np.ones(GAUSS_POINTS), END_WEIGHT)
     known = np.vander(np.append(POINTS_AT, 1.0) - 1.0, COURSE_DEGREE + 1, increasing=True)
@@ -189,7 +189,7 @@ COURSE: Table = _course()
 
 
 def _power_shares() -> Table:
-    """Integrals of (c_i - s)^m times the cardinal polynomials, shape (ORDER, POINTS, POINTS + 1)."""
+    """Integrals of (c_i - s)^m times cardinal polynomials, shape (ORDER, GAUSS_POINTS, GAUSS_POINTS + 1)."""
     places, weights = np.polynomial.legendre.leggauss(POWER_QUADRATURE)
     places, weights = 0.5 * (places + 1.0), 0.5 * weights
     ends = np.append(POINTS_AT, 1.0)

@@ -76,7 +76,7 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Drive periods by default, as a multiple of the longest searched period."""
+"""Base of the numbers that label a kind of motion with its period; above the longest searched period."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)

@@ -174,7 +174,7 @@ def integrate(
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:
-    """Refuse a limit of the impact rate that is not positive."""
+    """Refuse a negative or infinite limit of the impact rate."""
     if not 0.0 <= max_impact_rate_hz < math.inf:
         raise ValueError(
             f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."

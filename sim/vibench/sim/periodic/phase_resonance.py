@@ -27,7 +27,7 @@ from .shooting import OrbitShape, PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
-"""Step: a tenth of a decade of level, or a tenth of the gap."""
+"""Steps along the branch; one decade of level has the length `LENGTH_PER_DECADE`."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
 """A change of the frequency by this share counts as one unit of length."""

@@ -222,7 +222,7 @@ def periodic_orbit(
     specimen, drive
         The drive's amplitude must be positive, its phase zero.
     shape, periods
-        How it repeats: see `OrbitShape`; ``periods`` is for a repeated one.
+        How it repeats: see `OrbitShape`; a mirrored motion needs an odd number of ``periods``.
     start
         x, y, z, vx, vy, vz at time zero, shape (6,); None: the state after 400 periods from rest.
     """

@@ -35,7 +35,7 @@ from ..specimen.state import Floats
 FLIGHT, STEPS = 5e-5, 3.5e-4
 """Cost of one second of motion between contacts, and under a force at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
-"""Cost of an impact: in closed form, by Gauss points, and step by step [s]."""
+"""Cost of an impact on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
 """Factors of the cost of contacts if a small change is propagated, because collisions then need steps."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
@@ -117,7 +117,7 @@ class FollowedRun:
         self.specimen = specimen
         self.drive = drive
         self.outcome = Outcome.REACHED_END
-        """Number of impacts in all stretches so far."""
+        """Outcome of the last stretch."""
         self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)

@@ -141,7 +141,7 @@ SLOW = 0.9
 """Drive frequency over the lowest natural one, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Offset at which p just reaches a stop; it grows with the cube root of the excess of p."""
+"""Impacts per drive period where the linear p equals the gap; grows with the cube root of p over the gap."""
 MICROMETRES = 1e6
 
 
@@ -369,5 +369,5 @@ def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
 
 
 def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Return whether the drive is below all modes, where most motions depend on the start."""
+    """Return whether the drive is far below all modes, where other starts are not planned."""
     return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

@@ -167,7 +167,7 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
-        """Time of the last check of both motions."""
+        """Copies of both motions at their last check."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
         """All periodic motions found."""

@@ -131,7 +131,7 @@ def _returns_nowhere(points: Floats, tolerance: float) -> bool:
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Return the number of last states for which a section nearly repeats after a period."""
+    """Return how many states pass before a section nearly repeats after a period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)

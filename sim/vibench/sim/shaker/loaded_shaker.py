@@ -20,7 +20,7 @@ from ..specimen.specimen import Specimen
 FloatArray = NDArray[np.float64]
 
 STOP_STIFFNESS_N_PER_M = 2e5
-"""Stiffness of the rubber stops that end the stroke; assumed: 45 N press 0.2 mm into them."""
+"""Stiffness of the rubber stops that end the stroke; assumed: 45 N press 0.23 mm into them."""
 STOP_DAMPING_NS_PER_M = 50.0
 """Damping of these stops; assumed: the table rebounds with about half its energy."""
 

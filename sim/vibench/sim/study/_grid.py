@@ -57,9 +57,9 @@ SESSION_COLUMNS = (
     TextColumn("software_json", 512),
     TextColumn("executor", 160),
 )
-"""Number of sessions; a session is the first run of a study or a resumption."""
+"""Columns of the sessions; a session is the first run of a study or a resumption."""
 MOST_SESSIONS = 1024
-"""Row of all further sessions."""
+"""Rows; further sessions share the last one."""
 
 
 Cell = float | int | bytes | tuple[float, ...]

@@ -172,7 +172,7 @@ class GridResults(Generic[Plan]):
 
     @property
     def state(self) -> NDArray[np.uint8]:
-        """A `JournalPointState` for each point, over all axes."""
+        """A `PointState` for each point, over all axes."""
         return states(self.arrays).reshape(self.plan.grid.shape)
 
     @property

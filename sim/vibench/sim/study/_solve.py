@@ -331,7 +331,7 @@ def run_study(
     study, executor, store
         Study, executor of its scenes, and store of the results.
     observer
-        Called after every result.
+        Called after every batch of results.
     cancelled
         Called between results; True ends the run.
     """
