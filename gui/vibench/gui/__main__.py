@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QLabel
 
 NO_WINDOW = 1
-"""Exit code where no window can be shown."""
+"""Exit code when no window can be shown."""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -1,6 +1,6 @@
 """Work that takes longer than a frame, done in spawned processes.
 
-`Background` hands functions to a pool and polls for answers; `LatestRequest` keeps only the newest
-question. Functions, arguments and answers must be importable and picklable, and their modules
-free of Qt widgets: every process that calls them imports them.
+`Background` runs functions in a pool of processes and polls for answers; `LatestRequest` keeps only the
+newest question. Functions, arguments and answers must be importable and picklable. Their modules must not
+import Qt widgets, because every worker process imports these modules.
 """

@@ -1,4 +1,4 @@
-"""Work that takes longer than a frame: spawned processes do it, or the window, one step in each pass."""
+"""Run long work without blocking the window: in spawned processes, or step by step in the event loop."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -10,20 +10,20 @@ from vibench.sim.background import Job, Pool
 
 POLL_MS = 20
 LONGEST_S = 900.0
-"""Jobs that take longer are abandoned [s]."""
+"""Longest duration of a job, after which it is abandoned [s]."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
-    """Call a step in the next pass of the event loop, so that frames and input come in between."""
-    # Not 0: Qt then calls two steps before another timer.
+    """Call a step in the next pass of the event loop, so that drawing and input are handled first."""
+    # Not 0 ms, because Qt would then call two steps before it serves another timer.
     QTimer.singleShot(1, receiver, step)
 
 
 class Background(Pool, QObject):
-    """Spawned processes without Qt; their answers are delivered in the window's thread."""
+    """Pool of spawned processes without Qt; answers are delivered in the window's thread."""
 
     def __init__(self, workers: int, parent: QObject | None = None) -> None:
         QObject.__init__(self, parent)
@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Submits the newest question after a short pause; at most one question is being answered."""
+    """Queue for one question; a newer one replaces it, and it is submitted after a short pause."""
 
     def __init__(
         self,

@@ -1,6 +1,6 @@
 """The connection between the window and the engine's process.
 
-`Bridge` asks for status and samples at every tick, keeps what was answered last and sends commands; one
-thread without Qt waits for answers, so that the window never does. Its `Attendant` is fed here: an engine
-that misses it ramps down (docs/engine.md). A `LiveView` of the newest samples is kept for each run.
+`Bridge` requests status and samples at every tick, keeps the last answers and sends commands. A thread
+without Qt waits for the answers, so that the window does not. An `Attendant` reports that the window is
+alive; otherwise the engine ramps down (docs/engine.md). Each run has a `LiveView` of its newest samples.
 """

@@ -1,4 +1,4 @@
-"""The bridge between window and engine: status and samples come in, commands go out."""
+"""The connection between window and engine; it receives status and samples, and sends commands."""
 
 import threading
 from collections.abc import Callable
@@ -105,7 +105,7 @@ class _Call:
 
 
 class EngineLine:
-    """Starts an engine and sends requests from a thread without Qt; `drain` delivers the answers.
+    """Thread without Qt that starts an engine and sends requests; `drain` delivers the answers.
 
     Requests are sent only when the window makes them, so the engine notices a frozen window.
     """
@@ -117,7 +117,7 @@ class EngineLine:
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
         self.attendant: Attendant | None = None
-        """Reports to the engine that the window is alive; None before an engine exists."""
+        """Object that reports to the engine that the window is alive; None before an engine exists."""
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -146,11 +146,11 @@ class EngineLine:
             tell()
 
     def leave(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running, without waiting."""
+        """End the engine after a ramp-down, or leave it running; do not wait for this."""
         self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running, and wait."""
+        """End the engine after a ramp-down, or leave it running; wait until this is done."""
         self.leave(how)
         self._thread.join()
 
@@ -184,10 +184,10 @@ def _ignore(_: object) -> None:
 
 
 CATCH_UP_S = 2.0
-"""Older samples are not fetched after a pause; they are in the file, and the display shows the present."""
+"""Longest part fetched after a pause [s]; older samples are only in the file, not in the display."""
 
 PIECE_S = 0.2
-"""Duration of samples processed at once; a frame of a real instrument brings a quarter of that."""
+"""Duration of the samples processed in one step [s]; a real instrument delivers a quarter of it per frame."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -196,16 +196,16 @@ Snapshot = tuple[EngineStatus, SampleSlice | None]
 class Bridge(QObject):
     """The only connection between the window and the engine.
 
-    All stored values are what the engine reported last. The window's timer calls `tick`, which fetches
+    All stored values are those that the engine reported last. The window's timer calls `tick`, which fetches
     answers and sends new requests. The engine takes these requests as the sign that the window is alive.
     """
 
     noticed = Signal(object)
     armed = Signal(object)
     adopted = Signal(object)
-    """The `CampaignRequest` of a running engine that another window left."""
+    """`CampaignRequest` of a running engine, emitted after it was taken over from another window."""
     advanced = Signal()
-    """A requested step is done: a bench is open, a plan armed, or a run started."""
+    """Emitted when a requested step is done: a bench is open, a plan is armed, or a run has started."""
     recording_ended = Signal(object)
     """Path of a recording that has just ended."""
 
@@ -278,7 +278,7 @@ class Bridge(QObject):
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
             self.rig, request, self.status = found
             self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._emit_news(self.status)  # what happened before the next request
+            self._emit_news(self.status)  # show these messages now, not at the next tick
             self.adopted.emit(request)
 
         self._order(_adopt, keep)
@@ -330,7 +330,7 @@ class Bridge(QObject):
         line = self._line
 
         def over() -> None:
-            if self._line is line:  # skipped when the engine has ended, because its orders are forgotten too
+            if self._line is line:  # the orders of an ended engine are no longer counted
                 self._orders -= 1
 
         def answered(answer: Any) -> None:
@@ -375,7 +375,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Process one piece and schedule the rest; all samples after a pause would block the event loop."""
+        """Process one piece and schedule the rest; processing all at once would block the event loop."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:
@@ -429,7 +429,7 @@ _ADVANCES = frozenset(
         (EngineState.ARMED, EngineState.RUNNING),
     }
 )
-"""Steps after which an earlier complaint is out of date."""
+"""Changes of state after which an earlier error message no longer applies."""
 
 
 def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:

@@ -1,4 +1,4 @@
-"""Editors: one for every type of value that a plan may hold."""
+"""One editor for each type of value in a plan."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, q
 
 
 class Editor(Protocol):
-    """A widget that edits one value of a plan, in the plain types of a file."""
+    """A widget that edits one value of a plan; the value has the plain type that a file would hold."""
 
     @property
     def widget(self) -> QWidget:
@@ -64,9 +64,9 @@ class QuantityEditor:
 
 
 class Choice(QComboBox):
-    """A combo box that the mouse wheel changes only with the focus, and that ignores the space bar.
+    """A combo box that ignores the space bar, and the mouse wheel unless it has the focus.
 
-    The space bar freezes the picture of the Run page. F4 and Alt+Down open the list.
+    The space bar is reserved for freezing the pictures of the Run page. F4 and Alt+Down open the list.
     The width does not depend on the longest entry.
     """
 
@@ -79,7 +79,7 @@ class Choice(QComboBox):
         self.setMinimumContentsLength(self.LETTERS)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave the space bar to the page."""
+        """Pass the space bar on to the page."""
         if event.key() == Qt.Key.Key_Space:
             event.ignore()
         else:
@@ -91,7 +91,7 @@ class Choice(QComboBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the wheel without the focus, so that scrolling a form changes no value."""
+        """Ignore the mouse wheel unless the field has the focus, so that scrolling changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -99,7 +99,7 @@ class Choice(QComboBox):
 
 
 class _LineOnEach(QStyledItemDelegate):
-    """Shows a description beside each entry of the open list."""
+    """Delegate that shows a description beside each entry of the open list."""
 
     def initStyleOption(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
@@ -134,7 +134,7 @@ class ChoiceEditor:
             self._box.setCurrentIndex(place)
 
     def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
-        """List the values below headings, each with a line on it: heading and line by value."""
+        """List the values below headings; ``lines`` holds the heading and the description of each value."""
         blocked, chosen = self._box.blockSignals(True), self.content()
         self._box.clear()
         model = self._box.model()
@@ -153,7 +153,7 @@ class ChoiceEditor:
 
 
 class TextEditor:
-    """A word or a sentence; the plan itself judges it."""
+    """Editor of a text; the plan validates it."""
 
     complaint = ""
 
@@ -208,7 +208,7 @@ class SuggestionEditor:
 class ListEditor:
     """Editor of a list as one line of text: ``95, 266, 500``.
 
-    Numbers are read like those of a quantity field if their unit can be chosen.
+    If the unit can be chosen, each number is read as in a quantity field.
     """
 
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:

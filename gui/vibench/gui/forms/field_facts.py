@@ -38,16 +38,16 @@ class FieldFacts:
     name: str
     label: str
     unit: str
-    """SI unit, or a plain one."""
+    """Unit in the plan: an SI unit, or another one such as dB."""
     allowed: str
-    """``"above 0, at most 60 s"``; empty without limits."""
+    """Allowed range, such as ``"above 0, at most 60 s"``; empty without limits."""
     explanation: str
     examples: tuple[str, ...] = ()
     """Suggested texts; other texts may be typed."""
 
     @property
     def shown_unit(self) -> str:
-        """Unit of a plain number typed into the field."""
+        """Unit of a number that is typed without a unit."""
         return UNITS.in_field(self.unit)
 
     @property
@@ -63,7 +63,7 @@ class FieldFacts:
 
     @property
     def label_with_unit(self) -> str:
-        """Label and unit, at the beginning of a complaint."""
+        """Label with unit, shown at the beginning of a complaint."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Return the bounds as text, with the unit once, or at each bound if the unit can be chosen."""
+    """Return the bounds as text; the unit follows each bound if it can be chosen, otherwise the last."""
     each = f" {unit}" if unit in CHOICES else ""
     texts = ", ".join(_limit_texts(field, each))
     return texts if each or not texts else f"{texts} {unit}".strip()

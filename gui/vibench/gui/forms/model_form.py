@@ -46,7 +46,7 @@ def complaints_of(error: ValidationError) -> dict[Loc, str]:
 
 
 class ModelForm(QWidget):
-    """Edits a plan in the plain types of a file; the plan model validates it."""
+    """Form of a plan; its content has the plain types of a file, and the plan model validates it."""
 
     changed = Signal()
 
@@ -77,7 +77,7 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Return the content as a file would hold it, without empty fields unless None has a meaning."""
+        """Return the content as a file would hold it; omit empty fields, except where None has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         said = {
             name: value
@@ -173,7 +173,7 @@ class GroupEditor:
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
         self._memories: dict[str, dict[str, Any]] = {}
-        """Content of each kind when it was left."""
+        """Last content of each kind, shown again when that kind is chosen again."""
         self._usual: Mapping[str, Any] = {}
         self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
@@ -216,8 +216,8 @@ class GroupEditor:
     ) -> None:
         """Set starting values for the fields of a new kind, and describe the kinds in the list.
 
-        ``usual`` fills empty fields of any kind. ``fresh`` replaces, for its kind, what was typed for another
-        kind.
+        ``usual`` fills empty fields of any kind. ``fresh`` holds values by kind,
+        which replace those typed for another kind.
         ``lines`` holds the heading and the description of each kind.
         """
         self._usual, self._fresh = usual, fresh
@@ -279,7 +279,7 @@ class OptionalGroupEditor(GroupEditor):
 
 
 _DRAWN = frozenset({"excited_lines", "detection_lines"})
-"""Values that the plan draws itself; they are drawn again when other values change."""
+"""Fields that the plan fills by a random draw; they are not carried over to another kind."""
 
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
@@ -312,7 +312,7 @@ def _as_content(value: Any) -> Any:
 
 
 def _after_kind(editor: Editor, loc: Loc) -> Loc:
-    """Drop the kind, which pydantic puts into the place of an error and a form does not."""
+    """Remove the kind from the location of an error; pydantic includes it, the form does not."""
     if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
         return loc[1:]
     return loc

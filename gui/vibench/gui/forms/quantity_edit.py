@@ -47,7 +47,7 @@ def quantity_text(value: float, unit: str) -> str:
         if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
-            # Never in the SI unit: a plain number typed over it would be read in metres.
+            # Do not show the SI unit, because a plain number typed over it would be read in metres.
             return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()
@@ -62,7 +62,7 @@ def unit_of(text: str, unit: str) -> str:
 def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
     """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
-    A plain number is in the unit ``shown``; without one, in the unit of an empty field.
+    A number without a unit is read in the unit ``shown``, or else in the unit of an empty field.
     Raises ConfigurationError when the text is not a number or has another unit.
     """
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
@@ -94,19 +94,19 @@ def _scale(number: str, prefix: str) -> float:
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""Larger values are written without a prefix."""
+"""Value from which a quantity is written without a prefix."""
 _DIGITS = 6
 """Displayed digits of a long number; the stored value keeps all."""
 MOST_WHOLE = 1 << 53
-"""Larger integers are not represented exactly."""
+"""Largest integer up to which a float is exact."""
 MOST_TIMES = 1000.0
-"""A change by more than this factor is often a wrong unit and needs confirmation."""
+"""Factor of change above which a value must be confirmed, because it is often a wrong unit."""
 STEP = 0.05
 """Relative change per step: a small change that never crosses zero."""
 
 
 class QuantityEdit(QAbstractSpinBox):
-    """Edits a number in full precision; the field may be empty where that is allowed.
+    """Field for a number in full precision; it may be empty where that is allowed.
 
     The value changes when typing ends, not at every key.
     """
@@ -172,7 +172,7 @@ class QuantityEdit(QAbstractSpinBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the wheel without the focus, so that scrolling a form changes no value."""
+        """Ignore the mouse wheel unless the field has the focus, so that scrolling changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:

@@ -2,5 +2,5 @@
 
 `Page` is their base class; `AppContext` gives each page the bridge, settings, background work and signals to
 the window. `Selection` holds rig, test and campaign while they are edited. `UserActions` carries out commands
-of keys, menus and buttons. Pages know each other by name only.
+of keys, menus and buttons. Pages refer to each other by name only.
 """

@@ -1,4 +1,4 @@
-"""What all pages share: bridge, current selection, settings, background work, signals to the window."""
+"""Services of all pages: bridge, current selection, settings, background work, signals to the window."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -40,14 +40,14 @@ class SettingKey(StrEnum):
 
 
 class Settings:
-    """The settings file, an INI file that people may read and delete."""
+    """The settings file, in INI format; users may read and delete it."""
 
     def __init__(self, path: Path) -> None:
         self._store = QSettings(str(path), QSettings.Format.IniFormat)
 
     @property
     def complaint(self) -> str:
-        """The sentence that says that the file cannot be written; empty if everything is in it."""
+        """Message that the file cannot be written; empty if all settings are stored."""
         self._store.sync()
         if self._store.status() is QSettings.Status.NoError:
             return ""
@@ -103,7 +103,7 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.rig: Rig | None = None
-        """The selected rig, open or not."""
+        """The selected rig; its bench need not be open."""
         self.measurement: Measurement | None = None
         """The test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
@@ -140,10 +140,10 @@ WORKERS = 2
 
 
 class AppContext(QObject):
-    """The services of every page; pages know each other by name only."""
+    """Services of every page; pages refer to each other by name only."""
 
     folder_chosen = Signal(object)
-    """Folder of new recordings, after a change."""
+    """Folder of new recordings, emitted when it changes."""
     noticed = Signal(object)
     page_requested = Signal(str)
     """Name of a page to show."""
@@ -167,7 +167,7 @@ class AppContext(QObject):
         self.first_bench: Path | None = None
         """Configuration named on the command line; stored only after it could be used."""
         self.is_armed_read: Callable[[], bool] = lambda: True
-        """Whether the description of the armed test was displayed to its end; set by the Run page."""
+        """Function that returns whether the description of the armed test was read; set by the Run page."""
         self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
@@ -191,7 +191,7 @@ class AppContext(QObject):
 
     @property
     def patience_s(self) -> float:
-        """How long a run far from all limits may continue while the window does not answer [s]."""
+        """Time for which a run far from all limits may continue while the window does not respond [s]."""
         return self.settings.number(
             SettingKey.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
         )

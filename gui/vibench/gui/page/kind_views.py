@@ -37,4 +37,4 @@ KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
     },
     {},
 )
-"""By kind of excitation; the second table holds kinds that differ from their family."""
+"""Live pictures by kind of excitation; the second table is for kinds that differ from their family."""

@@ -66,8 +66,8 @@ def file_kind(path: Path) -> FileKind:
 class DisplayedResult:
     """A displayed result, and the inputs from which it was computed.
 
-    ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled, so
-    that an outdated result is recognised.
+    ``inputs`` are None while nothing is shown. While they differ from ``wanted``, the widget is disabled to
+    mark the result as outdated.
     """
 
     widget: QWidget
@@ -96,7 +96,7 @@ class Page(QWidget):
 
     @property
     def is_done(self) -> bool:
-        """Whether the navigation bar ticks this page."""
+        """Whether the navigation bar shows a tick beside this page."""
         return False
 
     def refresh(self) -> None:
@@ -134,7 +134,7 @@ class Page(QWidget):
         """Prepare to be shown."""
 
     def left(self) -> None:
-        """Store what was typed; called when another page is shown and when the window closes."""
+        """Store the user's input; called when another page is shown and when the window closes."""
 
 
 class SideAndPicture(QSplitter):

@@ -1,4 +1,4 @@
-"""Simulations for a page: run in one process, shown while they grow, and cancelled by the page."""
+"""Simulations for a page, run in one process; partial results are shown, and the page can cancel them."""
 
 from collections.abc import Callable
 
@@ -12,9 +12,9 @@ from ..background.background import Background
 
 
 class Simulator(QObject):
-    """Computes a page's newest request in one process, which lives as long as the page.
+    """Process that computes the newest request of a page, and lives as long as the page.
 
-    ``grown`` receives pieces of the answer, ``ended`` follows the last one, and ``died`` reports a failure.
+    ``grown`` receives partial results, ``ended`` is called after the last one, ``died`` after a failure.
     """
 
     def __init__(

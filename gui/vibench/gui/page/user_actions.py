@@ -19,7 +19,7 @@ LONGEST_NAME = 60
 
 
 class UserActions(QObject):
-    """Carries out the user's commands, or reports why a command is not possible."""
+    """The user's commands; a command that is not possible gives a message with the reason."""
 
     def __init__(self, context: AppContext, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -62,7 +62,7 @@ class UserActions(QObject):
             )
 
     def disarm(self) -> None:
-        """Disarm."""
+        """Disarm the armed plan."""
         self._context.bridge.order(EngineClient.disarm)
 
     def start(self) -> None:

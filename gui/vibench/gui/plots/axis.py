@@ -1,4 +1,4 @@
-"""Axes with their unit in the label, 1-2-5 ticks where they are logarithmic, and a grid of all ticks."""
+"""Axes with their unit in the label and 1-2-5 ticks on logarithmic scales, and a grid at all ticks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,15 +37,15 @@ class PlotAxis:
 
     label: str
     unit: str = ""
-    """SI unit of the values if the user can choose the displayed unit; otherwise the text of the label."""
+    """SI unit of the values if the user can choose the displayed unit; otherwise the displayed text."""
     factor: float = 1.0
-    """Displayed value per plotted value for a fixed unit: 1e3 shows seconds as milliseconds."""
+    """Factor from plotted to displayed values for a fixed unit: 1e3 shows seconds as milliseconds."""
     scale: Scale = Scale.LINEAR
     short: str = ""
 
     @property
     def shown(self) -> ShownUnit:
-        """The displayed unit, and its factor to the plotted values."""
+        """The displayed unit, with the factor from plotted to displayed values."""
         return UNITS.on_axis(self.unit) if self.unit in CHOICES else ShownUnit(self.unit, self.factor)
 
     @property
@@ -69,13 +69,13 @@ TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """Distance between labels on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Spacing reported to pyqtgraph for ticks without a number."""
+"""Spacing passed to pyqtgraph to mark ticks that have no number."""
 _WIDE = "2000"
-"""Widest label on a logarithmic horizontal axis, with its margin."""
+"""Text as wide as the widest label on a logarithmic horizontal axis, including margins."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
-    """An axis of a plot; in logarithmic mode, positions are powers of ten."""
+    """An axis of a plot; in logarithmic mode, positions are decimal logarithms."""
 
     def __init__(self, orientation: str, axis: PlotAxis) -> None:
         super().__init__(orientation)
@@ -107,20 +107,20 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
         """Adapt the label to the available length."""
-        # pyqtgraph calls this before the item is initialised.
+        # pyqtgraph calls this method before the item is initialised.
         if getattr(self, "_axis", None) is not None and self.label is not None:
             self._fit_label()
         super().resizeEvent(event)
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Paint directly; pyqtgraph paints through a QPicture, which looks up the font for every label."""
+        """Paint without the QPicture that pyqtgraph uses, which looks up the font for every label."""
         self.levels = ()
         specs = self.generateDrawSpecs(painter)
         if specs is not None:
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Hide numbers and label; the plot below shows them."""
+        """Hide numbers and label, because the plot below shows them for both."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
@@ -136,7 +136,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return f"<span style='{style}'>{escape(printable(self.labelText))}</span>"
 
     def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own
-        """Show or hide the label; changing its text, which makes pyqtgraph show it, is ignored."""
+        """Show or hide the label; ignore the call that pyqtgraph makes when the text changes."""
         if not getattr(self, "_is_fitting", False):
             self._is_labelled = show
         super().showLabel(show and self._is_labelled)
@@ -164,7 +164,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self._axis.shown.per_si
-            # Draw one labelled level only, because each grid line costs time in every frame.
+            # Draw only labelled ticks, because each grid line costs time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
@@ -195,7 +195,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
     """Remove ticks between multiples of a larger step, until at most ``most`` are left.
 
-    A single number defines no scale; in that case the outermost two of the previous step are kept.
+    A scale needs two numbers; if fewer would be left, keep the outermost two of the previous step.
     """
     wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):
@@ -209,7 +209,7 @@ def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, 
 
 
 def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]]:
-    """Return ticks between two powers of ten: 1-2-5 over decades, evenly spaced numbers within one."""
+    """Return ticks of a logarithmic axis: 1-2-5 per decade, or evenly spaced numbers within one decade."""
     if high - low < 1.0:
         return [(0.1, _even(10**low, 10**high))]
     decades = range(floor(low), ceil(high) + 1)
@@ -252,15 +252,15 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _ABOVE = 100
 """Drawing order above the curves, so that filled areas do not hide the grid."""
 _OPACITY = 0.25
-"""Opacity of the labelled lines; each further level is fainter."""
+"""Opacity of grid lines at labelled ticks; lines at other ticks are fainter."""
 _APART = 20.0
-"""Spacing of full-opacity lines [pixels]; denser lines are fainter."""
+"""Smallest spacing of grid lines at full opacity [pixels]; denser lines are fainter."""
 
 
 class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
     """Grid lines over the whole plot.
 
-    Grid lines of pyqtgraph's axes are cached as images of the size of the plot and blended in every frame.
+    It replaces the grid of pyqtgraph, which blends an image of the size of the plot in every frame.
     """
 
     def __init__(self, across: AxisItem, up: AxisItem) -> None:

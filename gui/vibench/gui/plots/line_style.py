@@ -1,4 +1,4 @@
-"""Styles of lines, dots and areas, converted to pens and colours at every change of theme."""
+"""Styles of lines, dots and areas; the current theme gives their pens and colours."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Dash(Enum):
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Theme colour and dash pattern of a line, independent of the theme."""
+    """Dash pattern of a line, and the function that gives its colour in a theme."""
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
@@ -65,7 +65,7 @@ def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a straight line; ``ratio`` is its width, in screen pixels per logical pixel."""
+    """Return the pen of a straight line; its width is ``ratio``, the screen pixels per logical pixel."""
     return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
@@ -88,13 +88,13 @@ def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
 
 
 class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
-    """On a fine screen, paints a line of one screen pixel again beside and below itself.
+    """Curve that draws a thick line as several thin ones, each shifted by one screen pixel.
 
     A pen of two pixels looks the same and takes three times as long, because Qt draws such lines as areas.
     """
 
     def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None) -> None:
-        """Draw once per screen pixel within a logical pixel."""
+        """Draw the line once more, to the right and below, for each further screen pixel of its width."""
         super().paint(painter, option, widget)
         ratio = painter.device().devicePixelRatioF()
         place = painter.transform()
@@ -123,7 +123,7 @@ class Band:
 
     def __init__(self, of: str) -> None:
         self.of = of
-        """Name of the curve with these bounds."""
+        """Name of the curve whose bounds the area shows."""
         self._edges = np.empty((3, 0))
         self.item = pg.PlotDataItem(pen=None, fillLevel=_INSIDE)
 

@@ -22,9 +22,9 @@ from .reading import Reading
 from .upright_marks import Rules, Stripes
 
 ROOM = 0.15
-"""Empty share at both ends after a change of the range."""
+"""Empty margin at both ends after a change of the range, as a share of the data's range."""
 LEAST_USED = 0.5
-"""Smallest share of the range that the data may fill before the range is reduced."""
+"""Share of the range below which the data are too small, so that the range is reduced."""
 
 Range = tuple[float, float]
 
@@ -44,7 +44,7 @@ def steady_range(shown: Range, data: Range) -> Range | None:
     return low - ROOM * size, high + ROOM * size
 
 
-# Antialiasing halves the frame rate; OpenGL draws grey areas on machines without hardware support.
+# Antialiasing would halve the frame rate; without hardware support, OpenGL would draw grey areas.
 pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
@@ -53,7 +53,7 @@ _VEIL = 0.5
 OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6
-"""Right margin for half of the last number."""
+"""Right margin, in font heights; half of the last number extends into it."""
 _MARGIN = 4
 """Margin above and below the legend [pixels]."""
 
@@ -69,7 +69,7 @@ class LegendEntry:
 
 
 class LegendLine(QLabel):
-    """Entries side by side in as many lines as the width requires; entries are never broken."""
+    """Legend with entries side by side, wrapped to the width; no entry is split over two lines."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -105,13 +105,13 @@ class LegendLine(QLabel):
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
-    """One pair of axes. Curves receive plain values; the plot takes logarithms.
+    """Plot with one pair of axes. Curves receive values; for logarithmic axes the plot takes logarithms.
 
-    `add_actions` defines keys and context menu. A disabled plot is veiled and marked as outdated.
+    `add_actions` defines keys and context menu. A disabled plot is dimmed and marked as outdated.
     """
 
     up_em = 5.0
-    """Width of the vertical axis, equal in all plots, so that stacked plots are aligned."""
+    """Width of the vertical axis, in font heights; equal in all plots, so that stacked plots are aligned."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
@@ -123,10 +123,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for unseen in ("top", "right"):
-            # pyqtgraph's auto-range buttons would rewrite an invisible label at every change of the range.
+            # Otherwise pyqtgraph would rewrite the label of an invisible axis at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
-            # Add the axes before the grid, which uses their ticks.
+            # Paint the axes before the grid, because painting determines the ticks that the grid uses.
             axis.setZValue(_FIRST)
         # Hide the last number of an axis where it would be cut off.
         self.up.setStyle(hideOverlappingLabels=True)
@@ -143,7 +143,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """All lines and sets of points, with their names in the legend; the name may be empty."""
         self.bands: list[Band] = []
         self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
-        """Returns additional text for the reading at a point."""
+        """Function that returns additional text for the reading at a point."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self.theme = theme
@@ -160,7 +160,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Fit axes and margins to the font."""
         em = self.fontMetrics().height()
         self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
-        # A width that depends on the numbers is known only after painting, which would have to be repeated.
+        # Fixed, because a width that depends on the numbers would require painting twice.
         self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
@@ -176,7 +176,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self
 
     def always_numbered(self) -> "Plot":
-        """Show numbers on the horizontal axis of an empty plot, because a plot above shares the axis."""
+        """Show numbers on the horizontal axis of an empty plot also, because a plot above shares the axis."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
         return self
@@ -275,7 +275,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def columns(self) -> int:
         """Number of columns for the extremes of a signal.
 
-        Slightly more than the width in logical pixels, because a pixel between two columns would stay empty.
+        It is slightly more than the width in logical pixels, so that no pixel between columns stays empty.
         """
         return int(1.02 * self.getViewBox().width()) + 2
 
@@ -295,7 +295,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def keep_in_view(
         self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
     ) -> None:
-        """Change the ranges only when these extremes require it, because redrawing an axis is expensive."""
+        """Fit the ranges to these extremes, but only if needed, because redrawing an axis is expensive."""
         if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
             return
         self._follows = True
@@ -306,7 +306,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.setYRange(*wanted, padding=0)
 
     def event(self, event: QEvent) -> bool:
-        """Redraw straight lines after a move to a screen of another resolution."""
+        """Redraw straight lines after the window was moved to a screen of another resolution."""
         if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "theme", None) is not None:
             self.retheme(self.theme)
         return bool(super().event(event))
@@ -314,12 +314,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Fit the legend to the new width."""
         super().resizeEvent(event)
-        # pyqtgraph calls this before the widget is initialised and after it is closed.
+        # pyqtgraph also calls this method before the widget is initialised and after it is closed.
         if getattr(self, "_legend", None) is not None and self.plotItem is not None:
             self._place_legend()
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
-        """Draw the hint on an empty plot, or the veil on a disabled one."""
+        """Draw the hint on an empty plot, or dim a disabled one."""
         super().drawForeground(painter, rect)
         # Clearing a curve emits no signal, so check again.
         self._look_for_points()
@@ -352,7 +352,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def leaveEvent(self, event: QEvent) -> None:
         """Hide the reading."""
         super().leaveEvent(event)
-        # The context menu still needs the place at which it was opened.
+        # Keep the reading while a context menu is open, because its actions use the position.
         if QApplication.activePopupWidget() is None:
             self.reading.hide()
 
@@ -410,7 +410,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _look_for_points(self, *_: object) -> None:
         """Show the hint and hide the numbers while the plot is empty.
 
-        Called before painting, because a change during painting causes a second one.
+        Call this before painting, because a change during painting would cause a second painting.
         """
         self._is_empty = bool(self._hint) and not self._holds_points
         for axis in self._blanked:

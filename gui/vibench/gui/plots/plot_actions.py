@@ -19,7 +19,7 @@ FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
 def add_actions(plot: "Plot") -> None:
-    """Add all actions; the plot passes other keys to its page."""
+    """Add all actions to a plot; other keys are passed on to the page."""
     clipboard = QGuiApplication.clipboard()
     for text, key, act in (
         ("Show everything", "A", plot.show_everything),
@@ -68,7 +68,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
             generator.setOutputDevice(memory)
             generator.setSize(plot.size())
             generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
-            # Other resolutions would shift the axes against the curves.
+            # With another resolution, axes and curves would not line up.
             generator.setResolution(plot.logicalDpiX())
             painter = QPainter(generator)
             plot.render(painter)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Reading:
-    """Crosshair at the pointer, with the place and the nearest curve in words.
+    """Crosshair at the pointer, with a text that shows its coordinates and the nearest curve.
 
     With a mark set, differences from it are shown too, as a ratio in dB on a logarithmic vertical axis.
     """
@@ -28,7 +28,7 @@ class Reading:
     def __init__(self, plot: "Plot") -> None:
         self._plot = plot
         self._lines: tuple[pg.InfiniteLine, ...] = ()
-        """Crosshair lines, then lines of the mark; created at first use."""
+        """Two lines of the crosshair, then two of the mark; created at first use."""
         self._label: QLabel | None = None
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None
@@ -116,7 +116,7 @@ class Reading:
                 line.hide()
 
     def forget(self) -> None:
-        """Drop lines that the plot has deleted."""
+        """Hide the reading, and discard the lines that the plot has deleted."""
         self.hide()
         self._lines, self._marked = (), None
 

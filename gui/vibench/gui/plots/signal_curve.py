@@ -15,7 +15,7 @@ MOST_COLUMNS = 3000
 
 
 class SignalCurve:
-    """Draws the visible part of a signal; an impact of three samples stays visible at any zoom."""
+    """Curve of a long signal; only the visible part is drawn, and short impacts stay visible at any zoom."""
 
     def __init__(self, plot: Plot, line_style: LineStyle, name: str = "") -> None:
         self._plot = plot
@@ -38,7 +38,7 @@ class SignalCurve:
         last = int(np.ceil((high_s - self._start_s) * self._rate_hz)) + 2
         count = len(self._samples)
         if self._plot.getViewBox().autoRangeEnabled()[0]:
-            # The axes are about to follow the data, so draw the whole signal.
+            # The axes will be fitted to the data, so draw the whole signal.
             first, last = 0, count
         self._draw(min(max(first, 0), count), min(max(last, 0), count))
 
@@ -59,7 +59,7 @@ class SignalCurve:
 
 
 SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
-"""Item role of the bar's share, 0 to 1 or more."""
+"""Item role that holds the length of the bar, 0 to 1 or more."""
 OVER = "#b3261e"
 NEAR = "#a06a00"
 WELL = "#00694d"
@@ -67,7 +67,7 @@ NEAR_SHARE = 0.8
 
 
 class BarDelegate(QStyledItemDelegate):
-    """Paints a bar in a table cell; above 1 it is full and red, and the text says so too."""
+    """Delegate that paints a bar in a table cell; above 1 the bar is full and red."""
 
     def paint(
         self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex

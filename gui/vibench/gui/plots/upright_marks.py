@@ -1,4 +1,4 @@
-"""Vertical stripes and lines of a plot; each kind is one item, painted by pixel columns."""
+"""Vertical stripes and lines of a plot; one item draws all marks of a kind, column by column."""
 
 from collections.abc import Callable, Iterable
 
@@ -15,12 +15,12 @@ _LEAST_APART = 5
 
 
 class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
-    """Base class; one item per mark would cost time in every frame."""
+    """Base class of items that draw many marks; one item per mark would be slow in every frame."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__()
         self._across = across
-        """Converts a value to its axis position, which may be logarithmic."""
+        """Function from a value to its position on the axis, which may be logarithmic."""
         self.setZValue(_BEHIND)
 
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
@@ -32,7 +32,7 @@ class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
 
 
 class Stripes(_UprightMarks):
-    """Stripes across a plot, at least one pixel wide, so that none is invisible."""
+    """Vertical stripes, each at least one pixel wide, so that all are visible."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)
@@ -51,7 +51,7 @@ class Stripes(_UprightMarks):
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Fill every pixel column that a stripe touches, once."""
+        """Fill each pixel column that stripes cover only once, so that overlaps are not darker."""
         visible, scale, shift = self._begin(painter)
         width = max(1, round(visible.width()))
         edges = np.clip(np.floor(self._bands * scale + shift - visible.left()), -1, width).astype(int)
@@ -67,7 +67,7 @@ class Stripes(_UprightMarks):
 
 
 class Rules(_UprightMarks):
-    """Lines across a plot; lines that are too close together are not drawn."""
+    """Vertical lines; none is drawn while they would be too close together."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)

@@ -1,4 +1,4 @@
-"""Box layouts in one expression, and common widgets: scroll areas, buttons, labels, progress bars."""
+"""Functions that build box layouts, and common widgets: scroll areas, buttons, labels, progress bars."""
 
 from collections.abc import Callable
 from html import escape
@@ -31,11 +31,11 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""A widget or layout, optionally with its share of the remaining space; a number is an empty share."""
+"""A widget or layout, alone or with its share of the free space; a number adds an empty share."""
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
-    """Add parts to a box in order; ``margin`` [pixels] is by default that of the style."""
+    """Add parts to a box in order; without ``margin`` [pixels], the margin of the style is used."""
     if margin is not None:
         box.setContentsMargins(margin, margin, margin, margin)
     for part in parts:
@@ -87,7 +87,7 @@ class ScrollArea(QScrollArea):
     name
         Name for screen readers.
     content
-        ScrollArea widget.
+        Widget that scrolls.
     """
 
     LEAST_EM = 7, 3
@@ -101,7 +101,7 @@ class ScrollArea(QScrollArea):
         self._content = content
 
     def minimumSizeHint(self) -> QSize:
-        """Return a small size, whatever the content."""
+        """Return a small size that does not depend on the content."""
         em = self.fontMetrics().height()
         return QSize(self.LEAST_EM[0] * em, self.LEAST_EM[1] * em)
 
@@ -133,7 +133,7 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 
 _WIDEST = 0.8
-"""Largest share of the width for the hint."""
+"""Largest width of a hint, as a share of its area."""
 
 
 def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) -> None:
@@ -197,7 +197,7 @@ class ElidedLabel(QLabel):
 
 
 LEAST_S = 1.0
-"""Elapsed time from which the remaining time is estimated [s]."""
+"""Elapsed time after which the remaining time is estimated [s]."""
 
 
 class ProgressBar(QProgressBar):

@@ -39,7 +39,7 @@ class Notice:
 
 
 def notice_of(error: BaseException, next_step: str = "") -> Notice:
-    """Return the notice of an error, whose sentence contains all parts."""
+    """Return the notice of an error; the error's message already has all parts."""
     return Notice(
         NoticeKind.FAULT,
         printable(str(error)) or type(error).__name__,
@@ -50,7 +50,7 @@ def notice_of(error: BaseException, next_step: str = "") -> Notice:
 
 
 def clock(seconds: float) -> str:
-    """Return a duration as on a clock: ``"3:20"``."""
+    """Return a duration in minutes and seconds, with hours if needed: ``"3:20"``."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"

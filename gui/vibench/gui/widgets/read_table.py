@@ -1,4 +1,4 @@
-"""A table that is read and copied, never edited."""
+"""A read-only table whose cells can be copied."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -48,7 +48,7 @@ def _offered(table: QTableView, text: str, said: Callable[[], str]) -> QAction:
 
 
 _WIDEST_LETTERS = 36
-"""Widest column of natural width, in letters; longer text is wrapped."""
+"""Largest width of a column that fits its content, in letters; longer text is wrapped."""
 _LEAST_LETTERS = 14
 """Smallest width of the wide column, in letters; narrower tables scroll."""
 _ROW_ROOM = 8
@@ -67,7 +67,7 @@ class ReadTable(QTableWidget):
     hint
         Text of an empty table.
     wide
-        The column with the remaining width; by default the last one.
+        Number of the column that takes the remaining width; by default the last one.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class ReadTable(QTableWidget):
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)
-        # A width changes in many steps; measure the rows once, after the last one.
+        # The width changes in many steps; fit the row heights only once, after the last step.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit)
 
@@ -123,7 +123,7 @@ class ReadTable(QTableWidget):
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Measure the rows again for the new width."""
+        """Fit the row heights to the new width."""
         super().resizeEvent(event)
         self._later.start()
 

@@ -13,7 +13,7 @@ Colour = str
 
 
 class Tone(StrEnum):
-    """Importance of a state; always shown with a word or a symbol too."""
+    """Importance of a state, shown by colour together with a word or a symbol."""
 
     CALM = "calm"
     GOOD = "good"
@@ -24,7 +24,7 @@ class Tone(StrEnum):
 
 @dataclass(frozen=True)
 class Paint:
-    """Text and background colours with a contrast of at least 4.5."""
+    """Background and text colour with a contrast of at least 4.5."""
 
     ground: Colour
     letters: Colour
@@ -42,13 +42,13 @@ class Theme:
     line: Colour
     """Borders of groups and grids."""
     edge: Colour
-    """Borders of input fields: a contrast of at least 3."""
+    """Borders of input fields, with a contrast of at least 3."""
     text: Colour
     muted: Colour
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]
-    """Okabe and Ito's colours that are visible on this background, in order of use."""
+    """Curve colours in order of use: those of Okabe and Ito, adapted to this background."""
     predicted: Colour
     """Colour of simulated curves, which are also dashed."""
 
@@ -97,7 +97,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Return the palette of Qt's widgets; colour schemes work only on some desktops."""
+    """Return the palette of Qt's widgets; a palette works on every desktop, colour schemes do not."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (
@@ -125,7 +125,7 @@ def palette(theme: Theme) -> QPalette:
 def style_sheet(theme: Theme) -> str:
     """Return style rules beyond the palette: panels, navigation bar, banner; sizes follow the font.
 
-    A table shows its focus by its frame, because the style's veil over a cell would dim the text.
+    A table shows its focus by its frame, because a shaded cell would be harder to read.
     """
     tones = "".join(
         f'*[tone="{tone.value}"] {{ background: {paint.ground}; color: {paint.letters}; }}\n'

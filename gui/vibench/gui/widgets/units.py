@@ -1,7 +1,7 @@
 """Displayed units: one choice per quantity for axes, fields, tables and sentences.
 
-Values are SI, and sentences of other packages use the paper's units (µm, m/s²). Only this module converts to
-the chosen units; files and reports are not affected.
+Values are in SI units, and sentences of other packages use the paper's units (µm, m/s²). Only this module
+converts to the chosen units; files and reports are not affected.
 """
 
 import re
@@ -21,7 +21,7 @@ from .boxes import plain_lines, plain_tip
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
-"""Displacements in µm on axes, and elsewhere with a prefix that suits the value."""
+"""Choice that shows displacements in µm on axes, and elsewhere with a prefix that suits the value."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "m": (AUTOMATIC, "µm", "mm", "m"),
     "m/s": ("mm/s", "m/s"),
@@ -29,7 +29,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 }
 """Units to choose from, by SI unit; the first is the default."""
 POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}
-"""Powers of ten by prefix; three characters are in use for micro."""
+"""Powers of ten by prefix; "micro" is written with any of three characters."""
 _FITTED = ("p", "n", "µ", "m", "", "k", "M")
 PREFIXED = frozenset({"m", "V", "Vpp", "s", "A", "N", "Hz", "W"})
 """Units that receive a prefix for small and large values."""
@@ -45,13 +45,13 @@ _QUANTITY = re.compile(
 _LEAST_DIGITS = 3
 _LONG_WORD = re.compile(r"[^\s\u200b]{25,}")
 _BREAK = "\u200b"
-"""Zero-width space, at which Qt may break a long word."""
+"""Zero-width space; Qt can break a long word there."""
 _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 
 @dataclass(frozen=True)
 class ShownUnit:
-    """A displayed unit and its number per SI unit."""
+    """A displayed unit, and the factor from the SI unit to it."""
 
     name: str
     per_si: float = 1.0
@@ -59,7 +59,7 @@ class ShownUnit:
     def text(self, value: float, digits: int = 3) -> str:
         """Return an SI value in this unit as text."""
         shown = value * self.per_si
-        # Counts are exact: 8192 points, not 8190.
+        # Counts are not rounded: 8192 points, not 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
         return f"{_number_text(Decimal(number))} {self.name}".strip()
 
@@ -83,7 +83,7 @@ class DisplayUnits:
 
     def __init__(self) -> None:
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
-        # Not a Qt signal: this object outlives every window, and a closed widget must not be called.
+        # Weak references, because this object outlives every window and must not call a closed widget.
         self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -121,7 +121,7 @@ class DisplayUnits:
         return prefixed_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Return the unit of a plain number in an empty field of this SI unit."""
+        """Return the unit assumed for a number typed without a unit into an empty field."""
         return self.on_axis(unit).name
 
     def convert(self, sentence: str) -> str:
@@ -155,7 +155,7 @@ def _scale_number(number: str, factor: float) -> str:
 
 
 def _number_text(number: Decimal) -> str:
-    """Return all digits; very small or large numbers have a power of ten."""
+    """Return a number with all digits; very small or large numbers have an exponent."""
     if number == 0 or not number.is_finite() or _LONG_FROM <= abs(number) < _LONG_TO:
         return f"{number:f}"
     return f"{float(number):g}"
@@ -166,7 +166,7 @@ def _with_breaks(word: re.Match[str]) -> str:
 
 
 UNITS = DisplayUnits()
-"""Units of the whole program, because users expect one unit on all pages."""
+"""The units of the whole program; all pages show the same unit."""
 
 
 class SentenceLabel(QLabel):
@@ -189,7 +189,7 @@ class SentenceLabel(QLabel):
         self._show_converted()
 
     def setToolTip(self, text: str) -> None:
-        """Set the tooltip, converted in the same way."""
+        """Set the tooltip; its quantities are converted for display."""
         self._tip = text
         self._show_converted()
 
@@ -198,6 +198,6 @@ class SentenceLabel(QLabel):
         return super().text().replace(_BREAK, "")
 
     def _show_converted(self) -> None:
-        # Allow breaks in long words, because Qt would not wrap or would cut off a path.
+        # Allow breaks in long words such as paths, because Qt would cut them off.
         super().setText(_LONG_WORD.sub(_with_breaks, UNITS.convert(plain_lines(self.sentence))))
         super().setToolTip(plain_tip(UNITS.convert(self._tip)))

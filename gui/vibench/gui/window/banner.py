@@ -95,13 +95,13 @@ class StatusLine(QFrame):
 
 @dataclass(frozen=True)
 class StateIndicator:
-    """What the banner shows for a state."""
+    """Symbol, word, colour and details that the banner shows for a state."""
 
     symbol: str
     word: str
     tone: Tone
     detail: str = ""
-    """Changing text of the state: a clock, a level."""
+    """Text that changes during the state, such as elapsed time and level."""
     is_ramping: bool = False
     """Whether the drive is ramping down, so that STOP can only make the ramp faster."""
 
@@ -111,10 +111,10 @@ CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page"
 
 
 class Banner(QFrame):
-    """Shows one state; a change of its word is announced to screen readers."""
+    """The banner with the state and STOP; a change of state is announced to screen readers."""
 
     stop_requested = Signal()
-    """Ramp down as planned; a second press uses the fastest ramp."""
+    """Request to ramp down as planned; a second press requests the fastest ramp."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -209,7 +209,7 @@ ORDERED = "The last order is being carried out: limits, folder and instruments a
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact
-    """Return symbol, word and changing text of the engine's state."""
+    """Return the indicator of the engine's state."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
@@ -284,10 +284,10 @@ _DETAIL_LINES = 14
 
 
 class MessageStrip(QFrame):
-    """The newest message: what happened, what was done, what to do; Details lists the earlier ones.
+    """Strip with the newest message: what happened, what was done, what to do next.
 
     Its height is constant, so that nothing below moves. Without a message it shows the next step. Details
-    overlap the page.
+    lists earlier messages and overlaps the page.
     """
 
     def __init__(self) -> None:
@@ -338,7 +338,7 @@ class MessageStrip(QFrame):
         self._text.setToolTip(notice.text)
 
     def hint(self, text: str) -> None:
-        """Set the next step, shown without a message."""
+        """Set the next step, which is shown while there is no message."""
         if text != self._hint:
             self._hint = text
             if not self.is_said:
@@ -367,7 +367,7 @@ class MessageStrip(QFrame):
         self.setFixedHeight(room + 6)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give Details the width of the strip."""
+        """Fit the list of messages to the width of the strip."""
         super().resizeEvent(event)
         self._show_details()
 

@@ -1,4 +1,4 @@
-"""Explains why no window can be shown. It imports no Qt: whether Qt can be loaded is the first question."""
+"""Find out why no window can be shown. This module does not import Qt, which may be impossible to load."""
 
 import ctypes
 import os
@@ -19,7 +19,7 @@ PACKAGES = {
     "libxcb-xkb": "libxcb-xkb1",
     "libxkbcommon-x11": "libxkbcommon-x11-0",
 }
-"""Debian packages for an X11 window, by the library that is missing first."""
+"""Debian packages needed for a window on X11, by the name of the missing library."""
 ON_X11 = " ".join(sorted(PACKAGES.values()))
 ELSEWHERE = "or run it without a window: QT_QPA_PLATFORM=offscreen"
 
@@ -30,7 +30,7 @@ def display_trouble() -> str:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - whether it loads is the question
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # Held in a variable, because type checkers for another system would find the rest unreachable.
+    # A variable, because type checkers run for another system would report the rest as unreachable.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""

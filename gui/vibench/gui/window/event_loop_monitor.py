@@ -13,12 +13,12 @@ from vibench.sim.operating_system.this import read_at
 
 EVERY_MS = 20
 BOUND_S = 0.1
-"""Longer delays are noticeable and logged [s]."""
+"""Delay above which it is logged, because users notice it [s]."""
 SPAN_S = 10.0
-"""Time range of the longest delay [s]."""
+"""Time range over which the longest delay is reported [s]."""
 MOST_NOTED = 20
 _DELAYS = "/proc/thread-self/schedstat"
-"""Linux: time that this thread waited for a processor [ns]."""
+"""File of Linux with the time that this thread waited for a processor [ns]."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Wait:
     """One delay of the event loop."""
 
     own_s: float
-    """Delay without the time in which other programs had the processor, where the system reports it [s]."""
+    """Delay [s], less the time spent waiting for a processor if the system reports that."""
     busy_s: float
-    """Processor time of this thread during the delay, which does not depend on other load [s]."""
+    """Processor time of this thread during the delay [s]; it does not depend on other programs."""
     at: datetime
     about: str
 
@@ -53,19 +53,19 @@ class EventLoopMonitor(QObject):
 
     @property
     def longest_s(self) -> float:
-        """The longest own delay in the last seconds [s]."""
+        """The longest delay in the last `SPAN_S`, without waiting for a processor [s]."""
         self._forget()
         return max((own_s for _, own_s, _ in self._waits), default=0.0)
 
     @property
     def busiest_s(self) -> float:
-        """The longest processor time between two timer events in the last seconds [s]."""
+        """The longest processor time between two timer events in the last `SPAN_S` [s]."""
         self._forget()
         return max((busy_s for _, _, busy_s in self._waits), default=0.0)
 
     @property
     def rounds(self) -> int:
-        """Number of timer events in the last seconds."""
+        """Number of timer events in the last `SPAN_S`."""
         self._forget()
         return len(self._waits)
 
@@ -114,7 +114,7 @@ class EventLoopMonitor(QObject):
 
 
 class _Delays:
-    """Reads how long this thread waited for a processor; zero where the system does not report it."""
+    """Reader of the time that this thread waited for a processor; zero if the system does not report it."""
 
     def __init__(self) -> None:
         try:

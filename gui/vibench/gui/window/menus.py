@@ -38,7 +38,7 @@ from ..widgets.units import UNITS
 
 
 def whole_path(folder: str) -> str:
-    """Return an absolute path, which does not depend on the working directory."""
+    """Return an absolute path; refuse a relative one, which depends on the working directory."""
     if not Path(folder).expanduser().is_absolute():
         raise ValueError(f"{folder!r} is not a whole path; give one such as {Path.home() / 'vibench'}")
     return folder
@@ -64,7 +64,7 @@ class Preferences(FrozenModel):
 
 
 class SettingsDialog(QDialog):
-    """Applies the settings if they are valid; Cancel discards them."""
+    """Dialog that applies the settings if they are valid; Cancel discards them."""
 
     def __init__(self, context: AppContext, parent: QWidget) -> None:
         super().__init__(parent)
@@ -138,7 +138,7 @@ class Reader(QDialog):
         self.resize(50 * em, 38 * em)
 
     def _fit(self, *_: object) -> None:
-        """Wrap lines of code too, so that the manual needs no horizontal scrolling."""
+        """Wrap lines of code also, so that the manual needs no horizontal scrolling."""
         block = self.browser.document().begin()
         while block.isValid():
             wrapped = block.blockFormat()
@@ -171,7 +171,7 @@ def installation_text() -> str:
 
 
 def show_about(parent: QWidget, context: AppContext) -> Reader:
-    """Show the versions of this installation, to be copied into a report."""
+    """Show the versions of this installation, which can be copied into a report."""
     reader = Reader("About vibench", parent)
     reader.browser.setPlainText("collecting the versions…")
 
@@ -195,9 +195,9 @@ ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
 
 
 class AbortKey(QObject):
-    """Receives every key press of the application before any widget.
+    """Filter that detects the abort key before any widget receives the key press.
 
-    A shortcut does not act while a modal dialog is open; an event filter of the application does. The key is
+    Unlike a shortcut, an event filter of the application also works while a modal dialog is open. The key is
     passed on to the focused widget, so that Esc still closes a dialog.
     """
 
@@ -209,7 +209,7 @@ class AbortKey(QObject):
         application.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Emit `pressed` for an abort key; block no event."""
+        """Emit `pressed` for an abort key, and let every event pass."""
         kind = event.type()
         if kind is QEvent.Type.KeyRelease:
             self._last_seen = None
@@ -268,7 +268,7 @@ OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Menu key", "context menu of the focused plot or table"),
     ("F4, Alt+Down", "open the list of a choice"),
 )
-"""Keys without a menu entry. No single letter starts an output."""
+"""Keys without a menu entry; no single letter starts the drive."""
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 
 

@@ -1,4 +1,4 @@
-"""Creates the application and the window."""
+"""Functions that create the application and the window."""
 
 import gc
 import sys
@@ -35,7 +35,7 @@ def application(arguments: list[str]) -> QApplication:
 
 
 def _font() -> QFont:
-    """Return DejaVu Sans, which has all characters used and is installed with matplotlib."""
+    """Return DejaVu Sans, which has all the characters needed and is installed with matplotlib."""
     folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
     for name in FONT_FILES:
         QFontDatabase.addApplicationFont(str(folder / name))
@@ -68,6 +68,6 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
 
 
 def load_ahead() -> None:
-    """Import what the first prediction and the first curves need, after the window was painted."""
+    """Import the modules for the first prediction and curves, after the window was painted."""
     import_module("scipy.signal")
     getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009

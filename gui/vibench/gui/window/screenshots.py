@@ -32,11 +32,11 @@ from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
-"""The smallest supported size and a common one; their pictures are in separate folders."""
+"""The smallest supported size and a common one; pictures of each size have their own folder."""
 PATIENCE_S = 3600.0
-"""Time allowed on a busy machine; incomplete pictures would end up in the manual [s]."""
+"""Longest wait for the window to be ready [s]; long, because a busy computer is slow."""
 STILL_MS = 1200
-"""Waiting time until the status line shows the steady cost of a page [ms]."""
+"""Waiting time until the frame rate in the status line is steady [ms]."""
 _SMALLEST_FILE = 0
 SHOWN = Measurement(
     name="sweep",
@@ -74,7 +74,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
-        # The same settings as in `vibench.gui.window`, so that pictures match the real window.
+        # As in `open_window`, so that the pictures match the real window.
         gc.freeze()
         window.resize(*SIZE)
         window.show()
@@ -133,7 +133,7 @@ def _fill(window: Window) -> None:
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
-    # One after another, so that the displayed times are not affected by each other.
+    # Compute one after another, so that the displayed computing times are realistic.
     for view, asked in (
         (simulation, {}),
         (maps, MAP),
@@ -195,7 +195,7 @@ def _save(window: Window, folder: Path, name: str) -> None:
 
 
 def _write(picture: QImage, path: Path) -> None:
-    """Save with 32 shades per colour, which halves the file without visible loss."""
+    """Save an image with 32 shades per colour, which halves the file size without visible loss."""
     picture = picture.convertToFormat(QImage.Format.Format_RGB32)
     shades = np.frombuffer(picture.constBits(), np.uint8) & 0xF8
     small = QImage(

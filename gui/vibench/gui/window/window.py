@@ -119,7 +119,7 @@ class NavigationBar(QListWidget):
             self._fit()
 
     def _fit(self) -> None:
-        """Set the width of the longest name in bold with a tick, as for a selected page."""
+        """Fit the width to the longest name in bold with a tick, as shown for a selected page."""
         bold = self.font()
         bold.setBold(True)
         metrics = self.fontMetrics()
@@ -137,7 +137,7 @@ SPAN_S = 1.0
 MOST_DROPPED = 20
 """Most files opened by one drop."""
 TICK_MS = 50
-"""Interval between updates [ms]: a shorter one needs a whole core, a longer one looks jerky."""
+"""Interval between updates [ms]; a shorter one would use a whole core, a longer one looks jerky."""
 
 
 class Window(QMainWindow):
@@ -230,7 +230,7 @@ class Window(QMainWindow):
             self.context.bridge.adopt(left)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
-        """Show an adopted campaign as if it had been armed here."""
+        """Show a campaign that was taken over as if it had been armed in this window."""
         self.context.selection.choose_rig(self.context.bridge.rig)
         self.context.selection.choose_campaign(request.campaign)
         self.context.say(
@@ -244,7 +244,7 @@ class Window(QMainWindow):
         self.show_page(RUN)
 
     def _how_to_close(self) -> Urgency | None:
-        """Ask what to do with the run while it continues; Esc aborts it. None keeps the window open."""
+        """Ask how to close while a measurement runs; return None to keep the window open."""
         if not self.context.bridge.is_driving:
             return Urgency.END
         box = QMessageBox(QMessageBox.Icon.Question, "A measurement is running", "", parent=self)
@@ -309,7 +309,7 @@ class Window(QMainWindow):
         assert isinstance(application, QApplication)
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
-        # A style sheet for the whole application would block the event loop for a third of a second.
+        # Set part by part: a style sheet for the whole application would block the event loop for 0.3 s.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
@@ -339,13 +339,13 @@ class Window(QMainWindow):
             in_next_pass(self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Focus the first page's next step, and not STOP."""
+        """Focus the next step of the visible page, so that STOP does not have the focus."""
         super().showEvent(event)
         self.navigation.setFocus()
         self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Apply a change of the font, which parts with a style sheet take over only with a new sheet."""
+        """Apply a change of the font; parts with a style sheet need a new sheet for this."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)
@@ -371,7 +371,7 @@ class Window(QMainWindow):
         act(path)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accept files."""
+        """Accept a drag that holds files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 

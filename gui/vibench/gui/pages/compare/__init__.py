@@ -1,5 +1,5 @@
 """The Compare page: recordings and predictions overlaid on one another.
 
-Curves with their bounds over frequency, peaks, markers, the difference of two curves, export.
+It shows curves with their bounds, their peaks, two markers and the difference of two curves.
 Analyses and exports run in another process.
 """

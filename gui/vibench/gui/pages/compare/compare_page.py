@@ -46,7 +46,7 @@ class AnalysisPanel(QGroupBox):
     """The analysis options, the button that applies them, and the progress bar."""
 
     wanted = Signal()
-    """Analyse all recordings again."""
+    """Request to analyse all recordings again."""
     cancelled = Signal()
 
     def __init__(self) -> None:
@@ -115,7 +115,7 @@ class ComparePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when two curves are overlaid."""
+        """Whether at least two curves are overlaid."""
         return len(self.curves.ticked()) > 1
 
     @property
@@ -125,7 +125,7 @@ class ComparePage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Files of branches."""
+        """Function that opens files of branches."""
         return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
 
     def left(self) -> None:

@@ -160,7 +160,7 @@ PEAK_HEADINGS = (
 
 
 class NumberTable(ReadTable):
-    """A table to read and copy, with variable columns; the first column takes the remaining width."""
+    """A read-only table with variable columns; the first column takes the remaining width."""
 
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(name, PEAK_HEADINGS[:1], hint)
@@ -195,7 +195,7 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-# A chaotic curve has thousands of peaks, and every tick and every change of units lists them again.
+# Cached: a chaotic curve has thousands of peaks, listed again whenever a curve is ticked or units change.
 _peaks = lru_cache(maxsize=64)(curve_peaks)
 
 
@@ -226,9 +226,9 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Dashes of the transmissibility or Response I, and of Response II."""
+"""Dash patterns by origin: the first for transmissibility or Response I, the second for Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Curves ticked by default. The two responses of a sweep coincide without contact, so only the first is."""
+"""Curves ticked by default. Response II is not, because it equals Response I without contact."""
 _SWATCH = (28, 12)
 
 
@@ -364,7 +364,7 @@ _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """Selects a curve and its reference; by default the second curve shown and the first."""
+    """Choice of a curve and its reference; by default the second and the first of the shown curves."""
 
     changed = Signal()
 

@@ -40,9 +40,9 @@ EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
 """Interval between checks for deleted files [s]."""
 CHECK_WAIT_MS = 250
-"""How long a recording stays open before it is checked whole."""
+"""Delay between opening a recording and checking all of its samples [ms]."""
 PAINTED_MS = 50
-"""After this time the pictures of an opened recording are painted."""
+"""Delay before the facts of a recording are shown, so that its pictures are painted first [ms]."""
 
 
 class FilesPage(Page):
@@ -57,7 +57,7 @@ class FilesPage(Page):
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
         self._pictured_path: Path | None = None
-        """The recording in the pictures."""
+        """The recording that the pictures show."""
         self._listing: Job | None = None
         self._making: Job | None = None
         self._check = LatestRequest(
@@ -74,19 +74,19 @@ class FilesPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when a recording is open."""
+        """Whether a recording is open."""
         return self._opened is not None
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The pictures, with the recording named above them."""
+        """The pictures, which must show the recording named above them."""
         wanted = None if self._opened is None else self._opened.path
         inside = self.pictures.spectrogram.displayed_results, self.pictures.hidden_motion.displayed_results
         return DisplayedResult(self.pictures, self._pictured_path, wanted), *inside
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Recordings and their folders."""
+        """Functions that open recordings and folders."""
         return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
     def enter(self) -> None:
@@ -127,7 +127,7 @@ class FilesPage(Page):
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording, also if it is open already; if it is listed, selecting it opens it."""
+        """Open a recording, even if it is open already; selecting a listed recording opens it."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:
@@ -190,7 +190,7 @@ class FilesPage(Page):
             self._making = self.context.background.ask(read_levels, self._show, self._failed, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
-        """Add one channel per event loop pass; all channels of a long recording would block the window."""
+        """Add one channel per pass of the event loop; reading all channels at once would block the window."""
         if recording is not self._opened:
             return
         if len(levels) == len(recording.roles):
@@ -205,7 +205,7 @@ class FilesPage(Page):
         self._making = None
         if self._opened is None:
             return
-        # After the pictures: to check the seal takes as long as to draw them.
+        # Delayed until the pictures are drawn, because checking the seal takes as long as drawing.
         QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)

@@ -143,7 +143,7 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the notes of the plan, and those added later, the oldest first, or why none is readable."""
+    """Return the notes of the plan, then later notes from oldest to newest, or an error text."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     try:
@@ -208,7 +208,7 @@ def whole_check(path: Path) -> VerifiedRecording:
 
 
 def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
-    """Describe a recording in a line; ``found`` is its whole check, None until that has ended."""
+    """Describe a recording in one line; ``found`` is the result of `whole_check`, None until that ends."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -236,7 +236,7 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """Selects all recordings or those of one campaign; hidden in a folder without campaigns."""
+    """Choice of all recordings or those of one campaign; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
     """Files of the selected campaign as a set; None for all recordings."""
@@ -367,7 +367,7 @@ class RecordingModel(QAbstractTableModel):
         return content
 
     def _picture(self, path: Path) -> QPixmap | None:
-        """Return the thumbnail of a visible row; drawing all those of a long campaign would take too long."""
+        """Return the thumbnail of a visible row; drawing the thumbnails of all rows would take too long."""
         found = self._thumbnails.get(path)
         if found is not None and path not in self._pictures:
             self._pictures[path] = _paint_thumbnail(found, self._theme)

@@ -41,7 +41,7 @@ CHOOSE = "Choose a recording in the list above."
 
 
 class HiddenMotionView(QWidget):
-    """Motion of m1 between its stops: with a contact model, and without one."""
+    """Estimated motion of m1 between its stops, with and without a contact model."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
@@ -117,7 +117,7 @@ class HiddenMotionView(QWidget):
         self._latest_request.ask(self._asked)
 
     def _choose_specimen(self, place: int) -> None:
-        """Select another specimen; the last entry asks for a file and adds it."""
+        """Select another specimen; the last entry opens a file dialog and adds the chosen file."""
         if self.specimen.itemText(place) == _ANOTHER:
             given, _ = QFileDialog.getOpenFileName(self, "Specimen", "", "Specimens (*.toml)")
             if given:
@@ -156,7 +156,7 @@ _WAIT_MS = 250
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Widths of the spectral lines; None selects one from the visible range."""
+"""Widths of the spectral lines [Hz]; with None, the width follows from the visible range."""
 _BAR_EM = 4
 """Width of the colour scale with its label."""
 _SHOWN_DB = 80.0
@@ -208,12 +208,12 @@ class SpectrogramView(QWidget):
 
     @property
     def plot(self) -> Plot:
-        """Current axes."""
+        """Plot with the selected frequency scale."""
         return self._plots[self._spacing]
 
     @property
     def image(self) -> "_Image":
-        """Current image."""
+        """Image with the selected frequency scale."""
         return self._images[self._spacing]
 
     @property

@@ -24,11 +24,11 @@ _TIME_AXIS_EM, _LEAST_EM = 3, 3
 MARKER = LineStyle(lambda theme: theme.accent)
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
-"""Most plots kept for reuse; creating a plot takes as long as drawing it ten times."""
+"""Largest number of plots kept for reuse; creating a plot takes as long as drawing it ten times."""
 _LABEL_AT = 0.1
-"""Height of segment names, as a share of the plot: at the bottom, since the channel name is at the top."""
+"""Height of segment names, as a share of the plot; low, because the channel name is at the top."""
 _NAMED_SHARE = 0.08
-"""Smallest share of the recording for which a segment's name is drawn."""
+"""Share of the recording that a segment must exceed for its name to be drawn."""
 
 
 @dataclass(eq=False)
@@ -40,7 +40,7 @@ class _TimeHistory:
 
 
 class RecordingTimeHistories(QWidget):
-    """Plots over one time axis. Wheel and + - zoom, arrows move, Home shows all, dragging moves."""
+    """Plots over one time axis. Wheel, + and - zoom; arrows and dragging move; Home shows all."""
 
     range_changed = Signal()
     markers_moved = Signal()
@@ -58,7 +58,7 @@ class RecordingTimeHistories(QWidget):
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(2)
-        # Several range changes may come with one move; draw once, after them.
+        # One move may cause several changes of the range; draw only once, after the last.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 
@@ -104,7 +104,7 @@ class RecordingTimeHistories(QWidget):
 
     @property
     def plots(self) -> tuple[Plot, ...]:
-        """One for each channel."""
+        """Plots, one for each channel."""
         return tuple(history.plot for history in self._histories)
 
     def show_all(self) -> None:
@@ -209,7 +209,7 @@ class RecordingTimeHistories(QWidget):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Delete plots that neither this recording nor probably the next one needs."""
+        """Delete plots that this recording does not use, when more are kept than allowed."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]

@@ -1,4 +1,4 @@
-"""Maps: the request on the left; on the right the map as it grows, and the motion at one point."""
+"""The Maps page: the request on the left; on the right the growing map, and the motion at one point."""
 
 from collections.abc import Callable
 from functools import partial
@@ -46,7 +46,7 @@ HINT = (
 )
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
-"""Quantile at both ends at which the colour scale is cut."""
+"""The colour scale ends at this quantile, and begins at one minus this quantile."""
 
 
 class MapPlot(QWidget):
@@ -74,7 +74,7 @@ class MapPlot(QWidget):
         return (left, right), (10.0**bottom, 10.0**top)
 
     def show_picture(self, picture: MapPicture, quantity: str) -> None:
-        """Draw a map, complete or not; the axes change only when its limits change."""
+        """Draw a complete or partial map; the axes change only when its limits change."""
         self.show_range(picture.frequency_hz, picture.amplitude_m)
         (left, right), (low, high) = picture.frequency_hz, picture.amplitude_m
         self.image.setImage(COLOURINGS[quantity](picture), autoLevels=False, levels=(0, 255))
@@ -90,7 +90,7 @@ class MapPlot(QWidget):
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
-        """Remove the map; the axes will show the whole of the next one."""
+        """Remove the map; the axes will be set to show the whole next map."""
         self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)
@@ -118,7 +118,7 @@ class MapPlot(QWidget):
 
 def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
     colours = [(*pg.mkColor(colour).getRgb()[:3], 255) for _, colour in MOTION_CLASSES]
-    # The last row is the colour of -1: not computed yet.
+    # The last row is the colour of class -1, which means not computed yet.
     return np.array([*colours, UNKNOWN], dtype=np.uint8)[picture.classes]
 
 
@@ -185,13 +185,13 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Share of the height for the map, of 1000; the motion takes the rest."""
+"""Height of the map, in thousandths of the page; the plots of the motion take the rest."""
 DIGITS = 5
 """Significant digits of the ranges that a zoom enters in the form."""
 
 
 class MapsPage(Page):
-    """Computes one map at a time; outdated requests are dropped."""
+    """Page that computes one map at a time; outdated requests are dropped."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -214,7 +214,7 @@ class MapsPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when a map is complete."""
+        """Whether a map is complete."""
         return self.picture is not None and not self.simulator.is_busy
 
     @property
@@ -397,10 +397,10 @@ class MapsPage(Page):
 
 
 def _legend_entry(name: str, colour: str) -> str:
-    """Return a framed square and an unbroken name; some colours equal the page's background."""
+    """Return a coloured square and a name; the square is framed, as some colours equal the background."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
 
 def _ignore(_error: BaseException) -> None:
-    """Ignore the error: noise and dwells have no level over frequency; Compare reports unreadable files."""
+    """Ignore errors: noise and dwells have no level over frequency; Compare reports unreadable files."""

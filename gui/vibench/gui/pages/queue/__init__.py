@@ -1,4 +1,4 @@
 """The Queue page: a campaign as a table, its sweeps, and the state of each point.
 
-Every edit gives a complete, valid campaign or is refused. Duration and size are computed in another process.
+An edit is refused unless it gives a complete, valid campaign. Another process computes duration and size.
 """

@@ -1,4 +1,4 @@
-"""Edits of a campaign; each edit gives a complete, valid campaign or is refused."""
+"""Edits of a campaign; an edit is refused unless it gives a complete, valid campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,8 +39,8 @@ def with_sweep(
 ) -> Campaign:
     """Add a sweep of a test along an axis.
 
-    Raises ConfigurationError when a point of it is not allowed. Limits that need a simulation (loads of
-    shaker and specimen) are checked when the campaign is armed.
+    Raises ConfigurationError when a point of the sweep is not allowed. Limits that need a simulation (loads
+    of shaker and specimen) are checked when the campaign is armed.
     """
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)
@@ -59,7 +59,7 @@ def with_sweep(
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
-    """Remove one entry; None when none is left."""
+    """Remove one entry; return None when no entry is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -168,7 +168,7 @@ def point_rows(
 
 @dataclass(frozen=True)
 class CampaignPreview:
-    """Preview of a campaign."""
+    """Summary of a campaign: rows, levels, existing recordings, duration and size."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     levels: Mapping[str, str]

@@ -62,7 +62,7 @@ class SweepForm(QGroupBox):
     """Form to add a sweep of the test on the Test page."""
 
     wanted = Signal(object, object)
-    """The `SweepAxis` and its `Range`."""
+    """`SweepAxis` and `Range` of the requested sweep."""
     refused = Signal(str)
 
     def __init__(self) -> None:
@@ -134,7 +134,7 @@ LOOK_MS = 50
 
 
 class QueuePage(Page):
-    """Edits the next campaign and shows the running one."""
+    """Page that edits the next campaign and shows the running one."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -150,7 +150,7 @@ class QueuePage(Page):
             "Load a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
-        # Otherwise the excitation column, which takes the remaining width, would be only a few letters wide.
+        # The excitation column takes the remaining width, and would otherwise be only a few letters wide.
         self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
@@ -186,7 +186,7 @@ class QueuePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when every recording of the campaign exists."""
+        """Whether every recording of the campaign exists."""
         status = self.context.bridge.status
         rows = () if status is None else status.rows
         return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
@@ -207,7 +207,7 @@ class QueuePage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Campaigns."""
+        """Function that opens campaigns."""
         return {FileKind.CAMPAIGN: self.open_file}
 
     def undo(self) -> None:
@@ -315,7 +315,7 @@ class QueuePage(Page):
 
     @property
     def _chosen_entry(self) -> int:
-        """Number of the selected row; -1 without one, and while the rows belong to an earlier campaign."""
+        """Number of the selected row; -1 if none is selected or the rows belong to an earlier campaign."""
         return self.entries.currentRow() if self.entries.isEnabled() else -1
 
     def _remove(self) -> None:

@@ -48,7 +48,7 @@ PACES = {"wall": "in real time, as a bench would", "free": "as fast as this comp
 
 
 class RigChoice(QWidget):
-    """Selects a hardware configuration; an unreadable file is reported and not selected."""
+    """Choice of a hardware configuration; an unreadable file is reported and not selected."""
 
     chosen = Signal()
     refused = Signal(object)
@@ -59,7 +59,7 @@ class RigChoice(QWidget):
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
-        """Why the selected file cannot be used, or should be checked; empty without a reason."""
+        """Why the selected file cannot be used, and what to check in it; each empty if there is nothing."""
         self._box = Choice(name="Hardware configuration")
         self._box.setToolTip("Instruments connected to this computer; a simulated rig runs anywhere")
         own = QPushButton("Own file…")
@@ -99,7 +99,7 @@ class RigChoice(QWidget):
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
-        """Select a file, listed or not."""
+        """Select a file, and add it to the list if it is new."""
         if path not in self._paths:
             self._add(path)
         row = self._paths.index(path)
@@ -135,7 +135,7 @@ class RigChoice(QWidget):
 
 
 class KnobSheetForm(QGroupBox):
-    """A check box for every knob, and the name of the operator."""
+    """Form with a check box for every knob, and the name of the operator."""
 
     changed = Signal()
 
@@ -206,7 +206,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Return the expected value, and what to do after a deviation."""
+    """Return the expected value, and advice for the case that the measured value differs."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 
@@ -260,7 +260,7 @@ class RigPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when the bench is open and no check has failed."""
+        """Whether the bench is open and no check has failed."""
         status = self.context.bridge.status
         if status is None or status.bench is None:
             return False
@@ -292,7 +292,7 @@ class RigPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Hardware configurations; none while a bench is open."""
+        """Function that opens hardware configurations; it refuses while a bench is open."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:
@@ -310,7 +310,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # an adopted engine may have another rig
+            self.context.selection.choose_rig(rig)  # an adopted engine may have changed the rig
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:

@@ -1,6 +1,6 @@
-"""The Run page: arming in plain words, starting, and live pictures of the run.
+"""The Run page: description of the armed test, start button, and live pictures of the run.
 
-Newest seconds of every channel, spectra, transmissibility with coherence, phase portrait and Poincaré
-section, responses over the actual drive frequency, level meters. The engine link's live view supplies the
-samples; the file holds more than is drawn.
+It shows the newest seconds of every channel, spectra, transmissibility with coherence, phase portrait and
+Poincaré section, responses over the actual drive frequency, and level meters. The samples come from the live
+view of the engine link; the file holds more than is drawn.
 """

@@ -23,7 +23,7 @@ from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
 Curves = Mapping[str, pg.PlotDataItem]
-"""Curves by the field that they show."""
+"""Curves by the name of the field that they show."""
 
 
 def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
@@ -118,9 +118,9 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""A fixed time axis; a scrolling one would be painted again in every frame."""
+"""Time axis; it is fixed, because a scrolling one would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Columns of a plot: one per pixel column within these limits, so that no gap appears."""
+"""Limits of the number of columns of a plot; one per column of pixels leaves no gap."""
 AXIS_EM, TIME_AXIS_EM = 4.0, 3
 USUAL_SPAN_S = 2.0
 """Time range shown at first [s]."""
@@ -212,7 +212,7 @@ MEASURED = "measured, 95 % bounds"
 
 
 class TransmissibilityPlot(QWidget):
-    """|x / U| over frequency."""
+    """Plot of the transmissibility |x / U| and its coherence over frequency."""
 
     title = "Transmission from base to m0"
     tab = "Transmission"
@@ -261,7 +261,7 @@ _LEAST = 1e-12
 
 
 class SpectrumPlot(QWidget):
-    """All channels over one frequency axis."""
+    """Plot of the spectra of all channels over one frequency axis."""
 
     title = "Spectral density of every channel"
     tab = "Spectrum"
@@ -291,7 +291,7 @@ class SpectrumPlot(QWidget):
             curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
 
     def _redraw(self) -> None:
-        """Redraw after a change of units; the axis has the unit of each channel."""
+        """Redraw all curves after a change of units, since each curve has its channel's unit."""
         self.plot.wipe()
         self._curves.clear()
         if self._view is not None:
@@ -354,7 +354,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Shades of a forecast. It ends where its error is a quarter of the gap, with the faintest shade."""
+"""Number of shades of a forecast; the faintest is at its end, where the error is a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "p of m1 between its stops, while a test runs and the live twin is on."
@@ -404,7 +404,7 @@ class HiddenMotionPlot(QWidget):
         self.plot.keep_in_view(up=(-reach, reach))
 
     def clear(self) -> None:
-        """Clear the plot: there is no twin, or a new run begins."""
+        """Clear the plot when the twin is off or a new run begins."""
         for curve in (self.tracked, *self.forecast):
             curve.setData([], [])
         for line in self._stops:
@@ -413,7 +413,7 @@ class HiddenMotionPlot(QWidget):
         self._end = (0, -1)
 
     def _draw_forecast(self, twin: TwinStatus) -> None:
-        """Draw the forecast in pieces; a larger error gives a fainter piece."""
+        """Draw the forecast in pieces; the larger the error, the fainter the piece."""
         p, error = np.array(twin.forecast_m), np.array(twin.forecast_error_m)
         time_s = np.arange(1, p.size + 1) * twin.step_s
         worth = _WORTH_OF_GAP * min(map(abs, twin.stops_m))

@@ -1,4 +1,4 @@
-"""The Run page: arm, start, watch; the pictures show the newest samples."""
+"""The Run page: arm, start and watch a test; the pictures show the newest samples."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -83,12 +83,12 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Room for four channels, the usual number."""
+        """Return the size for at least four channels, the usual number."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
     def minimumSizeHint(self) -> QSize:
-        """Room for the text."""
+        """Return the smallest size that shows the text."""
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -125,11 +125,11 @@ SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
 
 
 class WatchCard(QGroupBox):
-    """Progress, averages, impacts, time range, marks and the live twin's switch."""
+    """Box with progress, averages, impacts, time range, marks and the switch of the live twin."""
 
     mark_wanted = Signal(str)
     reject_requested = Signal()
-    """Exclude the current average of noise from all results."""
+    """Request to exclude the current average of noise from all results."""
     twin_requested = Signal(object)
 
     def __init__(self, theme: Theme) -> None:
@@ -247,7 +247,7 @@ class ArmCard(QGroupBox):
     cancel_wanted = Signal()
     hold_wanted = Signal()
     news = Signal()
-    """Another plan was armed: scroll the description to its beginning."""
+    """Emitted when another plan was armed, so that its description is shown from the beginning."""
 
     def __init__(self) -> None:
         super().__init__("What will happen")
@@ -262,7 +262,7 @@ class ArmCard(QGroupBox):
         self.buttons = column(
             self.arm_button, row(self.cancel_button, (self.start_button, 1)), self.hold_button
         )
-        """The possible commands; they do not scroll with the description."""
+        """Buttons, which do not scroll with the description."""
         self._armed: tuple[str, ...] = ()
         """Description of the armed plan; empty when nothing is armed."""
         self._read: tuple[str, ...] = ()
@@ -284,7 +284,7 @@ class ArmCard(QGroupBox):
         return self._words.text()
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
-        """Show the possible commands; ``reason`` tells why the test cannot be armed, empty when it can."""
+        """Show the possible commands; ``reason`` is why the test cannot be armed, empty if it can."""
         state = EngineState.CLOSED if status is None else status.state
         armed = None if status is None else status.armed
         is_armed = state is EngineState.ARMED and armed is not None
@@ -306,7 +306,7 @@ class ArmCard(QGroupBox):
         if words != self._armed:
             self._armed, self._read = words, ()
             if words:
-                # Arming and starting need different keys.
+                # Focus Cancel, so that the key that armed the plan cannot also start it.
                 self.cancel_button.setFocus()
                 self.news.emit()
         self.start_button.setEnabled(self.is_read)
@@ -318,12 +318,12 @@ class ArmCard(QGroupBox):
 
 
 LAYOUT_ROUNDS = 4
-"""Layout passes until a scroll bar and the line breaks agree."""
+"""Number of layout passes until the scroll bar fits the wrapped text."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
 class RunPage(Page):
-    """Displays the engine's run; it stores no data of the run."""
+    """Page that displays the engine's run; it stores no data of the run."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -357,7 +357,7 @@ class RunPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when something was recorded since the window opened."""
+        """Whether something was recorded since the window opened."""
         return self._ended is not None
 
     def refresh(self) -> None:
@@ -372,7 +372,7 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The focused buttons are hidden; without this call the next list in the row would get the focus.
+            # The focused button is now hidden; without this call, Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._played
@@ -400,7 +400,7 @@ class RunPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Pictures and numbers, with their run as input; frozen pictures are not marked as outdated."""
+        """Pictures and numbers, with their run as input; none while the picture is frozen or hidden."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
         return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)
@@ -411,7 +411,7 @@ class RunPage(Page):
         return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Space freezes, M marks, PgDn scrolls; fields and buttons that use these keys keep them."""
+        """Freeze with Space, mark with M, scroll with PgDn, unless the focused widget uses the key."""
         bar = self._parts.side.verticalScrollBar()
         match event.key():
             case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
@@ -449,7 +449,7 @@ class RunPage(Page):
         self._show_prediction(prediction)
         if measurement is not None:
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
-                # The signal of a preceding check lies outside and would compress the plotted band.
+                # Fix the range: a preceding check plays outside the band, and would compress the plot.
                 plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
         shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
         self.left_tabs.setCurrentWidget(pictures[shown.left])
@@ -469,7 +469,7 @@ class RunPage(Page):
         self.look_button.show()
 
     def _show_channels(self) -> None:
-        """Create the plots before the first sample, because a run has no time for it."""
+        """Create the plots before the run, because creating them during the run would delay it."""
         rig = self.context.selection.rig
         if rig is not None:
             self.time_histories.show_channels(
@@ -503,7 +503,7 @@ class RunPage(Page):
             self.right_tabs.setCurrentWidget(self.hidden_motion)
 
     def _is_armed_read(self) -> bool:
-        """Return whether the description was read; check now, since a new one may not be laid out yet."""
+        """Return whether the description was read, after finishing the layout of a new description."""
         self.refresh()
         for _ in range(LAYOUT_ROUNDS):
             QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
@@ -518,7 +518,7 @@ class RunPage(Page):
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         self.watch_card.reject_requested.connect(self._reject)
-        # Otherwise the pictures of a finished run would pass for those of this run until the next tick.
+        # Until the next tick, the pictures of a finished run would look like those of this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
         self.look_button.clicked.connect(self._look)

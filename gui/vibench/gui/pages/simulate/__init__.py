@@ -1,5 +1,5 @@
-"""The Simulate page: a scene as a form, and its answer as it grows.
+"""The Simulate page: a form for the scene, and results that are drawn as they arrive.
 
-One process computes for as long as the window lives; outdated requests are dropped.
-Responses, exponents, similarity and motion are drawn as they arrive.
+A separate process computes the requests; outdated ones are dropped.
+The results are responses, exponents, similarity and motion.
 """

@@ -37,7 +37,7 @@ Shown_contra = TypeVar("Shown_contra", contravariant=True)
 
 
 class AnswerPicture(Protocol[Shown_contra]):
-    """Draws a result, complete or not."""
+    """Plots that can draw a complete or partial result."""
 
     @property
     def widget(self) -> QWidget:
@@ -56,11 +56,11 @@ class DynamicsKind(Generic[Request, Answer]):
     hidden: frozenset[str]
     """Fields of the request without an editor."""
     answer: Callable[[Request, tuple[PartialResult, ...], float], Answer]
-    """Assembles the result from the pieces so far and the seconds elapsed."""
+    """Function that builds the result from request, pieces so far and elapsed time [s]."""
     cost: Callable[[Answer], str]
     curves: Callable[[Answer], tuple[Curve, ...]]
     before: str
-    """Text on cost and error, shown before a result exists."""
+    """Text about cost and error that is shown before a result exists."""
 
 
 @dataclass
@@ -215,7 +215,7 @@ def _chain(request: ChainRequest, parts: tuple[PartialResult, ...], elapsed_s: f
 
 
 def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
-    """Return no curves: exponents and chains are not comparable with the response of a recording."""
+    """Return no curves, because exponents and chains cannot be compared with a recording."""
     return ()
 
 

@@ -33,7 +33,7 @@ DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
 _FIRST_SPECIAL_COLOUR = 1
-"""Colour 0 is used for motions of one drive period."""
+"""Colour of the first kind of special points; colour 0 is for motions of one drive period."""
 
 
 class _TwoPlots(QStackedWidget):
@@ -52,7 +52,7 @@ class _TwoPlots(QStackedWidget):
             self.addWidget(column((first, 1), (second, 1)))
 
     def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Show the empty pair of plots over a parameter."""
+        """Clear and show the pair of plots over a parameter, and return the pair."""
         self.setCurrentIndex(list(ACROSS).index(along))
         pair = self.pairs[along]
         for plot in pair:
@@ -70,7 +70,7 @@ class _PairPicture:
 
 
 class BranchPicture(_PairPicture):
-    """Stable motions solid, unstable dashed; coloured by period; special points marked."""
+    """Plots of branches: stable solid, unstable dashed, coloured by period, special points marked."""
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
@@ -102,7 +102,7 @@ class BranchPicture(_PairPicture):
 
 
 class SpectrumPicture(_PairPicture):
-    """Six exponents with their intervals, and the dimension with its interval."""
+    """Plots of the six Lyapunov exponents and of the dimension, with their intervals."""
 
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, as they are found."
@@ -152,7 +152,7 @@ _GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
 """Smaller transmissibilities are drawn at this value."""
 _MOST_TRACES = 32
-"""Most traces of motion; longer chains show evenly spaced cells."""
+"""Largest number of traces; in longer chains, only evenly spaced cells are shown."""
 _HEIGHT = 0.45
 """Height of the largest motion, in cells."""
 
@@ -232,7 +232,7 @@ _HINTS = (
     "How far the two models differ, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
-"""Smaller differences are drawn at this value, because equal curves have no logarithm."""
+"""Smaller differences are drawn at this value, because zero has no logarithm."""
 
 
 class AnswerPlots(QWidget):

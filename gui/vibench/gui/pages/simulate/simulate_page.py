@@ -1,4 +1,4 @@
-"""Simulate: a scene as a form, its cost, and curves that grow while they are computed."""
+"""The Simulate page: a form for the scene, its cost, and curves that grow while they are computed."""
 
 import json
 import os
@@ -60,7 +60,7 @@ class SimulatePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when a simulation is complete."""
+        """Whether a simulation is complete."""
         return self.progress is not None and not self.simulator.is_busy and self.progress.done > 0
 
     def refresh(self) -> None:
@@ -68,7 +68,7 @@ class SimulatePage(Page):
         if self._is_stale and not self._undrawn:
             self._is_stale = False
             self._undrawn = self.plots.steps(self.progress)
-            # Points with several motions; the table is hidden without any.
+            # The table lists points with several motions; without such points it is hidden.
             rows = () if self.progress is None else self.progress.motion_rows
             self.motions.show_rows(rows)
             self.motions.setVisible(bool(rows))
@@ -95,7 +95,7 @@ class SimulatePage(Page):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """The tabs, each of which has as many fields as another page."""
+        """The tabs, each of which is as large as another page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:

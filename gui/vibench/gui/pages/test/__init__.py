@@ -1,5 +1,5 @@
 """The Test page: the next signal, its loads, and the predicted response.
 
-A form of one measurement, the signal in time and spectrum, predicted loads beside the limits of
-the rig, and the predicted response of the specimen. Preview and prediction are computed in another process.
+It has a form of one measurement and plots of its signal over time and frequency. Predicted loads are shown
+beside the limits of the rig. Another process computes preview and predicted response.
 """

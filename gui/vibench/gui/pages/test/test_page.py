@@ -117,21 +117,21 @@ class TestForm(ValidatedForm[Measurement]):
 
 
 FIRST = "quick"
-"""The campaign whose tests are listed first."""
+"""Name of the campaign whose tests are listed first."""
 MOST_OF_ONE = 12
-"""Most tests listed of one campaign; sweeps have hundreds."""
+"""Largest number of tests listed from one campaign, because a sweep has hundreds."""
 
 
 @dataclass(frozen=True)
 class NamedTest:
-    """A test and its origin."""
+    """A test, with a label that names its origin."""
 
     label: str
     measurement: Measurement
 
 
 def shipped_tests() -> tuple[NamedTest, ...]:
-    """Return the tests of the shipped campaigns whose required packages are installed."""
+    """Return the tests of shipped campaigns; campaigns that cannot be loaded are skipped."""
     campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
     return tuple(
         NamedTest(f"{campaign.name} / {each.name}", each)
@@ -161,7 +161,7 @@ COLLISION = LineStyle(lambda theme: theme.traces[3], fill_opacity=0.18)
 
 
 class PredictionPlot(Plot):
-    """Simulated response: dashed lines, the model in the legend, collision regions as stripes."""
+    """Plot of the simulated response: dashed or dotted lines, with stripes where the masses collide."""
 
     def __init__(self, theme: Theme) -> None:
         up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
@@ -196,7 +196,7 @@ _FLOOR = 1e-5
 _LEAST_HZ = 1.0
 """Lower end of the spectrum; no shaker moves below it."""
 _LEAST_LINES = 9
-"""Smallest useful height of the text, in lines."""
+"""Smallest useful height of a plot, in lines of text."""
 
 
 class PreviewPlots(QWidget):
@@ -232,7 +232,7 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
 class LimitTable(ReadTable):
-    """One row per limit, the most used first."""
+    """Table of limits, one row per limit; a bar shows how much of the limit is used."""
 
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
@@ -285,7 +285,7 @@ _SHOWN = {
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     """Return excitation, loads beside their limits, time and size in words.
 
-    ``refusal`` tells why feedback control would not hold the motion.
+    ``refusal`` is the reason why feedback control would not hold the motion, or empty.
     """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
@@ -317,13 +317,13 @@ def _load(check: LimitCheck, name: str) -> str:
 
 Asked = tuple[Measurement | None, Rig | None] | None
 NAMELESS = {"name": "test", "notes": ""}
-"""Name and notes of a test in predictions, which depend on neither."""
+"""Fixed name and notes for predictions, because these do not depend on name and notes."""
 LOOK_MS, PREDICT_MS = 200, 900
 """Delays between the last edit and preview or simulation [ms]."""
 
 
 class TestPage(Page):
-    """Edits the test that Arm will arm."""
+    """Page that edits the next test; the Arm button arms it."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -363,7 +363,7 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked when the test is valid, within all limits, and no feedback is known to lose it."""
+        """Whether the test is valid and within all limits, and feedback control is expected to hold it."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
@@ -373,7 +373,7 @@ class TestPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Files of tests."""
+        """Function that opens files of tests."""
         return {FileKind.TEST: self.open_file}
 
     def undo(self) -> None:
@@ -419,7 +419,7 @@ class TestPage(Page):
         if measurement is not None:
             self._history.note(measurement)
             if asked == self._asked:
-                # A new name changes no prediction.
+                # Only name or notes changed, so the prediction stays valid.
                 if seen is not None:
                     self.context.selection.keep_prediction(seen)
                 return
@@ -517,7 +517,7 @@ class TestPage(Page):
             self.save_as(measurement, Path(given))
 
     def save_as(self, measurement: Measurement, path: Path) -> None:
-        """Save a test; it is listed from now on if it is in the folder of tests."""
+        """Save a test; a test saved in the folder of tests appears in the list."""
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
@@ -572,14 +572,14 @@ class TestPage(Page):
         cells.setRowStretch(1, 2)
         cells.setRowStretch(2, 3)
         for table in (self.limits, self.prediction):
-            # Neither plot may ask for more height than the preview; they share the remaining height.
+            # Ignore the preferred heights, so that the preview gets enough height.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
         fill_box(QVBoxLayout(self), self._parts)
 
 
 def _stored_test(text: str) -> Measurement | None:
-    """Return a stored test; None if an older version stored one that is no longer valid."""
+    """Return a stored test; None if it is not valid in this version."""
     try:
         return validated(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):

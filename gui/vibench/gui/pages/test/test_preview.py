@@ -14,31 +14,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TestPreview:
-    """A test on a rig."""
+    """A test and the rig on which it will run."""
 
     measurement: Measurement
     rig: Rig
 
 
 def preview_test(test: TestPreview) -> MeasurementPreview:
-    """Return signal, loads, time and size."""
+    """Return signal, loads, duration and file size of a test."""
     return preview_measurement(test.measurement, test.rig)
 
 
 @dataclass(frozen=True, eq=False)
 class TestPrediction:
-    """Predicted response, and the predicted quality of the result."""
+    """Predicted response of a test, with the expected uncertainty of its results."""
 
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
     recorded_s: float | None
-    """Predicted time of recording with `until` [s]; None if it is not known, or without `until`."""
+    """Predicted recording time of a test with `until` [s]; None if unknown or without `until`."""
     refusal: str
-    """Why feedback on the rig would not hold the motion; empty without an objection."""
+    """Why feedback on the rig would not hold the motion; empty if it would."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
-    """Simulate the response of the specimen."""
+    """Simulate the response of the specimen, and predict uncertainty and recording time."""
     refusal = ""
     try:
         test.measurement.excitation.require_holdable(test.rig)
