@@ -1,8 +1,8 @@
 """Entry point of the `vibench` command, with a fast path for `vibench stop`.
 
-Loading the libraries of the other commands takes half a second of processor time, during which the drive is
-on. Only the standard library is imported here. Special cases, and systems other than Linux, use the complete
-command.
+The drive is on until `vibench stop` acts, and loading all libraries takes half a second of processor time.
+Therefore, this module imports only the standard library. Special cases, and systems other than Linux, use the
+complete command.
 """
 
 import gc
@@ -16,7 +16,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class RunningProgram:
-    """A program's announcement: process id and start time in the file name, further facts in the file."""
+    """Program that has announced itself by a file, whose name holds process id and start time."""
 
     def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
         self.path = path
@@ -25,7 +25,7 @@ class RunningProgram:
         self.is_alive = is_alive
         try:
             with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                self._facts = file.read()  # before it is withdrawn
+                self._facts = file.read()  # now, because the program may remove the file
         except OSError:
             self._facts = b""
 
@@ -42,7 +42,7 @@ class RunningProgram:
 
 
 def main() -> None:
-    """Stop, if the arguments are a simple stop command; otherwise run the complete command."""
+    """Stop the programs if the arguments are a simple stop command; otherwise run the complete command."""
     if sys.argv[1:2] == ["stop"] and sys.platform == "linux":
         request = parse_stop(sys.argv[2:])
         code = None if request is None else stop_programs(*request)
@@ -50,14 +50,14 @@ def main() -> None:
             sys.exit(code)
     # pydantic searches the metadata of every installed package for plug-ins; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # imports leave little garbage; collecting it took a fifth of the start
+    gc.set_threshold(10_000)  # imports leave little garbage; collecting took a fifth of the start-up
     from vibench.cli import main as run_command
 
     run_command()
 
 
 def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
-    """Return level, reason and process id of a stop command; None for the complete command."""
+    """Return level, reason and process id of a simple stop command; None if the arguments are not one."""
     split = [part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])]
     given = dict(zip(split[::2], split[1::2], strict=False))
     if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
@@ -69,7 +69,7 @@ def parse_stop(words: Sequence[str]) -> tuple[str, str, str] | None:
 
 
 def stop_programs(level: str, reason: str, pid: str) -> int | None:
-    """Stop the selected programs and return the exit code; None for the complete command."""
+    """Stop the selected programs and return the exit code; None if the complete command is needed."""
     try:
         programs = [each for each in running_programs() if pid in ("", each.pid)]
         living = [each for each in programs if each.is_alive]
@@ -90,7 +90,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
 
 
 def running_programs() -> Iterator[RunningProgram]:
-    """Yield the announced programs of this computer; raise OSError if another computer's is among them."""
+    """Yield the programs announced on this computer; raises OSError if one runs on another computer."""
     folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
     boot, space = _own_place()
     for name in sorted(os.listdir(folder)):  # noqa: PTH208
@@ -120,7 +120,7 @@ def _own_place() -> tuple[str, str]:
 
 
 def _start_of(pid: str) -> str:
-    """Return the start time of a running process, from proc(5); empty if it does not run."""
+    """Return the start time of a process, as proc(5) states it; empty if the process does not run."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
@@ -130,7 +130,7 @@ def _start_of(pid: str) -> str:
 
 
 def _is_locked(path: str) -> bool:
-    """Return whether the announcing program runs, in which case it holds a lock."""
+    """Return whether the program that made the file runs; if so, it holds a lock on the file."""
     import fcntl
 
     try:

@@ -1,4 +1,4 @@
-"""The `vibench` command: the table of commands, and the only place where errors become sentences.
+"""The `vibench` command: the table of commands, and the handling of errors of all commands.
 
 Commands are listed by name, and each is imported only when it is called.
 """
@@ -59,13 +59,13 @@ class Place:
     panel: Panel
     function: str
     extras: tuple[str, ...] = ()
-    """Extras required before the command starts; an extra that includes the others comes first."""
+    """Optional dependencies (extras) that the command needs; one that includes the others comes first."""
     space_mb: int = 300
-    """Address space of its libraries and threads [MB]."""
+    """Address space that the libraries and threads of the command need [MB]."""
     advice: str = ""
     """What to do if the command cannot run."""
     help: str = ""
-    """Help of a group of commands, which has no function with a docstring."""
+    """Help text of a group of commands, because a group has no function with a docstring."""
 
     def load(self) -> typer.Typer:
         """Import the command as an application with one command."""
@@ -79,7 +79,7 @@ class Place:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from the source because imports are slow."""
+        """First line of the function's docstring, read from the source file because importing is slow."""
         module, name = self.function.split(":")
         source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
@@ -112,12 +112,12 @@ class LateCommand(TyperCommand):
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""Base class of usage errors, from click or from the copy of click in newer typer."""
+"""Base class of usage errors, which is in click or, with newer typer, in its own copy of click."""
 
 
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
-    """Refuse empty arguments, and add the given and the allowed value to usage errors."""
+    """Context that refuses empty arguments, and adds the given and allowed values to usage errors."""
     words = ["", *words_of(args)]
     empty = next((before for before, word in pairwise(words) if not word), None)
     try:
@@ -131,7 +131,7 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if type(error) is typer.BadParameter:  # a missing option is one too
+        if type(error) is typer.BadParameter:  # exactly this class, because a missing option is a subclass
             error.exit_code = ExitCode.FAILED
         if args:  # without arguments, the message is the help
             error.message = printable(error.message)
@@ -177,7 +177,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space of commands that simulate or analyse (measured: 775) or open a bench (1807) [MB]."""
+"""Address space needed to simulate or analyse (measured: 775), and to open a bench (1807) [MB]."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -237,13 +237,13 @@ class LogLevel(StrEnum):
 
     WARNING = "warning"
     INFO = "info"
-    """Also what is noted in recordings."""
+    """Also log the messages that recordings store."""
     DEBUG = "debug"
-    """Also messages to instruments and their replies."""
+    """Also log the messages to instruments and their replies."""
 
 
 class OneLine(logging.Formatter):
-    """Formats a log message as one printable line; it may contain names and instrument replies."""
+    """Formatter that writes a log message as one line, without control characters from names or replies."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
         """Return a message as one line."""
@@ -251,7 +251,7 @@ class OneLine(logging.Formatter):
 
 
 class LogBeside(logging.StreamHandler[TextIO]):
-    """Writes log lines in a thread, so that a suspended terminal or an unread pipe does not delay a run."""
+    """Handler that logs in a thread, so that a suspended terminal or unread pipe does not delay a run."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -289,14 +289,14 @@ def vibench(
     """Set up logging for all commands."""
     handler = LogBeside()
     handler.setFormatter(OneLine("%(asctime)s %(name)s: %(message)s"))
-    # Log vibench only: other libraries log a traceback for every broken message of a client.
+    # Log only vibench, because other libraries log a traceback for every broken message of a client.
     ours = logging.getLogger("vibench")
     ours.handlers = [handler]
     ours.setLevel(log_level.upper())
 
 
 def main() -> None:
-    """Run the command line; an error that a user can fix is one sentence and a non-zero exit."""
+    """Run the command line; an error that a user can fix gives one sentence and a non-zero exit code."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; suppresses gRPC's log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
@@ -307,12 +307,12 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # raised for paths, because files contain valid text
+    except UnicodeEncodeError as error:  # caused by a path, because files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Any command may be the first to use a path, so errors of paths are caught here for all.
+        # Any command may meet an unusable path first, so such errors are handled here for all commands.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -323,12 +323,12 @@ def main() -> None:
 def _disk_trouble(error: Exception) -> str:
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
-    name = str(error.filename2 or error.filename or "a file")  # a copy names its source first
+    name = str(error.filename2 or error.filename or "a file")  # for a copy, the second name is the target
     return DISK_ERRORS[error.errno].format(name=shortened(name, NAME_SHOWN))
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return the exceeded limit behind an error, which libraries may have wrapped; empty without one."""
+    """Return a sentence if lack of memory or too many files caused an error, even indirectly; else empty."""
     if error is None:
         return ""
     text = str(error)
@@ -360,11 +360,11 @@ _NO_MEMORY = (
     "without setting an exception",
     "without exception set",
 )
-"""Messages of the system, Python and the loader when memory is exhausted."""
+"""Error messages of the system, Python and the loader when memory is exhausted."""
 
 
 NAME_SHOWN = 80
-"""Displayed letters of a name that is too long."""
+"""Number of letters shown of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:

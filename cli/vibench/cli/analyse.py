@@ -53,7 +53,7 @@ class DrivenBy(StrEnum):
 
     @property
     def simulation(self) -> Simulation:
-        """The corresponding value for the analysis."""
+        """The corresponding `Simulation` value for the analysis."""
         return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
 
 
@@ -260,7 +260,7 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
-    """Yield the hidden motion of each recording with a result; print an error where none can be estimated."""
+    """Yield the hidden motion of each recording with a result; print an error if it cannot be estimated."""
     for facts in results.facts if hidden is not _Hidden.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:
@@ -275,13 +275,13 @@ def hidden_motions(
 def fit_specimen(
     paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
-    """Fit the specimen to recordings, independent of the other options of the report."""
+    """Fit the specimen to recordings; the options of the report do not affect the fit."""
     measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)
     return update_model(measured, also_free, observer)
 
 
 def complain_about(results: CampaignResults) -> None:
-    """Raise an error with a sentence for each recording without a result or a simulation."""
+    """Print each failed analysis or simulation; exit with an error if an analysis failed."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
         errors.print(f"{word}: {failure.with_recording}")

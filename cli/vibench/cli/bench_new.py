@@ -40,7 +40,7 @@ from .paths import free_path
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
-"""Answers meaning that a wire is not plugged in; false is one of them."""
+"""Answers that mean that a wire is not plugged in."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Answers:
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """The questions, and other values of the template that the file sets."""
+        """The usual questions, and one question for each other value that the answer file sets."""
         usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
@@ -69,13 +69,13 @@ class Answers:
         return answer
 
     def wired(self, pair: str) -> str:
-        """Return the answer on whether a pair of connectors is wired."""
+        """Return the answer to the question whether a pair of connectors is wired; empty for no."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
-        """Return the confirmation of all settings made by hand, or none."""
+        """Return the confirmation of all settings made by hand; raises CheckFailed if it is missing."""
         if self.given.get(_KNOBS) != "as in the file":
             raise CheckFailed(
                 "settings made by hand are not confirmed; compare them, then give "
@@ -90,7 +90,7 @@ class Answers:
 
 
 def _name_in_a_comment(answer: str) -> str:
-    """Remove characters that would end a line of the configuration or cannot be written."""
+    """Remove unprintable characters such as line ends, because the name is written in a comment."""
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 
@@ -136,7 +136,7 @@ def _report_refusal(error: ConfigurationError) -> None:
 
 
 def _confirm_wire(target: Path, pair: str) -> str:
-    """Ask whether a wire is plugged in; the output is off, and Ctrl-C ends the program at once."""
+    """Ask whether a wire is plugged in; Ctrl-C may end the program at once, because the output is off."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
@@ -150,7 +150,7 @@ def _confirm_wire(target: Path, pair: str) -> str:
 
 
 def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
-    """Ask the questions, write the configuration, run the first day's checks, and write the report."""
+    """Ask the questions, write the configuration, run the checks of a new bench, and write the report."""
     given = None if answers is None else Answers.read(answers)
     if given is None and not sys.stdin.isatty():
         raise ConfigurationError("this is no terminal, and there are no answers; give --answers FILE.toml")

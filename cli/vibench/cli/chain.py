@@ -1,4 +1,4 @@
-"""`vibench chain`: a row of coupled cells: waves, band gaps, transmission, energy, impacts, exponents."""
+"""`vibench chain`: waves, band gaps, transmission, energy, impacts and exponents of a row of cells."""
 
 import math
 from pathlib import Path
@@ -102,7 +102,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Return the base motion as fields of the request; empty without a frequency or a recording."""
+    """Return the fields of the request for the base motion; no drive if no motion is given."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(

@@ -37,7 +37,7 @@ LOOK_S = 1.0
 
 
 class Analyst:
-    """Analyses recordings in another process, and returns the results in the same order."""
+    """Analysis of recordings in another process, with the results in the order of submission."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
@@ -56,7 +56,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order as they are ready; raises AnalysisError when the process ended early."""
+        """Yield the results in order, waiting for each; raises AnalysisError if the process has ended."""
         for number in range(self.submitted):
             while number == len(self._parts):
                 self._pool.poll(LOOK_S)

@@ -1,4 +1,4 @@
-"""`vibench doctor`: facts about this installation, as text to paste into a report."""
+"""`vibench doctor`: facts about this installation, for pasting into a problem report."""
 
 import os
 import platform
@@ -24,7 +24,7 @@ from .paths import AsJson
 
 NOT_INSTALLED = "not installed"
 FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
-"""Extras that users do not need."""
+"""Optional dependencies (extras) that only developers need."""
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
     STATE_VARIABLE: "folder for locks, bench checks and learnt costs; by default the user's own",
@@ -78,7 +78,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield the version of each library; for a missing one, the extra that installs it."""
+    """Yield each library with its version, or with the extra that installs it if it is missing."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
@@ -86,7 +86,7 @@ def libraries() -> Iterator[tuple[str, str]]:
         asking.setdefault(name, []).append(extra[1] if extra else "")
     sizes = Counter(extra for extras in asking.values() for extra in extras)
     for name, extras in asking.items():
-        # Extras include others; propose the one with the fewest libraries.
+        # Several extras may contain the library; propose the one with the fewest libraries.
         smallest = min(set(extras) - FOR_DEVELOPERS, key=sizes.__getitem__, default=None)
         if name == "vibench" or smallest is None:
             continue
@@ -97,7 +97,7 @@ def libraries() -> Iterator[tuple[str, str]]:
 
 
 def engine() -> Iterator[tuple[str, str]]:
-    """Load the native engine; yield its path, its processor family, and whether it solves a known scene."""
+    """Load the native engine, which tests itself; yield its path, processor family and test result."""
     try:
         loaded = native_engine()
     except (EngineError, OSError, subprocess.CalledProcessError) as error:

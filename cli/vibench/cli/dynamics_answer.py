@@ -1,4 +1,4 @@
-"""Shared by the commands on branches, exponents and chains: compute, report and save piece by piece."""
+"""Common functions of the commands for branches, exponents and chains: compute, report, save."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 SHOWN = 24
-"""Rows on the terminal; JSON and file contain all."""
+"""Largest number of rows on the terminal; JSON and file contain all rows."""
 
 
 def room_for(file: str, out: Path | None) -> None:
-    """Refuse a folder that is not writable or holds a result, before anything is computed."""
+    """Before computing, refuse a folder that is not writable or already holds a result."""
     if out is None:
         return
     room_for_folder(out)

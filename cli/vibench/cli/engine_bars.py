@@ -33,7 +33,7 @@ COLUMNS = (
 
 
 class EngineBars:
-    """Draws the engine's status: a bar for the running recording, and lines for results and messages."""
+    """Display of the engine's status: bars for recording and campaign, lines for results and messages."""
 
     def __init__(self, on: Console = console) -> None:
         self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
@@ -54,7 +54,7 @@ class EngineBars:
         self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
-        """Draw what has changed."""
+        """Draw the changes since the last status."""
         for row in status.rows:
             self._row(row)
         for message in status.messages:
@@ -103,9 +103,9 @@ def sentence(message: EngineMessage) -> str:
 
 
 class Watching:
-    """Draws the newest status in a separate thread, so that a blocked terminal blocks nothing else.
+    """Display of the newest status from a separate thread, so that only it waits for a blocked terminal.
 
-    At the end it prints on standard error who stopped the engine, if anyone did, and whether the drive is on.
+    After a stop, it prints on standard error who stopped the engine, and whether the output is off.
     """
 
     def __init__(self, ask: Callable[[], EngineStatus], engine: Engine, on: Console = console) -> None:

@@ -1,4 +1,4 @@
-"""Limit the threads of linear algebra and the memory that processes keep, unless the user has set numbers.
+"""Limit the threads of linear algebra and the memory that processes keep, unless the user has set limits.
 
 Imported before numpy. The matrices are small, and OpenBLAS's threads wait for each other in busy loops: the
 tests of the bench check take 8.8 to 9.7 s of processor time with one thread and 10.5 to 11.6 s with two.

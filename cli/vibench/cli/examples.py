@@ -45,13 +45,13 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def names_of(paths: list[Path]) -> list[str]:
-    """Return the stem of each file, with its folder where two stems are equal."""
+    """Return the name of each file without suffix, with its folder if two names are equal."""
     often = Counter(path.stem for path in paths)
     return [path.stem if often[path.stem] == 1 else f"{path.parent.name}/{path.stem}" for path in paths]
 
 
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
-    """Copy every file into a folder of its name under ``target``; raises ConfigurationError if one exists."""
+    """Copy all shipped folders to ``target``; raises ConfigurationError if one of the files exists."""
     room_for_folder(target)
     copies = {
         path: target / folder / path.relative_to(shipped_folder(folder))

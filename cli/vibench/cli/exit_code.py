@@ -11,6 +11,6 @@ class ExitCode(IntEnum):
     FAILED = 1
     """An error, a value that is not allowed, or a failed part; standard error has a sentence about it."""
     MISUSED = 2
-    """A command or an option is unknown, or one is missing."""
+    """A command or an option is unknown or missing."""
     STOPPED = 3
     """The command was stopped without a failure; ``--resume`` continues."""

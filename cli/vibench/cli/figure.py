@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Figures of the experiment, which need recordings."""
+"""Numbers of the figures of the experiment, which need recordings."""
 
 
 def figure(
@@ -49,7 +49,7 @@ def figure(
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
-    # For all figures, check the inputs of each before drawing the first.
+    # Check the inputs of all figures before drawing the first.
     asked = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])

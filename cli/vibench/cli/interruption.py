@@ -1,4 +1,4 @@
-"""Ctrl-C as a request: the current work is finished and saved. A second Ctrl-C ends the program."""
+"""Ctrl-C as a request to stop after the current work is saved; a second Ctrl-C ends the program."""
 
 import signal
 from collections.abc import Callable, Iterator

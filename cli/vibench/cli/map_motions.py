@@ -148,7 +148,7 @@ def _roughness(results: MapResults) -> UncertaintyExponent | None:
 
 
 def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
-    """Return the summary of a map as JSON; its points are in the file."""
+    """Return a summary of a map as a JSON document; the points are in the file."""
     audit = results.audit
     rough = _roughness(results)
     return {

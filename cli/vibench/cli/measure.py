@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 
 class Form(StrEnum):
-    """Output for people or for programs."""
+    """Form of the output: text for people or JSON for programs."""
 
     TEXT = "text"
     JSON = "json"
@@ -69,7 +69,7 @@ def print_estimate(
     shares: Sequence["TimeShare"] = (),
     ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
-    """Print number of recordings, time, size, free space, and the expected quality of results."""
+    """Print number of recordings, time, size, free space, and the expected uncertainty of results."""
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
@@ -123,7 +123,7 @@ def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | Non
 
 
 def duration_s(text: str) -> float:
-    """Parse a time such as ``30min``, ``1.5 h`` or ``90 s`` [s]."""
+    """Return a time such as ``30min``, ``1.5 h`` or ``90 s`` in seconds."""
     try:
         seconds = number_of(text, "s", "min", "h")
     except ValueError:
@@ -149,7 +149,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the requested messengers; raises ConfigurationError."""
+    """Return the messengers for command and mail; raises ConfigurationError if one is not usable."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))

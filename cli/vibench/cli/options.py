@@ -1,8 +1,8 @@
 """Command-line options that are fields of a pydantic model.
 
 Name, type, default and docstring of a field define the option, as they define form fields, JSON keys and HDF5
-attributes. `RequestOptions` represents these options in a command's signature, which declares all others
-itself.
+attributes. In the signature of a command, one parameter of type `RequestOptions` stands for all these
+options.
 """
 
 import inspect
@@ -48,7 +48,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True)
 class Fields:
-    """Annotation of `RequestOptions` with the fields that become options, in order."""
+    """Annotation of a `RequestOptions` parameter: the fields that become options, in order."""
 
     names: tuple[str, ...]
     panel: str | None = None
@@ -56,7 +56,7 @@ class Fields:
 
 @dataclass(frozen=True)
 class RequestOptions(Generic[Request]):
-    """The given options of a request; the request has defaults for all other fields."""
+    """The options that the user gave for a request; all other fields have defaults."""
 
     model: type[Request]
     typed: Mapping[str, Any]
@@ -67,7 +67,7 @@ class RequestOptions(Generic[Request]):
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request from options by field name; raises InvalidRequest with the first invalid option."""
+    """Return a request with these values by field; raises InvalidRequest that names the first invalid one."""
     from pydantic import ValidationError
 
     try:
@@ -96,7 +96,7 @@ def option(
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
 ) -> OptionInfo:
-    """Return an option that is not a field of a model; ``name`` if it differs from the parameter."""
+    """Return an option that is not a field of a model; give ``name`` if it differs from the parameter."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, min=min)
     return made
@@ -110,7 +110,7 @@ def _option(model: "type[BaseModel]", name: str, panel: str | None) -> OptionInf
 
 
 def _help(model: "type[BaseModel]", name: str) -> str:
-    """Return the help of a field's option: its docstring and the model's default."""
+    """Return the help of an option: the docstring and the default of the model's field."""
     from vibench.analysis.prediction.field_docstrings import field_docstring
 
     default = model.model_fields[name].default
@@ -124,7 +124,7 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return a type without limits and ``| None``; a union becomes text, which the model parses."""
+    """Return a type without limits and ``| None``; for a union return str, which the model parses."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -136,7 +136,7 @@ def _plain(annotation: Any) -> Any:
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command's function with a signature for typer that has an option for every field.
 
-    A switch has no value; ``--no-name`` exists only where it is declared.
+    A switch takes no value, and has no ``--no-name`` unless that is declared.
     """
     signature = inspect.signature(function, eval_str=True)
     parameters: list[inspect.Parameter] = []
@@ -184,18 +184,18 @@ def _parameter(model: "type[BaseModel]", name: str, panel: str | None) -> inspec
 
 
 def words_of(args: Sequence[str]) -> list[str]:
-    """Return arguments with ``--name=value`` split in two."""
+    """Return the arguments, with each ``--name=value`` split into name and value."""
     return [part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each])]
 
 
 class SectionedCommand(TyperCommand):
-    """Prints its help as plain text, with separate sections for options with a heading.
+    """Command whose help is plain text, with a section for each heading of options.
 
-    rich, which typer would use for its boxes, takes 75 ms to load.
+    The boxes that typer would draw need rich, which takes 75 ms to load.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; refuse what only Python reads as a number, such as 1_0."""
+        """Parse the arguments; refuse numbers that are valid only in Python, such as 1_0."""
         kinds = getattr(self.callback, "__annotations__", {})
         numbers: list[Any] = [each for each in self.params if _plain(kinds.get(each.name)) in (float, int)]
         for name, word in pairwise(words_of(args)):
@@ -221,11 +221,11 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Largest length of a command's description in a list."""
+"""Length limit of a command's description in a list; so large that none is shortened."""
 
 
 class SectionedGroup(TyperGroup):
-    """Lists commands by heading, each with the whole first line of its help."""
+    """Command group whose help lists the commands by heading, with the whole first line of their help."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
         """Write a section for each heading."""

@@ -1,4 +1,4 @@
-"""Output of commands: one console for text, JSON on standard output only."""
+"""Output of commands: consoles for text and for errors, and JSON on standard output."""
 
 import json
 import sys
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 
 
 LONGEST_LINE = 1800
-"""Characters: a name in a file may have any length."""
+"""Largest number of characters of a printed line, because a name in a file may have any length."""
 
 
 class PrintableConsole(Console):
-    """Console that escapes control and formatting characters, which any name may contain."""
+    """Console that escapes control and formatting characters, because names may contain them."""
 
     def print(self, *objects: Any, **settings: Any) -> None:
         """Print each string as one line; use `paragraph` for text of several lines."""
         super().print(*map(_shown, objects), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render tables, bars and lines in the same way."""
+        """Render tables, bars and lines, with control characters escaped."""
         for segment in super().render(renderable, options):
             text = "\n".join(map(printable, segment.text.split("\n")))
             yield segment if segment.control else Segment(text, segment.style)
@@ -38,7 +38,7 @@ def _shown(each: Any) -> Any:
     return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
-# No markup and no emoji: names and paths may contain text that looks like them.
+# Without markup and emoji, because names and paths may look like them.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
@@ -61,7 +61,7 @@ def paragraph(text: str) -> Text:
 
 
 def print_table(rows: "Table") -> None:
-    """Print a table of any width: words are wrapped, numbers are never cut."""
+    """Print a table; text is wrapped only between words, so that no number is cut."""
     for column in rows.columns:
         words_of = [word for text in (column.header, *column.cells) for word in str(text).split()]
         column.min_width = max((len(word) for word in words_of), default=0)

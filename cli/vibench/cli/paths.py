@@ -33,7 +33,7 @@ AllowExternal = Annotated[
 
 
 def external_data(allowed: bool) -> AbstractContextManager[None]:
-    """Allow external data within the context, if requested."""
+    """Return a context in which HDF5 files may refer to other files, if ``allowed``."""
     if not allowed:
         return nullcontext()
     from vibench.sim.hdf5_files.door import allow_external_data
@@ -55,13 +55,13 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 
 
 def room_for_folder(path: Path) -> None:
-    """Refuse a folder that is not writable before anything is computed; a created folder is removed again.
+    """Before computing, refuse a folder that cannot be written; nothing is left in it.
 
-    Raises ConfigurationError when it or its parent is a file or not writable.
+    Raises ConfigurationError when the folder or its parent is a file or not writable.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:
-        # Test by writing: administrators pass every permission check, and /proc accepts no folders.
+        # Test by writing: permissions do not bind administrators, and /proc accepts no folders.
         with tempfile.TemporaryDirectory(dir=standing):
             return
     except OSError as error:
@@ -74,9 +74,9 @@ def room_for_folder(path: Path) -> None:
 
 
 def room_for_page(path: Path) -> None:
-    """Refuse a page that is not writable before anything is computed.
+    """Before computing, refuse a page that cannot be written.
 
-    Raises ConfigurationError when it is a folder, or its folder cannot be created.
+    Raises ConfigurationError when the path is a folder, or its folder cannot be created.
     """
     if path.is_dir():
         raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a page in it")
@@ -86,7 +86,7 @@ def room_for_page(path: Path) -> None:
 def file_at(out: Path | None, usual: Path) -> Path:
     """Return the path of a new file: ``out`` itself, or ``usual`` in the folder ``out``.
 
-    A path without a suffix that does not exist is created as a folder.
+    If ``out`` has no suffix and does not exist, it is created as a folder.
     """
     if out is None:
         return usual
@@ -96,7 +96,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
 
 
 def free_path(path: Path) -> Path:
-    """Return an unused path: the given one, or with -2, -3, ... before its suffix."""
+    """Return the given path if it is unused, otherwise with -2, -3, ... before its suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

@@ -1,4 +1,4 @@
-"""Shared by commands that compute many points: workers, and errors of points."""
+"""Options and error messages of commands that compute many points."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -17,11 +17,11 @@ SHOWN_FAILURES = 5
 Workers = Annotated[int | None, option("Threads; by default one per processor.", "N", min=1)]
 Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
-"""Axis values of each failed point, and the reason."""
+"""For each failed point, its axis values and the reason."""
 
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
-    """Raise an error that names failed points, or the number of finished points after a stop."""
+    """Print failed points, or after a stop the number of finished points, and exit with an error code."""
     if print_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:

@@ -41,7 +41,7 @@ from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
-"""Rows on the terminal; JSON and file contain all."""
+"""Largest number of rows on the terminal; JSON and file contain all rows."""
 
 
 def predict(
@@ -102,7 +102,7 @@ def predict(
             and cluster is None
             and study_solver(request) is solve_scene
         ):
-            # A single point needs neither workers nor a file.
+            # Solve a single point directly, without workers and file.
             taken_s, kept, where = [math.nan], 1, request.coordinates(0)
             try:
                 scene = request.scene((0,) * len(request.axes), Rest())
@@ -140,7 +140,7 @@ def predict(
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
-    """Refuse options that a requested error or time determines."""
+    """Refuse options whose values follow from a requested error or time."""
     targets = [name for name in ("error", "time_s") if name in typed]
     others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
     if targets and others:
@@ -179,7 +179,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Return how the points are solved, in one paragraph per group of points solved the same way."""
+    """Explain how the points are solved; one paragraph for adjacent points solved in the same way."""
     from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -193,15 +193,15 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on adjacent points solved the same way, for the point nearest to its stops.
+    """Return a paragraph on adjacent points solved in the same way; details are of that with the largest p.
 
-    Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes a cost paid once per
+    Each entry is frequency [Hz], plan and time [s]; the time is NaN if it includes the start-up of the
     process.
     """
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
     said = " ".join(plan.sentences)
-    if not has_target:  # its time is in the answer
+    if not has_target:  # with a target, the result has the time
         said += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
@@ -247,7 +247,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return the share of starts that settled on a point's motion; empty if all starts give the same."""
+    """Return the number of starts that reached a point's motion; empty if all starts reach it."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
@@ -258,7 +258,7 @@ def _share_text(point: ScenePrediction) -> str:
 
 
 def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
-    """Return a table of the motions at points with more than one; None without such a point."""
+    """Return a table of the motions at points with several motions; None without such a point."""
     several = list(_several(points))
     if not several:
         return None
@@ -281,7 +281,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return where motions depended sensitively on the start, and the cost of the additional starts."""
+    """Return a text on sensitive dependence on the start, and on the additional starts simulated."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

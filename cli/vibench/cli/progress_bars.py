@@ -59,7 +59,7 @@ MINUTES_OF_AN_HOUR = 60.0
 
 @contextmanager
 def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
-    """Show one bar; yields the function that updates it."""
+    """Show one bar, and yield the function that updates it."""
     with show_bars(bars):
         bar = bars.add_task(what, total=total, left="")
 
@@ -88,7 +88,7 @@ def study_bar(points: int) -> AbstractContextManager[Observer]:
 
 
 def reading_bar() -> AbstractContextManager[Observer]:
-    """Show the stage of an analysis and the share of the recording read; the bar disappears at the end."""
+    """Show stage and progress of an analysis; the bar disappears at the end."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     return _bar(Bars(*columns, TimeElapsedColumn(), console=errors, transient=True), "opening", None)
 
@@ -104,7 +104,7 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar; yields the callback that takes the number of new values."""
+    """Show a progress bar, and yield a callback that takes the number of new values."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     with show_bars(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)

@@ -19,7 +19,7 @@ _EXAMPLES = {
         3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
     },
 }
-"""Allowed forms, by number of parts."""
+"""Descriptions of the allowed forms, by number of parts."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Range:
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
     """Parse ``260``, ``50:600`` or ``50:600:1``; ``parts`` holds the allowed numbers of parts.
 
-    ``option`` is the name of the option if it differs from the parameter's.
+    ``option`` is the name of the option if it differs from that of the parameter.
     Raises InvalidRequest for other text.
     """
     try:

@@ -95,7 +95,7 @@ _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m
 
 
 def _heading(name: str) -> str:
-    """Return the heading of a quantity from its name in code: ``"gaps [m]"``."""
+    """Return a heading from the name of a quantity in code: ``"gaps [m]"`` for ``gaps_m``."""
     ending = next((each for each in _UNITS if name.endswith(each)), "")
     words = name.removesuffix(ending).replace("_", " ")
     return f"{words} [{_UNITS[ending]}]" if ending else words

@@ -1,4 +1,4 @@
-"""Shared options: the specimen and its replaced parameters."""
+"""Options of several commands: the specimen, and parameters that replace those of the specimen."""
 
 from typing import Annotated, TypeVar
 
@@ -11,9 +11,9 @@ from .options import RequestOptions, option
 from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
-"""Fields of every request about a specimen that become options."""
+"""Fields that become options in every command with a specimen."""
 AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Axes of a study with one value, by the field that they replace."""
+"""Axes of a study, each with the field of `SpecimenChoice` that gives its single value."""
 SpecimenOption = Annotated[
     str | None, option("Specimen file, or a name listed by `vibench specimen`.", "NAME|FILE.toml")
 ]
@@ -21,7 +21,7 @@ Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Return the specimen of an option, by default the paper's; raises InvalidRequest if there is none."""
+    """Return the specimen of this name or file, by default that of the paper; raises InvalidRequest."""
     if specimen is None:
         return usual_specimen()
     try:
@@ -33,9 +33,9 @@ def read_specimen(specimen: str | None) -> SpecimenTable:
 def specimen_request(
     options: RequestOptions[Choice], specimen: str | None, amplitude: str | None, **others: object
 ) -> Choice:
-    """Return a request about a specimen; warn of amplitudes and gaps that look like mistakes.
+    """Return a request with a specimen; warn about implausible amplitudes and gaps.
 
-    ``amplitude`` is the typed text, already parsed. Raises InvalidRequest with the invalid option.
+    ``amplitude`` is the text of a valid option. Raises InvalidRequest, which names an invalid option.
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])

@@ -54,7 +54,7 @@ def spectrum(
 
 
 def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
-    """Return the axis and the fixed value of the drive; a single point counts as a frequency axis."""
+    """Return axis and fixed value of the drive as fields; a single point is an axis of one frequency."""
     if amplitude.stop is not None and frequency.stop is not None:
         raise InvalidRequest(
             "--amplitude and --frequency were both given as ranges; give one of them as one number"

@@ -68,7 +68,7 @@ def study(
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
-    """Return the summary of a file as JSON; the values are in the file."""
+    """Return a summary of the results as a JSON document; the values are in the file."""
     return {
         "file": str(out),
         "points": results.study.grid.size,
@@ -84,7 +84,7 @@ _DIGEST = 16
 
 
 class KeptStudies:
-    """Studies stored in a folder; the file name contains a hash of the request."""
+    """Solver that stores each study in a folder; the file name is a hash of the request."""
 
     def __init__(self, folder: Path, workers: int | None) -> None:
         self._folder = folder
@@ -113,6 +113,6 @@ class KeptStudies:
         return results
 
     def complain(self) -> None:
-        """Raise an error if any study has failed points; results of the others are kept."""
+        """Exit with an error code if any study has failed points; the other results are kept."""
         if self._failed > 0:
             raise typer.Exit(ExitCode.FAILED)

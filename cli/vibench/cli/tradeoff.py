@@ -1,4 +1,4 @@
-"""`vibench tradeoff`: error over time of every method, for one scene or the paper's four cases."""
+"""`vibench tradeoff`: error over computing time of every method, for a scene or the paper's four cases."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from .paths import AsJson, room_for_folder
 from .specimen_option import AXES, SPECIMEN, read_specimen
 
 _PAPER_HZ = 260.0
-"""Drive frequency of the paper's four cases here: without contact, chaotic, chaotic, strongly driven."""
+"""Drive frequency of the paper's four cases [Hz]: without contact, twice chaotic, strongly driven."""
 
 
 def tradeoff(

@@ -46,7 +46,7 @@ IDLE_S = 0.2
 PIECE_S = 0.1
 """Duration of samples processed and reported at once [s]."""
 LATEST_S = 3.0
-"""With a larger delay than this, the twin skips samples [s]."""
+"""Largest delay [s]; above it, the twin skips samples."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
@@ -80,7 +80,7 @@ class _Following:
         if waiting <= 0:
             return POLL_S
         is_late = waiting > LATEST_S * rate_hz
-        # Samples may arrive after the status; the request drops the oldest if there are too many.
+        # More samples may have arrived since; if there are too many, the request drops the oldest.
         most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
         piece = self.client.look(self.live.next_sample, most=most)
         if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
@@ -113,7 +113,7 @@ class _Following:
         self.client.tell_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Store parameters and usual level once known; later values are checked against them."""
+        """Store parameters and usual level when they are known, as a baseline for checking later values."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return
@@ -126,7 +126,7 @@ class _Following:
             levels = {**before.levels, self.plan: watch.usual}
             try:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
-            except OSError as error:  # a full disk; the twin still watches this run
+            except OSError as error:  # for example a full disk; the twin continues without it
                 reason = f"{path} could not be written ({error.strerror})"
                 print_warnings([f"{reason}: the usual level of this run is not stored; make room"])
 
@@ -156,7 +156,7 @@ class _Following:
 
 
 def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the useful part of a forecast and its errors; empty before the first one was checked."""
+    """Return the forecast and its errors, up to the largest displayed error; empty without a forecast."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error

@@ -1,4 +1,4 @@
-"""The figures and claims of the paper: the scripts of studies/paper, as a checkout or a wheel holds them.
+"""Figures and claims of the paper; the modules are the shipped scripts of studies/paper.
 
 >>> from vibench.cli.paper.options import FigureOptions
 >>> FigureOptions(gap_m=30e-6).specimen().gap_m
