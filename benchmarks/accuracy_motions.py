@@ -1,8 +1,9 @@
-"""Cost and error of every level on known motions, interleaved, so that a busy machine slows all alike.
+"""Cost and error of every accuracy level on known motions, for docs/accuracy.md.
 
-The motions are one of each kind, named by how they are driven. Cost is processor time over simulated time;
-errors are against `independent_solution`, which shares nothing with the engine. `accuracy_page.py` makes
-docs/accuracy.md from it. SI units.
+There is one motion of each kind, named by contact law and drive. Runs of the levels alternate, so that a busy
+machine slows all alike. Cost is processor time over simulated time. Errors are against
+`independent_solution`, which shares no code with the engine. `accuracy_page.py` writes docs/accuracy.md from
+the results. SI units.
 """
 
 import math
@@ -43,16 +44,16 @@ from vibench.sim.specimen.state import Floats
 from vibench.sim.study import software
 
 SEED = 4242
-"""Another draw of starts than an answer's own."""
+"""Seed of the comparison starts; a prediction draws its starts with another seed."""
 PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Which of these a start is called depends on how long it was followed."""
+"""Kinds that count as equal, because the kind depends on how long a start was followed."""
 SAME = 1e-3
-"""Relative difference of Response I of one motion that repeats, as an answer tells motions apart."""
+"""Largest relative difference of Response I of equal periodic motions; predictions use the same limit."""
 
 
 @dataclass(frozen=True)
 class Lottery:
-    """A scene in which it is chance which motion is reached, or when."""
+    """A scene with sensitive dependence on the start: chance decides which motion is reached, or when."""
 
     about: str
     model: str
@@ -63,13 +64,13 @@ class Lottery:
 
     @property
     def scene(self) -> Scene:
-        """As it is asked."""
+        """The scene, followed until it settles."""
         specimen = gong2025(self.damping_time_s, self.gap_m, self.model)
         return Scene(specimen, Harmonic(self.frequency_hz, self.amplitude_m), duration=AutomaticDuration())
 
     @property
     def name(self) -> str:
-        """How tables call it."""
+        """Name of the scene in tables."""
         return f"{self.model}, {self.frequency_hz:g} Hz, {1e6 * self.amplitude_m:g} µm"
 
 
@@ -83,34 +84,34 @@ LOTTERIES = (
 
 @dataclass(frozen=True)
 class StatedShare:
-    """A motion, its share as an answer states it, and the share of many starts."""
+    """A motion with the share that the prediction states, and its share among many more starts."""
 
     motion: FoundMotion
     of_many: float
 
     @property
     def is_covered(self) -> bool:
-        """The interval that is stated holds the share of the many."""
+        """Whether the stated interval contains the share among many starts."""
         return self.motion.share.low <= self.of_many <= self.motion.share.high
 
 
 @dataclass(frozen=True)
 class LotteryFigures:
-    """What was found of one scene."""
+    """Results for one scene."""
 
     lottery: Lottery
     answered: ScenePrediction
     shares: tuple[StatedShare, ...]
     starts: int
-    """The many."""
+    """Number of comparison starts."""
     cost: float
-    """Cost of the answer over that of one without a budget."""
+    """Processor time of the prediction, over that of a prediction without a budget for other starts."""
 
 
 def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
-    """Answer a scene, and follow many more starts of it.
+    """Predict a scene, and compare the stated shares with those of many more starts.
 
-    Raises ArithmeticError when its start is not forgotten.
+    Raises ArithmeticError when the motion does not depend sensitively on the start.
     """
     scene = lottery.scene
     solve_scene(replace(scene, budget_s=0.0))
@@ -141,7 +142,7 @@ def _time_run(run: Callable[[], ScenePrediction]) -> tuple[float, ScenePredictio
 
 
 class Regime(StrEnum):
-    """What a motion is like; what accuracy buys depends on it."""
+    """Kind of motion; it decides what a higher accuracy improves."""
 
     FREE = "no contact"
     PERIODIC = "periodic"
@@ -161,7 +162,7 @@ class Motion:
 
     @property
     def specimen(self) -> Specimen:
-        """The paper's, with this model's contact."""
+        """The paper's specimen with the contact law of this model."""
         return gong2025(contact=self.model)
 
     @property
@@ -171,7 +172,7 @@ class Motion:
 
     @property
     def name(self) -> str:
-        """How tables call it."""
+        """Name of the motion in tables."""
         return f"{self.model}, {self.frequency_hz:g} Hz, {1e6 * self.amplitude_m:g} µm"
 
 
@@ -184,51 +185,51 @@ MOTIONS = (
     Motion(Regime.PERIODIC, "power:47", 100.0, 5e-6),
     Motion(Regime.CHAOTIC, "hertz", 260.0, 5e-6),
 )
-"""Kinds were found by scanning; `settled_state` refuses a periodic motion that is none."""
+"""Motions whose kind was found by a scan; `settled_state` checks the kind."""
 TRANSIENTS = tuple(
     Motion(Regime.TRANSIENT, model, 130.0, 20e-6)
     for model in ("hertz", "linear_gap", "power:7", "power:47", "power:201")
 )
-"""Followed from rest, while a small change grows a thousandfold."""
+"""Motions observed from rest, while a small change grows a thousandfold."""
 LEAST_GAIN = 2.0
-"""A level whose error is not smaller than the one before it by this factor buys nothing."""
+"""Factor by which the error must fall for a level to count as better than the one before."""
 
 
 @dataclass(frozen=True)
 class LevelFigures:
-    """One level of accuracy on one motion."""
+    """Figures of one accuracy level on one motion."""
 
     accuracy: Accuracy
     cost: float
     """Processor time over simulated time."""
     state_error: float | None
-    """State error of the state at the end of the span, as `state_error` measures it; None in chaos."""
+    """Error of the state at the end of the span, from `state_error`; None in chaos."""
     response_i_error: float | None
-    """Relative, against the reference level; None in chaos."""
+    """Relative error against the reference level; None in chaos."""
     response_ii_error: float | None
     response_i: float
-    """Mean over all starts in chaos."""
+    """Response I; in chaos, the mean over all starts."""
     response_i_scatter: float
-    """Relative standard deviation of Response I over starts; 0 where all agree."""
+    """Relative standard deviation of Response I over the starts in chaos; 0 otherwise."""
     exponent_per_s: float
     exponent_error_per_s: float
-    """Standard error of the exponent itself, whatever the accuracy."""
+    """Statistical standard error of the exponent, which no accuracy level reduces."""
 
 
 @dataclass(frozen=True)
 class SolverFigures:
-    """A general solver on one motion."""
+    """Figures of a general solver on one motion."""
 
     name: str
     cost: float
     """Processor time over simulated time."""
     state_error: float | None
-    """Over its own, shorter span, against the independent solution."""
+    """Error against the independent solution, over the shorter span for general solvers."""
 
 
 @dataclass(frozen=True)
 class MotionBenchmark:
-    """The trade on one motion."""
+    """Cost and error of all levels and solvers on one motion."""
 
     motion: Motion
     span_s: float
@@ -238,7 +239,7 @@ class MotionBenchmark:
 
     @property
     def advice(self) -> str:
-        """Say in a sentence which level to take."""
+        """Sentence that recommends a level."""
         match self.motion.regime:
             case Regime.FREE:
                 return "Flight is exact: all levels are the same."
@@ -252,7 +253,7 @@ class MotionBenchmark:
 
     @property
     def without_gain(self) -> tuple[tuple[LevelFigures, LevelFigures], ...]:
-        """Levels whose state is no better than that of the level before, each with that one."""
+        """Pairs of a level that is no better than the level before it, and that level."""
         return tuple(
             (level, before)
             for before, level in pairwise(self.levels)
@@ -283,38 +284,38 @@ def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
 
 @dataclass(frozen=True)
 class TransientFigures:
-    """One level of accuracy on a motion that has forgotten nothing yet."""
+    """Figures of one accuracy level on a transient motion."""
 
     motion: Motion
     accuracy: Accuracy
     growth: float
-    """Largest factor by which a small change of the state grows on the way, up to the end."""
+    """Largest factor by which a small change of the state grows, from the start or to the end."""
     state_error: float
-    """At the end, as `state_error` measures it."""
+    """Error of the state at the end, from `state_error`."""
     response_error: float
-    """Relative, the largest of the four responses, against the reference level."""
+    """Largest relative error of the four responses, against the reference level."""
     stated_error: float
-    """What the answer says of them."""
+    """Error of the responses that the prediction states."""
 
     @property
     def promise(self) -> float:
-        """What the level promises here: its error of a settled motion, as often as a small change grows."""
+        """Promised error of the level here: that of a settled motion, times the growth of a small change."""
         return self.accuracy.promise * max(1.0, self.growth)
 
 
 @dataclass(frozen=True)
 class AccuracyBenchmark:
-    """Everything that was measured in one run."""
+    """All results of one run of this benchmark."""
 
     motions: tuple[MotionBenchmark, ...]
     machine: str
-    """Processor and cores."""
+    """Processor and number of cores."""
     software: str
     lotteries: tuple[LotteryFigures, ...] = ()
     transients: tuple[TransientFigures, ...] = ()
 
     def worst_error(self, accuracy: Accuracy) -> float:
-        """Return the largest error of the state that a level made on any motion that is not chaotic."""
+        """Return the largest error of the state of a level over all motions without chaos."""
         levels = [level for each in self.motions for level in each.levels if level.accuracy is accuracy]
         return max((each.state_error for each in levels if each.state_error is not None), default=0.0)
 
@@ -333,24 +334,24 @@ STARTS = 8
 EXPONENT_S = 10.0
 TRANSIENT_S = 0.1
 LOOKS = 20
-"""Instants up to which, and from which on, the growth of a small change is taken."""
+"""Number of instants between which the growth of a small change is computed."""
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 START_SPREAD_M = 1e-6
 
 Step = Callable[[str], None]
-"""Told, in a few words, what is being measured."""
+"""Function that is called with the name of each motion before it is measured."""
 
 
 @dataclass(frozen=True)
 class Thoroughness:
-    """How long the compared motions are: longer ones cost more and prove more."""
+    """Lengths of the compared motions; longer ones take more time and test more."""
 
     span_s: float = 0.5
-    """Span of the comparison with the independent solution."""
+    """Time span of the comparison with the independent solution [s]."""
     solver_span_s: float = 0.05
-    """Solver span of general solvers, which are slow."""
+    """Time span for general solvers, which are slow [s]."""
     starts: int = 200
-    """Followed of a scene whose start is forgotten."""
+    """Number of comparison starts of a scene with sensitive dependence on the start."""
 
 
 def measure_accuracy(
@@ -365,7 +366,7 @@ def measure_accuracy(
     Raises
     ------
     ArithmeticError
-        When a motion is not of the kind it is called, or the independent solution gives up.
+        When a motion is not of the stated kind, or the independent solution fails.
     """
     found: list[MotionBenchmark] = []
     for motion in motions:
@@ -383,7 +384,7 @@ def measure_accuracy(
 
 
 def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
-    """Measure the trade on one motion, from its settled state."""
+    """Measure cost and error of all levels and solvers on one motion, from its settled state."""
     start = settled_state(motion)
     span_s = _whole(thoroughness.span_s, motion)
     solver_span_s = _whole(thoroughness.solver_span_s, motion)
@@ -399,7 +400,7 @@ def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmar
 
 
 def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
-    """Measure what every level errs by from rest, and what its answers say of it."""
+    """Measure the error of every level on a motion from rest, beside the error that it states."""
     rest = np.zeros(6)
     truth = independent_state(motion.specimen, motion.drive, TRANSIENT_S, rest)
     duration = FixedDuration(TRANSIENT_S, 0.5 * TRANSIENT_S)
@@ -423,7 +424,7 @@ def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
 
 
 def _growth(motion: Motion) -> float:
-    """Largest factor by which a change of the state, in its units, grows from some instant on."""
+    """Return the largest growth of a change of the state, from the start or to the end."""
     ends = TRANSIENT_S * np.arange(1.0, LOOKS + 1.0) / LOOKS
     derivatives = [np.eye(6)] + [
         flow_derivative(motion.specimen, motion.drive, np.zeros(6), float(end_s))[1] for end_s in ends
@@ -434,7 +435,7 @@ def _growth(motion: Motion) -> float:
 
 
 def settled_state(motion: Motion) -> Floats:
-    """State at the drive's phase zero after the transient, shape (6,)."""
+    """Return the settled state at phase zero of the drive, shape (6,)."""
     periods = math.ceil(SETTLE_S * motion.frequency_hz)
     section = stroboscopic_section(motion.specimen, motion.drive, periods, Accuracy.REFERENCE)
     period = smallest_period(section[-PERIODS_SEEN:], state_scales(motion.specimen, motion.drive))
@@ -458,7 +459,7 @@ def _run_time_s(run: Callable[[], object]) -> float:
 
 
 def _costs(motion: Motion, start: Floats) -> dict[Accuracy, float]:
-    """Least processor time of each level over simulated time; not of the first round, which makes tables."""
+    """Return the least processor time over simulated time of each level, without the first round."""
     best = dict.fromkeys(LEVELS, math.inf)
     for repeat in range(REPEATS + 1):
         for level in LEVELS:
@@ -473,7 +474,7 @@ def _follow(motion: Motion, level: Accuracy, start: Floats, span_s: float) -> Fl
 
 
 def _responses(motion: Motion, level: Accuracy, start: Floats) -> Floats:
-    """Responses I and II from one start, or in chaos from several, shape (starts, 2)."""
+    """Return Responses I and II from one start, in chaos from several; shape (starts, 2)."""
     rng = np.random.default_rng(1)
     starts = STARTS if motion.regime is Regime.CHAOTIC else 1
     found = []

@@ -1,4 +1,4 @@
-"""The page docs/accuracy.md: what each level of accuracy costs and errs, from one measurement.
+"""Write docs/accuracy.md: cost and error of each accuracy level, from one measurement.
 
 ``python benchmarks/accuracy_page.py``; then `work_precision.py` and `error_targets.py` add their sections.
 """
@@ -33,7 +33,7 @@ ABSENT = "–"
 
 
 def accuracy_document(benchmark: AccuracyBenchmark) -> str:
-    """Write the page."""
+    """Return the text of the page."""
     return "\n".join(_lines(benchmark)) + "\n"
 
 
@@ -68,7 +68,7 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
-    """Write shares that answers state, beside those of many starts."""
+    """Yield the section on stated shares, beside the shares of many starts."""
     if not lotteries:
         return
     yield from (
@@ -108,7 +108,7 @@ def _share(found: LotteryFigures, stated: StatedShare) -> str:
 
 
 def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
-    """Write the errors of each level in transients."""
+    """Yield the section on the errors of each level in transients."""
     if not transients:
         return
     yield from (
@@ -175,7 +175,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         worst = benchmark.worst_error(accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
-    # Name the motions on which a level buys nothing.
+    # Name the motions on which a level does not reduce the error.
     names: dict[str, list[str]] = {}
     for each in benchmark.motions:
         for level, before in each.without_gain:
@@ -187,7 +187,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def main() -> None:
-    """Measure, and write the page."""
+    """Run the measurement and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
     parser.add_argument("--span", type=float, default=2.0, help="length of the motion compared [s]")

@@ -1,9 +1,9 @@
-"""Other people's programs for the AFG1022 on the simulated one, unchanged: what they print, what it refused.
+"""Run third-party programs for the AFG1022 unchanged on the simulated generator, and count refused messages.
 
     python benchmarks/afg_programs.py PROGRAM.py [PROGRAM.py ...]
 
-Each program, or file of tests, is a process of its own. The generator is plugged in under the USB address
-that the program names, and is the only instrument that pyvisa sees; nothing else is given or changed.
+Each program or test file runs in a separate process. The simulated generator is the only instrument that
+pyvisa finds, at the USB address that the program names. Nothing else is changed.
 """
 
 import argparse
@@ -23,11 +23,11 @@ from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 ADDRESS = re.compile(r"0x0699::0x0353::(\w+)")
 LONGEST = 70
-"""Of a message that is shown; a waveform has thousands of bytes."""
+"""Largest number of bytes shown of a message, because a waveform has thousands."""
 
 
 class Noted(Status):
-    """An error queue that remembers which message each error is of."""
+    """Error queue that also counts the errors of each message."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -41,7 +41,7 @@ class Noted(Status):
 
 
 class Overheard(AFG1022):
-    """Remembers what it refused."""
+    """Simulated generator that records its messages and the errors they cause."""
 
     def __init__(self, serial: str) -> None:
         super().__init__(lambda: 0.0, serial=serial)
@@ -49,14 +49,14 @@ class Overheard(AFG1022):
         self.messages = 0
 
     def execute(self, message: bytes) -> Reply:
-        """Carry out one message."""
+        """Execute one message."""
         self.messages += 1
         self.status.message = message[:LONGEST].decode("latin-1").strip()
         return super().execute(message)
 
 
 def run_one(program: Path) -> None:
-    """Run one program as itself."""
+    """Run one program in this process, with the simulated generator plugged in."""
     named = ADDRESS.search(program.read_text(encoding="utf-8", errors="replace"))
     generator = Overheard(named.group(1) if named else "C010101")
     plug_in(UsbTmcInstrument(generator))
@@ -80,7 +80,7 @@ def run_one(program: Path) -> None:
 
 
 def main() -> None:
-    """Run each."""
+    """Run each program in a separate process."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("programs", nargs="+", type=Path)
     parser.add_argument("--alone", action="store_true", help=argparse.SUPPRESS)

@@ -1,7 +1,7 @@
-"""Do the shares of attractors that an answer states cover those of 400 starts?
+"""Test whether the stated shares of attractors cover those of 400 starts.
 
-Scenes whose start is forgotten are drawn until so many have more than one motion; each is then followed from
-other starts, drawn with another seed, for as long as it takes to settle within 300 s.
+Random scenes are drawn until the requested number has more than one motion. Each of these is then followed
+from other starts, drawn with another seed, until it settles, for at most 300 s.
 """
 
 import argparse
@@ -14,13 +14,13 @@ from random_scenes import described, edge_scene, random_scene
 from vibench.sim import Ensemble, FoundMotion, MotionKind, ScenePrediction, solve_ensemble, solve_scene
 
 SAME = 1e-3
-"""Relative difference of Response I of one motion that repeats."""
+"""Largest relative difference of Response I of equal periodic motions."""
 PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 SEED = 77_000
 
 
 def main() -> None:
-    """Draw, follow, and count."""
+    """Draw scenes, compare their shares, and count the covered ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", type=int, default=20, help="with more than one motion")
@@ -43,9 +43,10 @@ def main() -> None:
 
 
 def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
-    """Whether the interval of each motion holds its share of the many; a motion not found, the share unseen.
+    """Return whether the stated interval of each motion contains its share among many starts.
 
-    Chaos that lasts and chaos so far are one: it depends on how long they were followed.
+    For a motion that was not found, the interval is zero to the unseen share. Lasting chaos and chaos so far
+    count as one kind, because the kind depends on the simulated time.
     """
     stated = answered.ensemble
     if stated is None or truth is None:
@@ -62,7 +63,7 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
 
 
 def _apart_from(motion: FoundMotion) -> Callable[[FoundMotion], float]:
-    """Of several chaotic motions, that is the same whose response is nearest."""
+    """Return a sort key: the distance of a motion's Response I from that of ``motion``."""
     return lambda each: abs((each.response_i or 0.0) - (motion.response_i or 0.0))
 
 

@@ -1,11 +1,10 @@
-"""Does `--duration auto` name the motion that a run of 300 s ends in?
+"""Test whether `--duration auto` finds the motion in which a run of 300 s ends.
 
-Scenes are drawn at random, and near an edge of chaos. The long run is another draw of the same scene: cut
-at other instants, it rounds otherwise. An answer agrees when kind, period and responses do;
-where the start is forgotten, when the long run came to one of the motions that it names. "chaotic so far" and
-"undecided" are counted apart.
-
-Of scenes that neither repeat nor are chaotic, the stated errors are counted that hold for the long run.
+Scenes are drawn at random, and near an edge of chaos. The long run rounds differently, because it is cut at
+other instants; where the motion depends sensitively on the start, it is another draw. A prediction agrees if
+kind, period and responses do. With sensitive dependence, it agrees if the long run ends in one of the motions
+that it names. "chaotic so far" and "undecided" are counted separately. For quasi-periodic scenes, the stated
+errors that cover the long run are counted.
 """
 
 import argparse
@@ -21,22 +20,22 @@ from vibench.sim import FixedDuration, MotionKind, Outcome, Scene, ScenePredicti
 
 LONG = FixedDuration(300.0, 5.0)
 SAME = 2e-3
-"""Relative difference of responses of one motion."""
+"""Largest relative difference of the responses of equal motions."""
 CHAOS = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR)
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One scene."""
+    """Result of the comparison for one scene."""
 
     verdict: str
     cost: float
-    """Over that of the answer without a budget."""
+    """Processor time, over that of the prediction without a budget for other starts."""
 
 
 def main() -> None:
-    """Compare, and count."""
+    """Compare all scenes and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--random", type=int, default=40, help="scenes drawn at random")
@@ -75,7 +74,7 @@ def _compared(scene: Scene) -> Compared:
 
 
 def _covered(scene: Scene) -> int:
-    """Count the responses of a scene that lie within their stated errors of those of a long run."""
+    """Return how many responses differ from those of a long run by at most their stated error."""
     found, truth = solve_scene(scene), solve_scene(replace(scene, duration=LONG, budget_s=0.0))
     off = [abs(getattr(found, name) / getattr(truth, name) - 1.0) for name in RESPONSES]
     stated = [getattr(found, f"{name}_error") for name in RESPONSES]

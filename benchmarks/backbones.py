@@ -1,21 +1,21 @@
-"""Backbones of three modes over three decades of level on the virtual rig, beside the simulated ones.
+"""Measured backbones of three modes on the virtual rig, over three decades of level, beside the model's.
 
     python benchmarks/backbones.py [--mode 1] [--spring hardening] [--levels 49] [--periods 150] [--seed 1]
     python benchmarks/backbones.py --superharmonic 2 --spring bumpers [--levels 13]
     python benchmarks/backbones.py --subharmonic 2 --spring bumpers [--levels 13]
 
-Tracks the phase resonance of each mode of the paper's specimen with a fixture of 0.6 kg, and prints, level by
-level, frequency with its standard uncertainty and the drive periods it took, beside the motions that the
-model has there (`phase_resonance_branch`): frequency, and largest Floquet multiplier in brackets. Where no
-resonance was met, where the loop was, and whether that motion repeats. With
-``--spring hardening`` p^3 stands in the place of the stops (0.1 k1 p at 100 um), with ``--spring bumpers``
-soft springs behind uneven gaps (100 N/m, 0.12 k1, below at 60 and above at 30 um). The weaker levels are
-played with the amplifier 30 dB lower: the generator's setting has steps of a millivolt.
+The script tracks the phase resonance of each mode of the paper's specimen with a fixture of 0.6 kg. For each
+level it prints the frequency, its standard uncertainty and the number of drive periods. Beside them are the
+motions of the model at this level (`phase_resonance_branch`): frequency, and largest Floquet multiplier in
+brackets. If no resonance was reached, it prints where the loop ended and whether that motion repeats. With
+``--spring hardening`` p^3 replaces the stops (0.1 k1 p at 100 um), with ``--spring bumpers`` soft springs
+behind uneven gaps (100 N/m, 0.12 k1, below at 60 and above at 30 um). The weaker levels are played with the
+amplifier 30 dB lower, because the generator's setting has steps of a millivolt.
 
-``--superharmonic 3`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2, and
-``--superharmonic 2`` the 2:1 one, from 10 to 25 m/s2; ``--subharmonic 2`` the one at which m0 repeats every
-two drives, from 22 to 34 m/s2. The model beside them is harmonic balance of specimen, table and coil
-together, since the table moves at those frequencies as well.
+``--superharmonic 3`` tracks the 3:1 superharmonic resonance of the first mode instead, from 6 to 20 m/s2, and
+``--superharmonic 2`` the 2:1 one, from 10 to 25 m/s2. ``--subharmonic 2`` tracks the one at which m0 repeats
+every two drive periods, from 22 to 34 m/s2. The model for these is harmonic balance of specimen, table and
+coil together, since the table also moves at those frequencies.
 """
 
 import argparse
@@ -41,7 +41,7 @@ K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 
 @dataclass(frozen=True)
 class Tracked:
-    """Which mode is tracked, where, and over which levels of the base."""
+    """Settings for tracking one mode: frequency range, phase reference and levels of the base."""
 
     start_hz: float
     low_hz: float
@@ -51,9 +51,9 @@ class Tracked:
     lowest: float
     """The weakest level, three decades below the strongest [m/s2]."""
     turned_up: float
-    """From here on the amplifier is turned up; the motion has no contacts yet [m/s2]."""
+    """Level from which the amplifier is turned up; it is below the first contact [m/s2]."""
     band_hz: tuple[float, float]
-    """Where the model's linear motion meets the phase once."""
+    """Band in which the model's linear motion has this phase exactly once [Hz]."""
     harmonic: int = 1
     subharmonic: int = 1
 
@@ -74,14 +74,14 @@ OTHERS = {
         2: (Tracked(192, 187, 199, 0.5, PhaseReference.RELATIVE, 22.0, 0.0, (187, 199), subharmonic=2), 34.0)
     },
 }
-"""Where they are tracked, and up to which level [m/s2]."""
+"""Settings for super- and subharmonic resonances by order, each with the highest level [m/s2]."""
 ORDERS, WAVE = np.arange(20), 512
 P_OVER_M0 = 24.0
-"""In the first mode."""
+"""Ratio of p to the motion of m0 in the first mode."""
 
 
 def rig_of(spring: str, seed: int) -> Rig:
-    """Give the virtual rig with a fixture, and stops or a smooth spring."""
+    """Return the virtual rig with a fixture, and with stops or another spring."""
     rig = load_rig(Path("virtual_rig"))
     changed = {
         "shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.6}),
@@ -100,7 +100,7 @@ def rig_of(spring: str, seed: int) -> Rig:
 def tracked(
     rig: Rig, mode: Tracked, levels: np.ndarray, most_periods: int, folder: Path
 ) -> list[ResonanceNote]:
-    """Track the mode over all levels; the amplifier is turned up between them."""
+    """Track the mode over all levels, with a higher amplifier gain at the stronger levels."""
     notes = []
     halves = np.split(levels, [np.searchsorted(levels, mode.turned_up)])
     for gain_db, part in zip(GAINS_DB, halves, strict=True):
@@ -144,7 +144,7 @@ def backbone(specimen: Specimen, mode: Tracked, levels: np.ndarray) -> Branch:
 
 
 def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
-    """Give frequency [Hz] and largest multiplier of each motion that the model has at a level."""
+    """Return frequency [Hz] and largest multiplier of each motion of the model at a level."""
     above = np.log(model.amplitudes_m * (2 * np.pi * model.frequencies_hz) ** 2 / level)
     found = []
     for k in np.flatnonzero((above[:-1] < 0) != (above[1:] < 0)):
@@ -155,7 +155,7 @@ def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
 
 
 def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float]:
-    """Find the phase resonance under a level by harmonic balance: frequency [Hz], and what resonates [m]."""
+    """Return frequency [Hz] and resonant amplitude [m] of the phase resonance, by harmonic balance."""
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), LoopTiming(1e4, 0.0))
     (rates, volt), spring = plant.equations, spring_of(specimen_of(rig))
     into, relative = (each[:9] for each in plant.spring)
@@ -177,7 +177,7 @@ def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float
         return note.base_m_per_s2 / (2 * np.pi * hertz) ** 2
 
     def wrong(unknown: np.ndarray, at_hz: float | None) -> np.ndarray:
-        """Give what is left: p [um] at each order, the base, and at no given frequency the phase."""
+        """Return the residuals: p [um] at each order, base, and phase or, if given, frequency."""
         p, volts = unknown[:count] + 1j * unknown[count : 2 * count], complex(*unknown[-3:-1])
         hertz = unknown[-1] if at_hz is None else at_hz
         wave = micro * (p @ turns).real
@@ -185,14 +185,14 @@ def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float
         pushes = np.outer(force, into)
         pushes[drives] += volts * volt
         states = states_at(hertz, pushes)
-        # A sine has the phasor -i.
+        # The phasor of a sine is -i.
         base, of_m0 = states[drives][0] * 1j / base_m(hertz) - 1.0, states[mode.harmonic][3] * 1j
         moved["m"] = abs(of_m0)
         seen = np.sin(drives * np.angle(of_m0) + quarter + 0.5 * np.pi)
         left = np.concatenate([states @ relative / micro - p, [base]])
         return np.concatenate([left.real, left.imag, [seen if at_hz is None else unknown[-1] - at_hz]])
 
-    # From the motion without the spring between the masses, and half or a third of the drive as it was seen.
+    # Start from the motion without the contact force, and the observed subharmonic.
     alone = states_at(note.at_hz, np.outer(drives == ORDERS, volt))
     volts = -1j * base_m(note.at_hz) / alone[drives][0]
     p = alone @ relative * volts / micro
@@ -211,7 +211,7 @@ def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float
 
 
 def compare_others(rig: Rig, spring: str, mode: Tracked, levels: np.ndarray, periods: int) -> None:
-    """Print what was tracked of a super- or subharmonic, beside the model of a softer spring."""
+    """Track a super- or subharmonic resonance, and print it beside the model."""
     with tempfile.TemporaryDirectory() as folder:
         notes = tracked(rig, mode, levels, periods, Path(folder))
     away = []
@@ -231,7 +231,7 @@ def compare_others(rig: Rig, spring: str, mode: Tracked, levels: np.ndarray, per
 
 
 def row(note: ResonanceNote, model: Branch) -> str:
-    """Say what was measured at a level, and what the model has there."""
+    """Return one line with the measured resonance at a level, and the motions of the model."""
     motions = ", ".join(f"{hertz:.3f} ({size:.3g})" for hertz, size in motions_at(model, note.base_m_per_s2))
     if note.frequency_hz is None:
         found = f"not met, {note.at_hz:.2f} Hz, {note.phase_deg:.1f} degrees, {note.motion.value}"
@@ -241,14 +241,14 @@ def row(note: ResonanceNote, model: Branch) -> str:
 
 
 def summary(notes: list[ResonanceNote], model: Branch) -> str:
-    """Say how many levels were met, in how many periods, and how far from the model."""
+    """Return a summary: levels reached, periods needed, differences from the model."""
     met = [each for each in notes if each.frequency_hz is not None]
     away = [
         abs(each.frequency_hz - hertz)
         for each in met
         for hertz, _ in motions_at(model, each.base_m_per_s2)[:1]
     ]
-    # The first level of each half is searched for in settled motion.
+    # Leave out the first level of each part, which is searched for in settled motion.
     periods = [each.periods for each in met if each.mode_hz is None]
     first, last = met[0], met[-1]
     return (
@@ -260,7 +260,7 @@ def summary(notes: list[ResonanceNote], model: Branch) -> str:
 
 
 def main() -> None:
-    """Print one row for each level."""
+    """Track the requested modes and print one row for each level."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mode", type=int, choices=MODES)
     parser.add_argument("--spring", choices=("stops", "hardening", "bumpers"), default="stops")

@@ -1,9 +1,9 @@
-"""The README's two commands on a bare Debian: no compiler, no git, none of Qt's libraries, no vibench before.
+"""Test the README's commands on a minimal Debian without compiler, git, Qt's libraries or vibench.
 
     sudo python benchmarks/bare_machine.py FOLDER
 
-debootstrap makes the system in the given folder, which takes some 3 GB in the end, and chroot runs in it. The
-commands are those of README.md. Each ends with its exit code, its seconds and the last lines that it printed.
+debootstrap installs the system in the given folder, which needs about 3 GB, and chroot runs in it. For each
+command of README.md, the script prints exit code, time and the last lines of output.
 """
 
 import argparse
@@ -18,18 +18,18 @@ ROOT = Path(__file__).resolve().parent.parent
 ABSENT = ("gcc", "cc", "clang", "git", "libGL.so.1")
 LINES = 4
 AFTERWARDS = ("env QT_QPA_PLATFORM=offscreen vibench gui",)
-"""Beyond the README's two: the window, which needs libraries of the system."""
+"""Additional command: the window, which needs libraries of the system."""
 
 
 def readme_commands() -> list[str]:
-    """Return what the README tells a newcomer to type."""
+    """Return the commands that the README tells a new user to type."""
     section = (ROOT / "README.md").read_text(encoding="utf-8").split("## Two commands")[1]
     (block,) = re.findall(r"^```\n(.*?)^```", section.split("## Next steps")[0], re.DOTALL | re.MULTILINE)
     return str(block).splitlines()
 
 
 def make(folder: Path, release: str, mirror: str) -> None:
-    """Make the system, and put a copy of the sources that git knows into it."""
+    """Install the system, and copy the committed sources into it."""
     packages = "python3,python3-venv,ca-certificates"
     subprocess.run(
         ["debootstrap", "--variant=minbase", f"--include={packages}", release, folder, mirror], check=True
@@ -41,7 +41,7 @@ def make(folder: Path, release: str, mirror: str) -> None:
 
 
 def run(folder: Path, command: str, limit_s: float) -> None:
-    """Type one command in the new system, and show how it ended."""
+    """Run one command in the new system, and print exit code, time and last lines."""
     begun = time.monotonic()
     script = f"cd /work && . .venv/bin/activate && timeout {limit_s:g} {command}"
     clean = ("env", "-i", "HOME=/root", "PATH=/usr/bin:/bin:/usr/sbin:/sbin")
@@ -53,7 +53,7 @@ def run(folder: Path, command: str, limit_s: float) -> None:
 
 
 def main() -> None:
-    """Make the system and type the commands."""
+    """Install the system and run the commands."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path, help="where the system goes; it must not exist")
     parser.add_argument("--release", default="bookworm")

@@ -1,6 +1,6 @@
-"""What a chain costs against its length, and against the engine of one cell: ``python benchmarks/chain.py``.
+"""Cost of a chain over its length, and against the engine of one cell: ``python benchmarks/chain.py``.
 
-Processor time, the shortest of a few runs; every cell starts in motion, so that all of them strike.
+Times are the shortest processor time of a few runs. Every cell starts in motion, so that all have impacts.
 """
 
 import os
@@ -23,7 +23,7 @@ from vibench.sim.chain._tables import chain_tables
 REPEATS = 3
 LENGTHS = (2, 4, 8, 16, 32, 64, 128, 256)
 LONG = 8
-"""Lengths from here on show how the cost goes on to grow."""
+"""Length from which the growth of the cost is also fitted separately."""
 DRIVE = Harmonic(220.0, 40e-6)
 DURATION_S = 0.5
 DRIFT_SEEDS = range(10)
@@ -36,7 +36,7 @@ WATCHED = (2, 8)
 
 
 def best(job, repeats=REPEATS):
-    """Shortest of a few runs [s of processor time], and the last result."""
+    """Return the shortest processor time of a few runs [s], and the last result."""
     times = []
     for _ in range(repeats):
         start = time.process_time()
@@ -46,17 +46,17 @@ def best(job, repeats=REPEATS):
 
 
 def lively(cells):
-    """Make a state in which every cell moves."""
+    """Return a random state in which every cell moves."""
     return np.random.default_rng(3).normal(size=(cells, 6)) * np.repeat([2e-5, 0.1], 3)
 
 
 def slope(lengths, costs):
-    """Exponent of the power law through the points."""
+    """Return the exponent of a power law fitted to the points."""
     return np.polyfit(np.log(lengths), np.log(costs), 1)[0]
 
 
 def report_lengths(accuracy):
-    """Cost per impact and per simulated second against the number of cells."""
+    """Print the cost per impact and per simulated second for each number of cells."""
     print(f"{DRIVE.frequency_hz:.0f} Hz {DRIVE.amplitude_m * 1e6:.0f} um, {DURATION_S} s, {accuracy}")
     print("cells  impacts  set up (ms)  us/impact  ms per simulated s  responses  windows (us)")
     per_impact, per_second = [], []
@@ -85,7 +85,7 @@ def report_lengths(accuracy):
 
 
 def report_one_cell():
-    """One cell against its specimen: responses and motion, from rest and settled; and whether they agree."""
+    """Compare a chain of one cell with its specimen, from rest and settled: time, and whether they agree."""
     print("one cell over its specimen, 2 s, standard: time of responses, of motion (the same motion?)")
     for contact in LAWS:
         for damping_time_s in DAMPINGS_S:
@@ -98,7 +98,7 @@ def report_one_cell():
 
 
 def one_cell_over_specimen(specimen, drive, state):
-    """Time ratios of responses and of motion, and whether both engines end in the same state."""
+    """Return the time ratios of responses and of motion, and whether both engines end in the same state."""
     chain, start = chain_of(specimen, 1), state[None, :]
     alone, theirs = best(lambda: steady_response(specimen, drive, "standard", 2.0, 1.0, state))
     row, ours = best(lambda: chain_response(chain, drive, "standard", 2.0, 1.0, start))
@@ -112,7 +112,7 @@ def one_cell_over_specimen(specimen, drive, state):
 
 
 def report_watching():
-    """Say what observing adds to the cost of a motion, for every law."""
+    """Print how much observing responses adds to the cost of a motion, for every contact law."""
     print("responses over the motion alone, 1 s, standard, every cell struck at the start")
     for contact in LAWS:
         row = []
@@ -125,7 +125,7 @@ def report_watching():
 
 
 def report_drift():
-    """Energy that undamped chains without a drive gain or lose in a second, over what they have."""
+    """Print the relative change of energy of undamped chains without a drive in a second."""
     for contact in ("hertz", "power:5", "linear_gap:2e5"):
         for cells in (1, 2, 4, 20):
             chain = chain_of(gong2025(damping_time_s=0.0, contact=contact), cells)
@@ -141,7 +141,7 @@ def report_drift():
 
 
 def report_exponents():
-    """Largest exponents of short chains."""
+    """Print the largest exponents of short chains."""
     for cells in (1, 2, 4, 8):
         taken, found = best(
             lambda n=cells: chain_lyapunov_exponent(chain_of(gong2025(), n), Harmonic(260.0, 5e-6)), 1

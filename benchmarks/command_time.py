@@ -1,13 +1,13 @@
-"""Sweeps on a generator that takes its time for a setting: what is played, refused, or ended.
+"""Test sweeps on a generator that is slow to accept settings: excess cycles, refusals and early ends.
 
     python benchmarks/command_time.py
     python benchmarks/command_time.py --settle 0 0.1 --step 0.1 0.5
     python benchmarks/command_time.py --bench virtual_rig_keysight
 
-On the virtual rig at the wall's pace, where commands take time while samples are converted. Told for each
-`generator.settle_s` and `step_s`: how many cycles of the drive the recorded sweep has more than its plan,
-and between them what the run said where it refused or ended the sweep. The check of the bench and a ramp
-are part of every run. Where the generator makes sweeps by itself, a last column has those.
+The virtual rig runs in real time (pace "wall"), where commands take time while samples are converted. For
+each `generator.settle_s` and `step_s`, the table shows by how many drive cycles the recorded sweep exceeds
+its plan. If the run refused or ended the sweep, it shows the message. Every run includes a bench check and a
+ramp. The last column is for generators that can sweep by themselves.
 """
 
 import argparse
@@ -29,7 +29,7 @@ MARGIN_S = 0.15
 
 
 def bench(name: str, settle_s: float) -> Rig:
-    """Give a virtual rig at the wall's pace, with a generator that wants a pause after each command."""
+    """Return a virtual rig in real time, with a generator that needs a pause after each command."""
     rig = load_rig(name)
     return rig.model_copy(
         update={
@@ -40,7 +40,7 @@ def bench(name: str, settle_s: float) -> Rig:
 
 
 def sweep(step_s: float | None) -> Measurement:
-    """150 to 310 Hz in 6 s, in steps or by the generator itself."""
+    """Return a sweep from 150 to 310 Hz in 6 s, in steps or by the generator itself."""
     moved = {"swept_by": "generator"} if step_s is None else {"step_s": step_s}
     excitation = SineSweep(
         amplitude_vpp=0.2, start_hz=150.0, stop_hz=310.0, duration_s=6.0, settle_s=0.5, **moved
@@ -49,10 +49,10 @@ def sweep(step_s: float | None) -> Measurement:
 
 
 def excess_cycles(path: Path, excitation: SineSweep) -> float:
-    """Cycles of the recorded drive beyond the plan's."""
+    """Return by how many cycles the recorded drive exceeds the plan."""
     with open_recording(path) as recording:
         found = next(each for each in recording.segments if each.label == "sweep")
-        # The sine goes on to both sides: there the transform's own ends lie.
+        # Read more on both sides, where the sine continues, because the transform is inaccurate at its ends.
         margin = round(MARGIN_S * recording.sample_rate_hz)
         drive = recording.read("drive_voltage", found.first_sample - margin, found.last_sample + 1 + margin)
     phase = np.unwrap(np.angle(hilbert(drive - np.mean(drive))))
@@ -61,7 +61,7 @@ def excess_cycles(path: Path, excitation: SineSweep) -> float:
 
 
 def report(name: str, settle_s: float, step_s: float | None) -> str:
-    """Say what came of one sweep."""
+    """Return the result of one sweep: excess cycles, or the error message."""
     plan = sweep(step_s)
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -75,7 +75,7 @@ def report(name: str, settle_s: float, step_s: float | None) -> str:
 
 
 def main() -> None:
-    """Print a table."""
+    """Run all combinations and print a table."""
     asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     asked.add_argument("--settle", type=float, nargs="+", default=SETTLES_S)
     asked.add_argument("--step", type=float, nargs="+", default=STEPS_S)

@@ -1,10 +1,10 @@
-"""What a seal costs: beside finishing a recording, and beside reading it.
+"""Cost of a seal, compared with finishing and with reading a recording.
 
     python benchmarks/cost_of_seals.py [--minutes 10]
 
-Four channels of noise at 51.2 kS/s are recorded as fast as the disk takes them. Finishing is timed as it
-is, and with the seal left out (samples alone are read back then, as before there were seals); then a quick
-look, a check of the whole, and plain reading of all samples. The least of three runs counts.
+Four channels of noise at 51.2 kS/s are recorded as fast as the disk allows. Finishing is timed with the seal,
+and without it (then only the samples are read back). A quick check, a whole check and plain reading of all
+samples are also timed. The shortest of three runs counts.
 """
 
 import argparse
@@ -35,7 +35,7 @@ ROLES = ("drive_voltage", "base_acceleration", "m0_velocity", "extra")
 
 
 def finishing_s(path: Path, minutes: float) -> float:
-    """Record, and time the end."""
+    """Record noise, and return the time to finish the recording [s]."""
     channels = tuple(ChannelHeader(role, "ai0", "voltage", "V", 1.0, 5.0, STEP_V) for role in ROLES)
     samples = round(minutes * 60 * RATE_HZ)
     chance = np.random.default_rng(1)
@@ -52,7 +52,7 @@ def finishing_s(path: Path, minutes: float) -> float:
 
 
 def least_s(action: Callable[[], object]) -> float:
-    """Time an action a few times; the least."""
+    """Return the shortest time of a few runs of an action [s]."""
     taken = []
     for _ in range(RUNS):
         began_s = time.perf_counter()
@@ -62,7 +62,7 @@ def least_s(action: Callable[[], object]) -> float:
 
 
 def as_before_s(path: Path, minutes: float) -> float:
-    """Finish without a seal: samples alone are read back, as before there were seals."""
+    """Return the time to finish a recording without a seal [s]; only its samples are read back."""
     samples_alone = SealCheck(SealState.INTACT, "", "")
 
     def read_back(file: object, *_: object) -> SealCheck:
@@ -76,7 +76,7 @@ def as_before_s(path: Path, minutes: float) -> float:
 
 
 def main() -> None:
-    """Measure, and say it."""
+    """Measure and print the times."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--minutes", type=float, default=10.0, help="length of the recording")
     minutes = parser.parse_args().minutes

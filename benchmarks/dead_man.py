@@ -1,11 +1,11 @@
-"""What a dead man costs in signal: a dwell as bursts that are triggered again, beside one that plays on.
+"""Compare a dwell in retriggered bursts (dead man's switch) with a continuous dwell.
 
     python benchmarks/dead_man.py
 
-On the virtual rig. In windows of five periods the response of m0 is divided by the drive, both at the
-drive's frequency; a window is disturbed where that differs from its median of the dwell that plays on by more
-than 5 % and more than it does there in 99 of 100 windows. Told are the share of time in which the drive is
-silent, the share of disturbed windows, and how long a gap is felt.
+In windows of five periods, the response of m0 is divided by the drive, both at the drive frequency. The
+median over the continuous dwell is the reference. A window is disturbed if it differs from the reference by
+more than 5 %, and by more than 99 of 100 windows of the continuous dwell do. The table shows the share of
+time in which the drive is silent, the share of disturbed windows, and how long a gap has an effect.
 """
 
 import tempfile
@@ -29,7 +29,7 @@ SILENT_V = 5e-3
 
 
 def recorded(dead_man_s: float | None, frequency_hz: float, amplitude_vpp: float) -> tuple[float, NDArray]:
-    """Share of silence, and response over drive in each window, of one dwell."""
+    """Return the share of silence of one dwell, and response over drive in each window."""
     rig = load_rig(RIG)
     guarded = rig.model_copy(
         update={"generator": rig.generator.model_copy(update={"dead_man_s": dead_man_s})}
@@ -51,14 +51,14 @@ def recorded(dead_man_s: float | None, frequency_hz: float, amplitude_vpp: float
     count = drive.size // length
     turn = np.exp(-2j * np.pi * frequency_hz / rate_hz * np.arange(length))
     drives, responses = (each[: count * length].reshape(count, length) @ turn for each in (drive, response))
-    # A tenth of a period: at the sine's own zeros it is not silent for so long.
+    # A tenth of a period, which is longer than the sine stays near a zero crossing.
     hop = max(1, round(0.1 * rate_hz / frequency_hz))
     pieces = np.abs(drive[: drive.size // hop * hop].reshape(-1, hop)).max(axis=1)
     return float(np.mean(pieces < SILENT_V)), responses / drives
 
 
 def main() -> None:
-    """Compare, and print a table."""
+    """Compare the dwells and print a table."""
     print("| dwell | bursts of | silent | disturbed | felt after a gap |")
     print("|---|---|---|---|---|")
     for name, (frequency_hz, amplitude_vpp) in CASES.items():

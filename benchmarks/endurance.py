@@ -1,13 +1,12 @@
-"""One engine for hours: memory, descriptors and threads of engine and window, and gaps in what was recorded.
+"""Run one engine for hours; watch memory, descriptors and threads, and count gaps in the recordings.
 
     python benchmarks/endurance.py --pace wall --minutes 120 --window on
     python benchmarks/endurance.py --pace free --minutes 60 --window off --save free_off.json
 
-Recordings of colliding dwells and of noise, one after the other, on the virtual rig: at the wall's pace a
-minute of this program is a minute of the rig's, at the free pace many. Each recording is read when it is
-complete, its gaps are counted, and it is deleted. What was seen is written every half minute, so that a run
-in shards (or one that was killed) tells what it has seen. Slopes are least squares over the time after the
-first quarter, in which buffers fill, with their standard errors.
+The virtual rig records dwells with impacts and noise, one after the other. With pace "wall" it runs in real
+time, with "free" much faster. Each complete recording is read, its gaps are counted, and it is deleted.
+Results are saved repeatedly, so that a killed run also has results. Slopes are least-squares fits with
+standard errors, without the first quarter of the time, in which buffers fill.
 """
 
 import argparse
@@ -38,32 +37,32 @@ from vibench.acquisition.rig import Rig, load_rig
 
 ROOT = Path(__file__).resolve().parent.parent
 LOOK_S = 5.0
-"""Between two looks at the processes, and at what was recorded."""
+"""Interval between two looks at processes and recordings [s]."""
 BLOCKS = 3
-"""How often dwells change to noise and back in a campaign."""
+"""Number of alternations between dwells and noise in a campaign."""
 SETTLED = 0.25
-"""Share of the time in which buffers fill, and which no slope counts."""
+"""Share of the time in which buffers fill; it is left out of the slopes."""
 PAGE = os.sysconf("SC_PAGE_SIZE")
 NUMBERS = ("engine_mb", "engine_descriptors", "engine_threads", "window_mb", "window_descriptors")
 
 
 @dataclass(frozen=True)
 class Look:
-    """What was seen at one moment."""
+    """State of both processes at one moment."""
 
     time_s: float
     rig_s: float
-    """Length of all complete recordings."""
+    """Total duration of all complete recordings [s]."""
     engine_mb: float
     engine_descriptors: int
     engine_threads: int
     window_mb: float
-    """Of this process, which is the window or only asks."""
+    """Memory of this process, which is the window or only a client [MB]."""
     window_descriptors: int
 
 
 def campaign(rounds: int) -> Campaign:
-    """Dwells and noise, each so many times."""
+    """Return a campaign that alternates dwells and noise, each repeated ``rounds`` times."""
     shared = {"amplitude_vpp": 1.5, "settle_s": 1.0}
     dwell = {**shared, "kind": "dwell", "frequency_hz": 260.0, "duration_s": 40.0}
     band = {"band_start_hz": 50.0, "band_stop_hz": 600.0, "realisations": 8}
@@ -77,7 +76,7 @@ def campaign(rounds: int) -> Campaign:
 
 
 class Watch:
-    """Looks at the engine's process and this one, and at what is recorded."""
+    """Observer of the engine process, of this process, and of the recordings."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -90,11 +89,11 @@ class Watch:
 
     @property
     def elapsed_s(self) -> float:
-        """Time since the beginning."""
+        """Time since the beginning [s]."""
         return time.monotonic() - self._began_s
 
     def look(self) -> None:
-        """Note what is there."""
+        """Record the current state, and read the complete recordings."""
         self._read_complete()
         engine, own = Path(f"/proc/{self._engine}"), Path("/proc/self")
         self.looks.append(
@@ -114,7 +113,7 @@ class Watch:
             path.unlink()
 
     def document(self) -> dict[str, object]:
-        """Say everything, for `--save`."""
+        """Return all results as a JSON document for `--save`."""
         return {
             "recordings": self.recordings,
             "gaps": self.gaps,
@@ -132,7 +131,7 @@ def _count(folder: Path) -> int:
 
 
 def slope_per_h(looks: list[Look], name: str) -> tuple[float, float]:
-    """Give what a number grows by in an hour, and its standard error; NaN of too few looks."""
+    """Return the growth of a number per hour and its standard error; NaN if there are too few looks."""
     kept = [look for look in looks if look.time_s > SETTLED * looks[-1].time_s]
     if len(kept) < len(("slope", "offset", "error")) + 1:
         return float("nan"), float("nan")
@@ -144,7 +143,7 @@ def slope_per_h(looks: list[Look], name: str) -> tuple[float, float]:
 
 @contextmanager
 def without_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[float], None]]:
-    """Let an unattended engine carry it out; gives a way to wait."""
+    """Run the campaign with an unattended engine; yields a function that waits."""
     with start_engine("unattended") as engine:
         client = engine.client
         client.open(rig)
@@ -164,7 +163,7 @@ def _until(client: EngineClient, state: EngineState) -> None:
 
 @contextmanager
 def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[float], None]]:
-    """Let a window carry it out and show it; gives a way to wait that lets it live."""
+    """Run the campaign in a window; yields a function that waits while the window stays alive."""
     from PySide6.QtCore import QEventLoop, QTimer  # noqa: PLC0415 - only where there is a window
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
@@ -196,7 +195,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     try:
         yield wait
     finally:
-        # A window that closes while something plays asks first, and nobody is there to answer.
+        # Stop first, because closing the window during a run would open a question.
         bridge.order(lambda client: client.stop("off"))
         while bridge.state in DRIVING:
             wait(0.1)
@@ -205,7 +204,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
 
 
 def endure(options: argparse.Namespace, folder: Path) -> Watch:
-    """Run for as long as asked, and look now and then."""
+    """Run for the requested time, with regular looks."""
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": options.pace})})
     recordings = folder / "recordings"
@@ -223,7 +222,7 @@ def endure(options: argparse.Namespace, folder: Path) -> Watch:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the test and print the slopes."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pace", choices=("wall", "free"), default="wall")
     parser.add_argument("--minutes", type=float, default=10.0, help="of the clock")

@@ -1,11 +1,11 @@
-"""Does the engine keep up on the wall clock, with a frozen viewer and both cores busy with something else?
+"""Test whether the engine keeps up in real time, with a frozen viewer and all cores busy.
 
     python benchmarks/engine_under_load.py [MINUTES]
 
-An engine records 4 x 51.2 kS/s from the virtual rig on the wall clock (its samples are lost when they are
-read too late, as on the real device), unattended. One viewer asks for ten seconds of samples again and
-again and reads nothing of the answers; as many processes as there are cores calculate all the time.
-Counted are the samples that are missing and the gaps that the recording flags.
+An unattended engine records 4 x 51.2 kS/s from the virtual rig in real time; as on the real device, samples
+that are read too late are lost. One viewer repeatedly requests ten seconds of samples and never reads the
+answers. One busy process runs per core. The script prints the missing samples and the gaps that the recording
+flags.
 """
 
 import os
@@ -28,13 +28,13 @@ BUSY = "while True: sum(i * i for i in range(100_000))"
 
 
 def campaign(duration_s: float) -> Campaign:
-    """One dwell in the colliding range."""
+    """Return a campaign of one dwell with impacts."""
     dwell = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": duration_s}
     return Campaign.model_validate({"name": "load", "measurements": [{"name": "dwell", "excitation": dwell}]})
 
 
 def frozen_viewer(stack: ExitStack, client: EngineClient) -> None:
-    """Ask for much and read nothing, until the connection's buffers are full."""
+    """Send requests without reading the answers, until the connection's buffers are full."""
     connection = client._connection  # noqa: SLF001 - a viewer that misbehaves must go behind the client's back
     connection.setblocking(False)  # noqa: FBT003 - the name is the socket's
     stack.callback(client.close)
@@ -46,7 +46,7 @@ def frozen_viewer(stack: ExitStack, client: EngineClient) -> None:
 
 
 def main() -> None:
-    """Run for some minutes and tell."""
+    """Record for some minutes and print what is missing."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     rig = load_rig(RIG)
     assert rig.virtual is not None

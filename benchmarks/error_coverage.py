@@ -1,18 +1,18 @@
-"""How often the error that an answer states covers what an independent code answers, on random scenes.
+"""Test how often the stated error covers the result of an independent code, on random scenes.
 
 ``python benchmarks/error_coverage.py --seed S --scenes 400 [--shard 1/4] [--levels standard] [--lanes]``.
-Scenes are drawn from the contact laws, damping times, gaps, frequencies and amplitudes below, from rest; a
-part of them asks for a short transient, a part for the end of a longer run. Each is answered at every level
-and by `plain_motion`, whose own error is the difference of two tolerances and is allowed on top of what is
-stated.
+Scenes start from rest; contact law, damping time, gaps, frequency and amplitude are drawn from the ranges
+below. Some scenes observe a short transient, the others the end of a longer run. Each is predicted at every
+level, and solved by `plain_motion` with two tolerances. The difference of these two is its own error, which
+is allowed on top of the stated error.
 
-Three kinds of question are counted apart. *Settled*: the motion repeats throughout the window. *Transient*:
-it does not, but both tolerances give the same answer. *Scattering*: they do not, because growth on the way
-has forgotten the start; the answer is then one draw of many, a stated error is that of two draws, and several
-independent draws, from starts a billionth of the gap apart, each count as a part of a scene.
+Three kinds of scene are counted separately. *Settled*: the motion repeats throughout the window. *Transient*:
+it does not, but both tolerances agree. *Scattering*: they differ, because small changes grow too much. The
+prediction is then one sample of several, and is compared with several independent samples, from starts a
+billionth of the gap apart. Each sample counts as a fraction of a scene.
 
-Covered are the four responses, each by its own error, in the mean; "all by one" asks for all four at once by
-``error_estimate``. An answer that says that it is one of several motions covers what any of them covers.
+"Covered" is the mean over the four responses, each with its own error; "all by one" tests all four against
+``error_estimate``. If a prediction names several motions, the nearest one counts.
 """
 
 import argparse
@@ -42,32 +42,32 @@ MODELS = (
     "power:47",
 )
 UNDAMPED = 0.1
-"""Part of the scenes without any damping."""
+"""Share of scenes without damping."""
 UNEVEN = 0.2
-"""Part of the scenes with stops at two distances."""
+"""Share of scenes with two different gaps."""
 TRANSIENT = 0.4
-"""Part of the scenes that end before they can have settled."""
+"""Share of scenes that end before the motion can settle."""
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 TIGHT, LOOSE = 1e-13, 1e-11
-"""Relative error of a step of the independent code, and another by which its own error shows."""
+"""Two relative tolerances of the independent code; the difference of their results is its own error."""
 FORGOTTEN = 1e-3
-"""Where two tolerances differ by more, relatively, the start is forgotten."""
+"""Relative difference of the two results above which the motion depends sensitively on the start."""
 RESOLVED = 5e-11
-"""Relative error of the independent code at its best: peaks of a closed form come out 4e-11 too high."""
+"""Smallest relative error of the independent code; its peaks of a known motion are 4e-11 too high."""
 DRAWS = 5
 NUDGE = 1e-9
 FAR = 10.0
-"""A difference of so many stated errors is a wrong answer."""
+"""Difference, in stated errors, above which a result counts as wrong."""
 WANTED = 0.92
 
 
 def log_uniform(rng, low, high):
-    """Draw from between two numbers, every factor as likely."""
+    """Return a random number between two limits, uniform in its logarithm."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def drawn_scene(seed, index):
-    """Draw scene ``index``: the same for every shard."""
+    """Return random scene ``index``, which is the same in every shard."""
     rng = np.random.default_rng([seed, index])
     model = str(rng.choice(MODELS))
     damping_s = 0.0 if rng.random() < UNDAMPED else float(rng.uniform(0.0, 5e-5))
@@ -88,18 +88,18 @@ def drawn_scene(seed, index):
 
 @dataclass(frozen=True)
 class Truth:
-    """What the independent code answers: one answer with its own error, or several draws."""
+    """Result of the independent code: one result with its own error, or several samples."""
 
     kind: str
     answers: np.ndarray
-    """Shape (draws, 4)."""
+    """Four responses of each sample, shape (draws, 4)."""
     own: np.ndarray
     """Relative error of the answers, shape (4,)."""
     period: int | None
 
 
 def truth_of(scene):
-    """Follow a scene by the independent code; None where it gives up."""
+    """Return the result of the independent code for a scene; None if it fails."""
     length = scene.duration.duration_s, scene.duration.window_s
     tight, loose = (
         plain_motion(scene.specimen, scene.drive, *length, tolerance=tol) for tol in (TIGHT, LOOSE)
@@ -121,12 +121,12 @@ def truth_of(scene):
 
 
 def solve_in_a_batch(scene):
-    """Solve a scene as among many others."""
+    """Solve a scene with the solver for many scenes."""
     return solve_scenes([scene])[0].prediction
 
 
 def solve_and_measure(scene, truth, level, solve):
-    """Answer a scene at a level; gives plain values for the table."""
+    """Predict a scene at a level, and return the comparison as plain values for the table."""
     began = time.process_time()
     asked = Scene(scene.specimen, scene.drive, scene.observe, level, scene.duration, scene.start)
     found = solve(asked)
@@ -134,7 +134,7 @@ def solve_and_measure(scene, truth, level, solve):
     errors = [getattr(found, f"{name}_error") for name in NAMES]
     stated = np.array([math.inf if error is None else error for error in errors])
     off = np.abs(truth.answers / answer_of(found) - 1.0)
-    # Within each of the motions that it names, whichever is nearest.
+    # Compare with the nearest of the motions that the prediction names.
     motions = [(answer_of(found), stated)]
     if found.ensemble is not None:
         motions += [
@@ -157,17 +157,17 @@ def solve_and_measure(scene, truth, level, solve):
 
 
 def answer_of(found):
-    """Give the four responses, shape (4,)."""
+    """Return the four responses, shape (4,)."""
     return np.array([getattr(found, name) for name in NAMES], dtype=np.float64)
 
 
 def times_off(truth, answer, stated):
-    """Say how many stated errors each draw is off, shape (draws, 4)."""
+    """Return the difference of each sample in units of the stated error, shape (draws, 4)."""
     return np.maximum(np.abs(truth.answers / answer - 1.0) - truth.own, 0.0) / np.maximum(stated, 1e-300)
 
 
 def described(scene, index):
-    """Say a scene in numbers that let it be repeated."""
+    """Return the parameters of a scene, so that it can be repeated."""
     specimen, drive, duration = scene.specimen, scene.drive, scene.duration
     return {
         "scene": index,
@@ -182,7 +182,7 @@ def described(scene, index):
 
 
 def report(rows):
-    """Print coverage by level and kind of question, and every scene that was far off."""
+    """Print the coverage by level and kind of scene, and every scene with a wrong result."""
     groups = defaultdict(list)
     for row in rows:
         groups[row["level"], row["kind"]].append(row)
@@ -213,7 +213,7 @@ def report(rows):
 
 
 def main():
-    """Draw, answer, compare, count."""
+    """Draw scenes, predict and compare them, and print the coverage."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=2025)
     parser.add_argument("--scenes", type=int, default=400)

@@ -1,9 +1,9 @@
-"""What a target costs: three pictures and the first section of docs/accuracy.md.
+"""Cost of a requested error: three figures and the first section of docs/accuracy.md.
 
-``python benchmarks/error_curves.py --markdown docs/accuracy.md`` draws error over time for the paper's four
-cases, the similarity of continuous models over the time that they take, and the error of a chaotic mean over
-window and starts. Times are processor time of one core. Numbers that images/NAME.csv holds are not measured
-again: remove the file to do so.
+``python benchmarks/error_curves.py --markdown docs/accuracy.md`` draws three figures: error over time for the
+paper's four cases; similarity of continuous models over their computing time; error of a mean in chaos over
+window and starts. Times are processor time of one core. Numbers stored in images/NAME.csv are used again;
+remove the file to measure again.
 """
 
 import argparse
@@ -57,7 +57,7 @@ def paper_cases():
 
 
 def kept(path):
-    """Return the rows of a table that was written, numbers as such; None where there is none."""
+    """Return the rows of a stored table, with numbers converted; None if there is no file."""
     if not path.exists():
         return None
     with path.open(encoding="utf-8", newline="") as file:
@@ -94,7 +94,7 @@ def response_curve(model, amplitude_m):
 
 
 def models_of_stops():
-    """Compare continuous models with the stops: rows of model, amplitude, time of a point, similarity."""
+    """Return the similarity of continuous models and stops: model, amplitude, time per point, similarity."""
     rows = []
     for amplitude_m in AMPLITUDES_M:
         stops, cost_s = response_curve("hertz", amplitude_m)
@@ -108,7 +108,7 @@ def models_of_stops():
 
 
 def models_figure(rows):
-    """Draw the similarity of Response I over the time of a point, a line through the models of each level."""
+    """Draw the similarity of Response I over the time per point, with one marker style per level."""
     with styled():
         figure = new_figure(4.2)
         axes = figure.subplots()
@@ -126,7 +126,7 @@ def models_figure(rows):
         labelled = sorted((row for row in rows if row[1] == LABELLED_M), key=lambda row: row[2])
         for name, _, cost_s, rate, *_ in labelled:
             alike = [row[2] for row in labelled if row[3] == rate]
-            # Of models with equal similarity the fastest has its name on the left, the slowest on the right.
+            # Among models of equal similarity, label the fastest on the left and the slowest on the right.
             is_first = cost_s == alike[0] and (len(alike) > 1 or cost_s == labelled[0][2])
             side = -1 if is_first else 1 if cost_s == alike[-1] else 0
             axes.annotate(
@@ -162,7 +162,7 @@ def models_figure(rows):
 
 
 def chaos_rows():
-    """Measure the stated error of the mean in chaos: rows of window, starts, error, time."""
+    """Return the stated error of the mean in chaos, as rows of window, starts, error and time."""
     drive, rows = Harmonic(PAPER_HZ, AMPLITUDES_M[1]), []
     specimen = gong2025()
     for window_s in WINDOWS_S:
@@ -183,7 +183,7 @@ def chaos_rows():
 
 
 def chaos_figure(rows):
-    """Draw the error of the mean over time, a line for each window, from few to many starts."""
+    """Draw the error of the mean over computing time, with one line per window."""
     with styled():
         figure = new_figure(3.8)
         axes = figure.subplots()
@@ -225,7 +225,7 @@ def chaos_figure(rows):
 
 
 def section(curves, models, chaos):
-    """Write the section: what an error costs, in three pictures and as many short tables."""
+    """Yield the lines of the section, with three figures and three short tables."""
     yield from (
         HEADING,
         "",
@@ -289,7 +289,7 @@ def section(curves, models, chaos):
 
 
 def main():
-    """Measure, draw, and put the section before the promises of the page."""
+    """Measure, draw, and insert the section before the promises of the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
     given = parser.parse_args()

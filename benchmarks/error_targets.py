@@ -1,10 +1,10 @@
-"""How honest and how cheap answers to a requested error are, on random scenes of all contact laws.
+"""Test coverage and cost of predictions with a requested error, on random scenes of all contact laws.
 
-``python benchmarks/error_targets.py --seed S --count 200 [--shard 1/4] --save FILE``. Each scene is asked for
-five errors. Its truth is taken from *reference*: of a periodic motion after a long run; of one start in a
-named window, the same window; of forgotten starts, the mean over others at *quick*. Truths that are
-not a hundred times better than the stated error are allowed their own error on top of it. A file that is
-there is continued; ``--sum FILES`` adds up several.
+``python benchmarks/error_targets.py --seed S --count 200 [--shard 1/4] --save FILE``. Each scene is predicted
+with five requested errors. The true value is computed at level *reference*: for a periodic motion after a
+long run, for one start in a named window from the same window. With sensitive dependence, it is the mean over
+other starts at *quick*. If the true value is less than a hundred times more exact than the stated error, its
+own error is allowed too. An existing file is continued; ``--sum FILES`` combines several.
 """
 
 import argparse
@@ -46,14 +46,14 @@ LAWS = (
 )
 ERRORS = (0.1, 0.01, 1e-3, 1e-4, 1e-6)
 UNDAMPED, UNEVEN = 0.05, 0.2
-"""Parts of the scenes."""
+"""Shares of scenes without damping, and with two different gaps."""
 TRUE_STARTS, FEWEST_TRUE = 400, 40
 TRUE_S = 1.0
-"""Processor time for the truth of one forgotten scene and window [s]."""
+"""Processor time for the true mean of one scene with sensitive dependence, per window [s]."""
 LONG_S = 60.0
-"""After which a damped motion of these scenes has settled."""
+"""Time after which a damped motion of these scenes has settled [s]."""
 SHORT, SMALL = 0.1, 1e-3
-"""Share of the time for errors up to this where the start is forgotten: no mean reaches them soon."""
+"""With sensitive dependence, errors up to SMALL get this share of the time, as no mean reaches them."""
 KINDS = ("periodic", "named window", "forgotten")
 HEADING, LAST = "## Requested errors", "## Other solvers"
 INTRODUCTION = """A motion that keeps its start but does not repeat is observed in a window that the answer
@@ -64,7 +64,7 @@ NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
 def drawn_scene(seed, index):
-    """Draw scene ``index``: the same for every shard."""
+    """Return random scene ``index``, which is the same in every shard."""
     rng = np.random.default_rng([seed, index])
     law = str(rng.choice(LAWS))
     damping_s = 0.0 if rng.random() < UNDAMPED else float(rng.uniform(2e-6, 5e-5))
@@ -80,13 +80,13 @@ def responses(found):
 
 
 def stated(found):
-    """Return their four errors, shape (4,)."""
+    """Return the stated errors of the four responses, shape (4,)."""
     errors = [getattr(found, f"{name}_error") for name in NAMES]
     return np.array([math.inf if each is None else each for each in errors])
 
 
 def truth_of(scene, found):
-    """Return what *reference* answers to the same question, and its own error, shape (4,) each."""
+    """Return the true responses, their own error, shape (4,) each, and the reference prediction or None."""
     named = FixedDuration(found.duration_s, found.window_s)
     if found.memory is not StartMemory.LOST:
         if found.motion is MotionKind.PERIODIC:
@@ -104,7 +104,7 @@ def truth_of(scene, found):
     for push in pushes(scene.specimen, scene.drive, TRUE_STARTS, 99):
         if len(drawn) >= FEWEST_TRUE and time.process_time() - began > TRUE_S:
             break
-        # In chaos no accuracy changes a mean: the quick level gives ten times as many starts.
+        # No accuracy level changes a mean in chaos, and quick gives ten times as many starts.
         run = FollowedRun(scene.specimen, scene.drive, Accuracy.QUICK.tolerance, push)
         run.follow(first / frequency_hz)
         seen = [
@@ -119,7 +119,7 @@ def truth_of(scene, found):
 
 
 def solve_and_measure(scene, time_s):
-    """Answer a scene for every error and for the 30 s default; returns plain values."""
+    """Predict a scene for every error and with the 30 s default; return plain values."""
     began = time.process_time()
     default = solve_scene(scene)
     row = {"default_s": time.process_time() - began, "default_error": default.error_estimate, "targets": []}
@@ -145,7 +145,7 @@ def solve_and_measure(scene, time_s):
         if found.response_i is None:
             row["targets"].append({"error": error, "refusal": found.ended})
             continue
-        # Truths of one motion or window serve every error.
+        # The true value of one motion or window is used for every error.
         key = (kind, found.duration_s, found.window_s, found.target.windows) if kind != "periodic" else kind
         if key not in known:
             known[key] = truth_of(scene, found)
@@ -173,12 +173,12 @@ def solve_and_measure(scene, time_s):
 
 
 def answered_of(rows):
-    """Return each scene beside each of its answers."""
+    """Return pairs of a scene and one of its predictions."""
     return [(row, each) for row in rows for each in row["targets"] if "kind" in each]
 
 
 def groups_of(rows):
-    """Return what was found for each kind of motion and error: labels, then numbers."""
+    """Yield the results for each kind of motion and requested error: labels, then numbers."""
     answered = answered_of(rows)
     for kind in KINDS:
         for error in (*ERRORS, None):
@@ -196,7 +196,7 @@ def groups_of(rows):
 
 
 def costs_of(rows):
-    """Compare costs: to 1 % with the 30 s default, and 1e-6 with 1e-2 on periodic motion."""
+    """Yield cost comparisons: 1 % with the 30 s default, and 1e-6 with 1e-2 on periodic motion."""
     pairs = [(row, each) for row, each in answered_of(rows) if each["error"] == ERRORS[1]]
     taken_s, default_s = [each["taken_s"] for _, each in pairs], [row["default_s"] for row, _ in pairs]
     middle_s, usual_s = np.median(taken_s), np.median(default_s)
@@ -218,7 +218,7 @@ def costs_of(rows):
 
 
 def report(rows):
-    """Print what a campaign found."""
+    """Print the results of all scenes."""
     refused = sum("refusal" in each for row in rows for each in row["targets"])
     print(f"{len(rows)} scenes, {refused} targets refused in a sentence")
     for kind, error, count, covered, met, stated_error, cost_s in groups_of(rows):
@@ -236,7 +236,7 @@ def report(rows):
 
 
 def write_section(page, rows, time_s):
-    """Put the figures into the page on accuracy, before the comparison with other solvers."""
+    """Insert the results into the page on accuracy, before the comparison with other solvers."""
     text = page.read_text(encoding="utf-8")
     before, last = text.split(f"\n{LAST}\n")
     lines = [
@@ -266,7 +266,7 @@ def write_section(page, rows, time_s):
 
 
 def main():
-    """Draw, answer, compare, count."""
+    """Draw scenes, predict and compare them, and print the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--count", type=int, default=200)

@@ -1,10 +1,10 @@
-"""Extremes through the real command: every one is answered in finite numbers, or refused in a sentence.
+"""Test that `vibench predict` gives finite numbers or one sentence of refusal for extreme parameters.
 
-``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4] [--targets]``. Each case draws a
-specimen and a drive from the ranges below, writes the specimen as a file, and calls ``vibench predict``. An
-answer is good when the exit code is 0 and all four responses and their errors are finite numbers; a refusal,
-when the exit code is 1 and standard error holds one sentence and no traceback. Whatever else happens is
-listed, and ends the script with exit code 1; a case that takes too long ends it at once.
+``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4] [--targets]``. Each case draws a specimen
+and a drive from the ranges below, writes the specimen as a file, and calls ``vibench predict``. A prediction
+is correct when the exit code is 0 and the four responses and their error are finite. A refusal is correct
+when the exit code is 1 and standard error holds one sentence without a traceback. Other results are listed,
+and the script ends with exit code 1. A case that takes too long ends it at once.
 """
 
 import argparse
@@ -27,9 +27,9 @@ from vibench.cli import main as vibench
 
 ERRORS = ("1e-15", "1e-9", "1e-6", "0.1%", "1%", "10%", "100%")
 TIMES_S = (1e-3, 1e-3, 0.1, 1.0, 3.0)
-"""Requested."""
+"""Requested times [s]."""
 LATE, LATE_S = 1.5, 0.2
-"""An answer may take so many times the requested time, or so much longer, whichever is more [s]."""
+"""Allowed time: LATE times the requested time, or LATE_S longer, whichever is more [s]."""
 AMPLITUDES_M = (1e-300, 1e-120, 1e-100, 1e-30, 1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-2, 1.0)
 FREQUENCIES_HZ = (1e-3, 1.0, 94.6, 130.0, 266.0, 1e3, 1e4, 1e6)
 MASS_FACTORS = (1e-9, 1e-6, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e6, 1e9)
@@ -41,23 +41,23 @@ LAWS = ("hertz", "linear", "linear_gap:{:g}", "rigid:0", "rigid:0.5", "rigid:1",
 MOST_PERIODS = 40
 MASSES_KG = (5.8e-3, 2.1e-3, 2.0e-3)
 SHOWN = 70
-"""Letters of a refusal."""
+"""Number of letters shown of a refusal."""
 LIMIT_S = 300
-"""Of one case."""
+"""Longest time of one case [s]."""
 NUMBERS = ("response_i", "response_ii", "relative_i", "relative_ii", "error_estimate")
 
 
 def targets(rng):
-    """Draw a requested error and time, as options."""
+    """Return a random requested error and time, as options."""
     time = ("--time", f"{rng.choice(TIMES_S):g}s")
     return (*time, "--error", str(rng.choice(ERRORS))) if rng.random() < 0.8 else time
 
 
 def drawn(rng, folder, is_target):
-    """Draw a case: write its specimen, give the words of its command."""
+    """Draw a case: write its specimen file, and return the arguments of its command."""
     masses = [mass * float(rng.choice(MASS_FACTORS)) for mass in MASSES_KG]
     stiffness, frequency_hz = float(rng.choice(STIFFNESSES)), float(rng.choice(FREQUENCIES_HZ))
-    # At a thousandth of a hertz one period is a hundred thousand cycles of the specimen.
+    # At 0.001 Hz, one drive period lasts a hundred thousand cycles of the specimen.
     periods = int(rng.integers(2, MOST_PERIODS)) if frequency_hz >= 1.0 else 1
     specimen = folder / "specimen.toml"
     specimen.write_text(
@@ -78,7 +78,7 @@ def drawn(rng, folder, is_target):
 
 
 def called(words):
-    """Call the command; gives exit code, standard output and standard error."""
+    """Call the command; return exit code, standard output and standard error."""
     out, err = StringIO(), StringIO()
     before = sys.argv
     sys.argv = ["vibench", *words]
@@ -96,7 +96,7 @@ def called(words):
 
 
 def complaint(code, out, err):
-    """Say what is wrong with what a command did; None where nothing is."""
+    """Return a description of the fault in a command's result; None if there is none."""
     said = [line for line in err.splitlines() if line.startswith("error:")]
     if "Traceback" in err or isinstance(code, str):
         return f"a traceback: {code} {err[-300:]}"
@@ -113,7 +113,7 @@ def complaint(code, out, err):
 
 
 def lateness_s(target):
-    """Return how much later than allowed an answer came [s]; zero without a requested time."""
+    """Return how much longer than allowed a prediction took [s]; zero without a requested time."""
     if target is None or target["wanted_time_s"] is None:
         return 0.0
     wanted_s = target["wanted_time_s"]
@@ -121,7 +121,7 @@ def lateness_s(target):
 
 
 def main():
-    """Draw, call, judge."""
+    """Draw cases, call the command and check its results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=2025)
     parser.add_argument("--cases", type=int, default=150)
@@ -135,7 +135,7 @@ def main():
     for case in cases:
         with tempfile.TemporaryDirectory() as folder:
             words = drawn(np.random.default_rng([arguments.seed, case]), Path(folder), arguments.targets)
-            # Whatever does not come back is the last that is named.
+            # Print the case first, so that a case that hangs can be identified.
             print(f"case {case}: {' '.join(words)}", file=sys.stderr, flush=True)
             faulthandler.dump_traceback_later(LIMIT_S, exit=True)
             began = time.process_time()

@@ -1,13 +1,14 @@
-"""What fast sweeps of random specimens are said to show, with and without stops.
+"""Test the detection of collisions in fast sweeps of random specimens, with and without stops.
 
     python benchmarks/fast_sweeps.py --count 100 --seed 1 --save fast.json
     python benchmarks/fast_sweeps.py --count 100 --seed 1 --shard 1/4
     python benchmarks/fast_sweeps.py --count 8 --rig        # recorded on the virtual rig, random fixtures
     python benchmarks/fast_sweeps.py --count 100 --unknown  # as if nobody had described the specimen
 
-Each specimen has other masses, damping and gap; each sweep another range, rate, direction and level; half of
-them are logarithmic. Impacts are those of the simulation. Wrong is a collision without an impact, or a sweep
-with impacts in ten intervals that is said to show none; "not determined" is never wrong.
+Each specimen has different masses, damping and gap; each sweep has a different range, rate, direction and
+level, and half of the sweeps are logarithmic. The true impacts are those of the simulation. A result is wrong
+if it reports a collision without an impact, or reports none in a sweep with impacts in ten intervals. "not
+determined" is never wrong.
 """
 
 import argparse
@@ -30,9 +31,9 @@ from vibench.sim import Sampled, Specimen, base_transmissibility, gong2025, inte
 RATE_HZ = 12_800.0
 LEAD_S, TAIL_S, RAMP_S = 3.0, 0.2, 0.5
 NOISE = 2e-7
-"""Of a vibrometer [m/s per root hertz]."""
+"""Noise density of the vibrometer [m/s per root hertz]."""
 CLEARLY = 10
-"""Intervals with impacts that must not be missed."""
+"""Number of intervals with impacts from which a missed collision is wrong."""
 
 
 @dataclass(frozen=True)
@@ -50,30 +51,30 @@ class FastSweep:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was said of a sweep, beside what happened."""
+    """Analysis of a sweep, beside the true impacts."""
 
     seed: int
     rate_hz_per_s: float
     struck: int
-    """Intervals with impacts."""
+    """Number of intervals with impacts."""
     colliding: int
-    """Intervals that are said to collide."""
+    """Number of intervals reported as colliding."""
     both: int
     not_determined_hz: tuple[tuple[float, float], ...]
     largest_ii: float
     steady_over_swept: float
     steady_ii: float
-    """Largest of the specimen without contact within the sweep, in closed form."""
+    """Largest Response II of the specimen without contact within the sweep, in closed form."""
 
     @property
     def is_wrong(self) -> bool:
-        """Whether collisions were invented, or clear ones denied."""
+        """Whether collisions were reported without impacts, or clear ones were missed."""
         is_missed = self.struck >= CLEARLY and not self.both and not self.not_determined_hz
         return is_missed or (self.struck == 0 and self.colliding > 0)
 
 
 def fast_sweep(number: int, seed: int = 1) -> FastSweep:
-    """Draw a sweep across or beside a resonance of another specimen."""
+    """Return a random sweep near a resonance of a random specimen."""
     rng = np.random.default_rng((seed, number))
     nominal = gong2025(damping_time_s=float(10 ** rng.uniform(-6.5, -4.4)), gap_m=rng.uniform(20e-6, 80e-6))
     masses = tuple(float(each) for each in np.array(nominal.masses) * rng.uniform(0.7, 1.4, 3))
@@ -88,7 +89,7 @@ def fast_sweep(number: int, seed: int = 1) -> FastSweep:
 
 
 def simulate_and_analyse(sweep: FastSweep, contact: str, known: Specimen | None) -> Outcome:
-    """Simulate a sweep after a settled sine, and analyse it, with the specimen that is known of it."""
+    """Simulate a sweep after a settled sine, and analyse it, with the known specimen if any."""
     lead, tail = round(LEAD_S * RATE_HZ), round(TAIL_S * RATE_HZ)
     time_s = np.arange(lead + round(sweep.duration_s * RATE_HZ) + tail) / RATE_HZ
     swept = np.maximum(time_s - LEAD_S, 0) / sweep.duration_s
@@ -116,7 +117,7 @@ def simulate_and_analyse(sweep: FastSweep, contact: str, known: Specimen | None)
 
 
 def outcome(sweep: FastSweep, found: SweepResponse, said: Collisions, impacts_s: np.ndarray) -> Outcome:
-    """Count intervals with impacts, and those that are said to collide."""
+    """Return the counts of intervals with impacts and of intervals reported as colliding."""
     edges = np.append(found.time_s, found.time_s[-1] + found.interval_s) - 0.5 * found.interval_s
     struck = np.histogram(impacts_s, edges)[0] > 0
     played_hz = np.linspace(found.frequency_hz.min(), found.frequency_hz.max(), 20_001)
@@ -138,7 +139,7 @@ def outcome(sweep: FastSweep, found: SweepResponse, said: Collisions, impacts_s:
 
 
 def recorded(sweep: FastSweep, contact: str, path: Path) -> Outcome:
-    """Record a sweep on the virtual rig with another fixture; without stops no impact is possible."""
+    """Record a sweep on the virtual rig with a random fixture; without stops, no impact is possible."""
     rng = np.random.default_rng((sweep.seed, 99))
     document = load_rig("virtual_rig").model_dump(mode="json")
     document["shaker"]["fixture_mass_kg"] = float(10 ** rng.uniform(-1.7, 0))
@@ -158,7 +159,7 @@ def recorded(sweep: FastSweep, contact: str, path: Path) -> Outcome:
 
 
 def main() -> None:
-    """Analyse sweeps and count what is wrong."""
+    """Analyse sweeps and count the wrong results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,4 +1,4 @@
-"""A first day on the virtual rig at the wall's pace, as a new user has it: its transcript and its time.
+"""Transcript and duration of a new user's first commands on the virtual rig in real time.
 
 python benchmarks/first_day.py > transcript.txt
 """
@@ -23,7 +23,7 @@ pace = "wall"
 
 
 def main() -> None:
-    """Play the commands in an empty folder, and print them with what they print."""
+    """Run the commands in an empty folder, and print them with their output."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         answers = (ROOT / "examples" / "first_day_answers.toml").read_text(encoding="utf-8")

@@ -1,10 +1,10 @@
-"""A new user's first hour, from an empty environment to a measurement, an analysis and a figure of their own.
+"""Transcript of a new user's first hour, from installation to a measurement, an analysis and a figure.
 
 python benchmarks/first_hour.py [--demo] > transcript.txt
 
-An environment of its own is made, vibench is installed into it from this checkout, and everything is typed
-in an empty folder, mistakes included. What is printed is the transcript, with the time of each command by
-the clock and of processors.
+The script creates a new environment, installs vibench from this checkout, and runs all commands in an empty
+folder, including typical mistakes. It prints the transcript, with elapsed time and processor time of each
+command.
 """
 
 import argparse
@@ -81,7 +81,7 @@ TYPED = (
 
 
 def main() -> None:
-    """Install, then type everything; mistakes are part of it, so that no exit code ends it."""
+    """Install, then run all commands; a failed command does not end the script, as mistakes are intended."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--demo", action="store_true", help="begin with the demonstration, as README does")
     typed_here = ("vibench demo", *TYPED) if parser.parse_args().demo else TYPED
@@ -110,7 +110,7 @@ def main() -> None:
 
 
 def typed(shown: str, words: list[str], folder: Path, environment: dict[str, str]) -> None:
-    """Run a command, and print it with what it printed and its time."""
+    """Run a command, and print it with its output and its time."""
     print(f"$ {shown}", flush=True)
     began_s, used_s = time.monotonic(), processors_s()
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
@@ -121,7 +121,7 @@ def typed(shown: str, words: list[str], folder: Path, environment: dict[str, str
 
 
 def processors_s() -> float:
-    """Time that all commands together have used so far [s]."""
+    """Return the processor time of all commands so far [s]."""
     times = os.times()
     return times.children_user + times.children_system
 

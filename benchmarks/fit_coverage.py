@@ -1,16 +1,15 @@
-"""How often a fit's intervals hold the truth, and how often wrong models are refused and named.
+"""Test how often a fit's intervals contain the truth, and how often wrong models are named.
 
     python benchmarks/fit_coverage.py --draws 200                    # all cases, on random rigs
     python benchmarks/fit_coverage.py --draws 250 --shard 1/4 --json # a quarter of a thousand, as numbers
 
-Each draw is another specimen (masses, frequencies, damping), another bench description (all linear
-numbers some per cent off), another clock, other noise, and from 4 to 24 realisations. Wrong models hold
-one thing that is not so; the further mode is a fourth mass, solved as such, and friction between base
-and m0 comes from an integrator of its own, through the estimator of recordings. A wrong model's effect
-is above the noise where the chi square of its misfit without noise would be refused in 95 of 100 cases.
-
-The table's mass and the gaps, which no transmission tells, are held on random rigs whose recordings describe
-another rig than was measured; their effect is above the noise where the fit tells the quantity well enough.
+Each draw has a random specimen (masses, frequencies, damping), clock and noise, and 4 to 24 realisations. The
+bench description has random errors of some per cent in all linear parameters. Wrong models contain one false
+assumption. The further mode is a fourth mass, solved as such. Friction between base and m0 is integrated
+separately, and analysed like a recording. The effect of a wrong model is above the noise if the chi square of
+its misfit without noise would be refused in 95 of 100 cases. Transmission does not depend on the table's mass
+and the gaps. These are tested with recordings of random rigs whose description is wrong; the effect is above
+the noise if the fit determines the quantity well enough.
 """
 
 import argparse
@@ -60,36 +59,36 @@ _SURELY = 0.95
 
 @dataclass(frozen=True)
 class Rig:
-    """A specimen, how it is described, and how well its transmission is measured."""
+    """A specimen, its description, and the scatter of its measured transmission."""
 
     true: Specimen
     described: Specimen
     sd: Reals
-    """Relative, of every line."""
+    """Relative standard deviation of every line."""
     realisations: int
 
 
 @dataclass(frozen=True)
 class Count:
-    """What became of the draws of one case."""
+    """Results of all draws of one case."""
 
     case: str
     draws: int
     above_noise: int
     refused: int
-    """Of those above the noise; of a right model, of all."""
+    """Number of refused fits: of draws above the noise, or for a right model of all."""
     named_first: int
-    """Of the refused."""
+    """Number of refused fits that name the right culprit first."""
     intervals: int
     held: int
 
 
 USUAL_NOISE, MUCH_NOISE = (-3.6, -2.6), (-1.5, -0.5)
-"""Logarithms of a line's relative scatter where m0 moves as the base does."""
+"""Range of the logarithm of a line's relative scatter, where m0 moves as the base does."""
 
 
 def random_rig(rng: np.random.Generator, noise: tuple[float, float] = USUAL_NOISE) -> Rig:
-    """Draw one."""
+    """Return a random rig."""
     usual = gong2025(damping_time_s=float(rng.uniform(1.2e-5, 2.6e-5)))
 
     def near(values: tuple[float, float, float], share: float) -> tuple[float, float, float]:
@@ -109,7 +108,7 @@ def random_rig(rng: np.random.Generator, noise: tuple[float, float] = USUAL_NOIS
 
 
 def measured(value: Complexes, rig: Rig, rng: np.random.Generator) -> FrequencyResponse:
-    """Average so many realisations, whose scatter is all that is known of the lines'."""
+    """Return the mean over the realisations, with the scatter estimated from these alone."""
     count, shape = rig.realisations, (rig.realisations, value.size)
     parts = math.sqrt(count) * rig.sd * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
     mean = parts.mean(axis=0)
@@ -138,16 +137,16 @@ def _response(
 
 
 Wrong = Callable[[Rig], tuple[Complexes, Specimen, bool]]
-"""What is measured of a rig, how it is described, and whether realisations scatter beyond noise."""
+"""Function from a rig to measured response, description, and whether scatter exceeds noise."""
 
 
 def plain(specimen: Specimen) -> Complexes:
-    """Without contact."""
+    """Return the transmissibility of a specimen without contact."""
     return np.asarray(base_transmissibility(specimen, LINES_HZ)[:, 0])
 
 
 def clocked(rig: Rig, rng: np.random.Generator) -> Rig:
-    """Give the rig whose motion a clock within 50 parts in a million shows as this one's."""
+    """Return the rig as it appears with a clock error of up to 50 parts in a million."""
     faster = (1 + 50e-6 * rng.uniform(-1, 1)) ** 2
     k0, k1, k2 = (faster * each for each in rig.true.stiffnesses)
     c0, c1, c2 = (math.sqrt(faster) * each for each in rig.true.dampings)
@@ -155,12 +154,12 @@ def clocked(rig: Rig, rng: np.random.Generator) -> Rig:
 
 
 def right(rig: Rig) -> tuple[Complexes, Specimen, bool]:
-    """Nothing is wrong but the numbers that are fitted."""
+    """Return a case in which only the fitted parameters are wrong."""
     return plain(rig.true), rig.described, False
 
 
 def mass(index: int) -> Wrong:
-    """Describe a mass 3 % too light."""
+    """Return a case whose description has one mass 3 % too light."""
 
     def wrong(rig: Rig) -> tuple[Complexes, Specimen, bool]:
         masses = [*rig.described.masses]
@@ -171,18 +170,18 @@ def mass(index: int) -> Wrong:
 
 
 def damper(rig: Rig) -> tuple[Complexes, Specimen, bool]:
-    """Shake a specimen whose c0 is three times what it is described as."""
+    """Return a case whose c0 is three times the described value."""
     c0, c1, c2 = rig.true.dampings
     return plain(replace(rig.true, dampings=(3 * c0, c1, c2))), rig.described, False
 
 
 def sensitivity(rig: Rig) -> tuple[Complexes, Specimen, bool]:
-    """Show everything 1 % too large."""
+    """Return a case whose measured response is 1 % too large."""
     return 1.01 * plain(rig.true), rig.described, False
 
 
 def extra_mode(rig: Rig) -> tuple[Complexes, Specimen, bool]:
-    """Hang a small mass on m0 whose mode is at 1.2 kHz; four masses, solved as such."""
+    """Return a case with a fourth, small mass on m0 whose mode is at 1.2 kHz."""
     (m0, m1, m2), k, c = rig.true.masses, rig.true.stiffnesses, rig.true.dampings
     small = EXTRA_SHARE * m0
     spring = small * (2 * np.pi * EXTRA_HZ) ** 2
@@ -203,16 +202,16 @@ def extra_mode(rig: Rig) -> tuple[Complexes, Specimen, bool]:
 
 
 FRICTION_SHARE = 0.3
-"""Friction force between base and m0, over the rms force in the damper of that link without it."""
+"""Friction force between base and m0, over the rms damper force of that link without friction."""
 RATE_HZ, REPETITION_HZ, SETTLE_S = 12_800.0, 4.0, 1.5
 STEPS = 4
-"""Of the integrator in a sample."""
+"""Number of integrator steps per sample."""
 
 
 def _rubbing(base: Reals, specimen: Specimen, force: float, soft: float) -> Reals:
-    """Velocities of m0 relative to bases of these accelerations, by Runge and Kutta's rule of fourth order.
+    """Return velocities of m0 relative to the base, with friction, by the fourth-order Runge-Kutta method.
 
-    ``base`` has shape (motions, samples), as has what is returned.
+    ``base`` holds base accelerations, shape (motions, samples); the result has the same shape.
     """
     step = 1.0 / (RATE_HZ * STEPS)
     flow = np.zeros((6, 6))
@@ -243,7 +242,7 @@ def _rubbing(base: Reals, specimen: Specimen, force: float, soft: float) -> Real
 
 
 def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool | None]:
-    """Shake m0 that rubs on the base with a multisine, and estimate the transmission as of a recording."""
+    """Simulate multisines with friction between base and m0, and estimate the transmission."""
     count, whole = round(RATE_HZ * (SETTLE_S + 2 / REPETITION_HZ)), round(RATE_HZ * 2 / REPETITION_HZ)
     omega = 2 * np.pi * np.arange(round(50 / REPETITION_HZ), round(600 / REPETITION_HZ)) * REPETITION_HZ
     motions = []
@@ -252,7 +251,7 @@ def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool 
         base, moved = np.cos(angle).sum(axis=0), (np.sin(angle) / omega[:, None]).sum(axis=0)
         motions.append((base, moved, rng.standard_normal(count if number > 0 else 0)))
     bases = np.array([base for base, _, _ in motions])
-    # Without friction, to learn how fast it moves.
+    # Simulate without friction first, to find the typical velocity.
     soft = 1e-3 * float(np.std(_rubbing(bases[:1], rig.true, 0.0, 1.0)[0, -whole:]))
     force = FRICTION_SHARE * rig.true.dampings[0] * 1e3 * soft
     sums = PeriodicSums(RATE_HZ, REPETITION_HZ)
@@ -272,7 +271,7 @@ def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool 
 
 
 def friction(rig: Rig) -> tuple[Complexes, Specimen, bool]:
-    """Say what Gaussian linearisation makes of it (Roberts and Spanos 2003, ch. 5): for the effect."""
+    """Return a case with friction by Gaussian linearisation (Roberts and Spanos 2003, ch. 5)."""
     c0, c1, c2 = rig.true.dampings
     more = c0 * (1 + FRICTION_SHARE * math.sqrt(2 / math.pi))
     return plain(replace(rig.true, dampings=(more, c1, c2))), rig.described, True
@@ -291,7 +290,7 @@ CASES: dict[str, tuple[Wrong, Assumption | None]] = {
 
 
 def recorded(true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | WhiteNoise]) -> UpdatedSpecimen:
-    """Measure a virtual rig that its configuration describes as another, and fit the specimen."""
+    """Measure a virtual rig with a wrong description, and fit the specimen."""
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{number}.h5" for number in range(len(plans))]
         for path, plan in zip(paths, plans, strict=True):
@@ -302,7 +301,7 @@ def recorded(true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | Wh
 
 
 def weak_noise(rng: np.random.Generator) -> WhiteNoise:
-    """Draw noise in which nothing collides."""
+    """Return random noise so weak that there are no impacts."""
     return WhiteNoise(
         amplitude_vpp=float(10 ** rng.uniform(-2.0, -1.4)),
         band_start_hz=50,
@@ -315,7 +314,7 @@ def weak_noise(rng: np.random.Generator) -> WhiteNoise:
 
 
 def heavier_table(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
-    """Describe the table by a tenth too light; whether that is above the noise."""
+    """Fit with a table described a tenth too light; return fit, and whether the effect exceeds the noise."""
     true, _words = random_bench(rng)
     table_kg = true.shaker.moving_mass_kg + true.shaker.fixture_mass_kg
     lighter = {"fixture_mass_kg": true.shaker.fixture_mass_kg - (1 - 1 / 1.1) * table_kg}
@@ -325,7 +324,7 @@ def heavier_table(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
 
 
 def uneven_gaps(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
-    """Describe gaps of 35 and 55 um as 45 um on both sides; whether that is above the noise."""
+    """Fit with gaps of 35 and 55 um described as 45 um; return as for `heavier_table`."""
     bench, _words = random_bench(rng)
     true, described = (
         bench.model_copy(update={"specimen": bench.specimen.model_copy(update={"gap_m": gap_m})})
@@ -341,7 +340,7 @@ def uneven_gaps(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
 
 
 def _is_told(effect: float, sd: float) -> bool:
-    """Whether an effect is refused surely at 3.3 standard deviations."""
+    """Return whether an effect is refused with near certainty at a limit of 3.3 standard deviations."""
     return effect > (3.3 + 1.65) * sd
 
 
@@ -352,7 +351,7 @@ RECORDED = {
 
 
 def counted_recordings(case: str, draws: int, seed: int) -> Count:
-    """Measure and fit so many rigs of one case."""
+    """Measure and fit ``draws`` virtual rigs of one case."""
     wrong, culprit = RECORDED[case]
     above, refused, named = 0, 0, 0
     for number in range(draws):
@@ -364,7 +363,7 @@ def counted_recordings(case: str, draws: int, seed: int) -> Count:
 
 
 def counted(case: str, draws: int, seed: int) -> Count:
-    """Fit so many rigs of one case."""
+    """Fit ``draws`` random rigs of one case."""
     if case in RECORDED:
         return counted_recordings(case, draws, seed)
     wrong, culprit = CASES[case]
@@ -396,8 +395,8 @@ def counted(case: str, draws: int, seed: int) -> Count:
 
 
 def _is_above(value: Complexes, rig: Rig, described: Specimen) -> bool:
-    """Whether the misfit without noise would be refused surely."""
-    # Of a noise-free measurement whose scatter is known exactly.
+    """Return whether the misfit without noise would be refused with near certainty."""
+    # Fit a measurement without noise whose scatter is known exactly.
     clean = fit_specimen(_response(value, rig.sd, 1e6), described, is_nonlinear=False)
     freedom = 2 * clean.lines - 6
     return bool(ncx2.sf(clean.limit * freedom, freedom, clean.reduced_chi_square * freedom) > _SURELY)
@@ -414,7 +413,7 @@ def _true(specimen: Specimen, parameter: Parameter) -> float:
 
 
 def rows(counts: list[Count]) -> Iterator[str]:
-    """Give a table as the document has it."""
+    """Yield the lines of a table for the documentation."""
     yield "| model | draws | effect above the noise | refused | right culprit first | intervals that hold |"
     yield "|---|---|---|---|---|---|"
     for each in counts:
@@ -426,7 +425,7 @@ def rows(counts: list[Count]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Run all cases and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)

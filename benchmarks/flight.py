@@ -1,4 +1,4 @@
-"""How fast and how exact the engine is on this machine: ``python benchmarks/flight.py``."""
+"""Speed and accuracy of the engine on this machine: ``python benchmarks/flight.py``."""
 
 import time
 
@@ -9,14 +9,14 @@ from vibench.sim.engine.run import CubicRun, RunRecord
 
 REPEATS = 3
 UNITS = np.repeat([1e-4, 0.1], 3)
-"""Errors are in units of 100 um and 0.1 m/s."""
+"""Units of errors of the state: 100 um and 0.1 m/s."""
 
 RUNS = ((Harmonic(130.0, 20e-6), 2.0), (Harmonic(260.0, 5e-6), 0.05), (Harmonic(260.0, 5e-6), 30.0))
-"""Periodic; chaotic, while runs can agree; chaotic, when they cannot."""
+"""Drives and durations: periodic; chaotic, short enough for runs to agree; chaotic, too long for that."""
 
 
 def best(job):
-    """Shortest of a few runs [s], and the last result."""
+    """Return the shortest time of a few runs [s], and the last result."""
     times = []
     for _ in range(REPEATS):
         start = time.perf_counter()
@@ -26,12 +26,12 @@ def best(job):
 
 
 def carry(pieces, interval_s):
-    """Advance over many intervals."""
+    """Advance a run over many intervals of a sampled drive."""
     CubicRun(gong2025(), interval_s, np.zeros(6), Accuracy.STANDARD.tolerance).advance(pieces, RunRecord(0))
 
 
 def report_first_use():
-    """Load the engine."""
+    """Print the time of the first use, which loads the engine."""
     start = time.perf_counter()
     integrate(gong2025(), Harmonic(130.0, 20e-6), 0.01)
     integrate(gong2025(), LinearSweep(100.0, 110.0, 0.1, 20e-6), 0.1)
@@ -39,7 +39,7 @@ def report_first_use():
 
 
 def report_runs():
-    """Time and error at each accuracy, against the strictest level."""
+    """Print time and error of each accuracy level, against the reference level."""
     specimen = gong2025(damping_time_s=3e-5)
     for drive, duration_s in (
         (Harmonic(130.0, 20e-6), 2.0),
@@ -58,7 +58,7 @@ def report_runs():
 
 
 def report_intervals():
-    """Cost of an interval of a sampled drive."""
+    """Print the cost of an interval of a sampled drive."""
     pieces = np.zeros((200_000, 4))
     taken, _ = best(lambda: carry(pieces, 1e-5))
     print(f"interval of 10 us, clear of the stops: {taken / len(pieces) * 1e9:.0f} ns")

@@ -1,21 +1,18 @@
-"""Branches of the virtual rig held by its real-time controller, beside those of the model.
+"""Compare branches held by the real-time controller of the virtual rig with those of the model.
 
     python benchmarks/held_branches.py [--noise 10] [--wrong 1.1] [--latency 5e-4] [--seed 1] [--out DIR]
     python benchmarks/held_branches.py --stability 0.02 [--noise 3]
     python benchmarks/held_branches.py --stops
     python benchmarks/held_branches.py --latencies 0.3,1,1.2,1.5,2 --draw docs/images/held_latency.png
 
-Follows the branch of campaigns/branch.toml on the virtual rig with a controller, every noise of its
-virtual section times ``--noise``, and prints how far what was measured lies from the model's branch. With
-``--wrong`` the host believes in springs stiffer and a coil stronger by that factor than those that move.
-
-With ``--stability`` small changes of that size tell how stable each point is, beside the model's Floquet
-multipliers.
-
-With ``--stops`` the specimen is the paper's, and the branch one with impacts, begun from above.
-
-With ``--latencies`` [ms] each branch is begun though the loop would not hold it (the refusal is taken out
-here), and where it was lost is printed beside where the loop's largest multiplier passes one by the model.
+The script follows the branch of campaigns/branch.toml on the virtual rig with a controller, and prints how
+far the measured points lie from the model's branch. All noise of the virtual rig is multiplied by
+``--noise``. With ``--wrong``, the host's model has stiffer springs and a stronger coil than the true rig, by
+this factor. With ``--stability``, small changes of this size determine the stability of each point, beside
+the model's Floquet multipliers. With ``--stops``, the specimen is the paper's, and the branch has impacts and
+is followed downwards. With ``--latencies`` [ms], each branch is started even if the loop cannot hold it (the
+check is disabled here). The frequency at which it was lost is printed beside that at which the model's
+largest multiplier exceeds one.
 """
 
 import argparse
@@ -72,13 +69,13 @@ NOISES = (
     "converter_noise_v",
 )
 BESIDE_HZ = 0.2
-"""So near to a fold m0 is not compared: the branch is steep there."""
+"""Distance from a fold within which m0 is not compared, because the branch is steep there [Hz]."""
 FINE = 25
-"""Latencies of the model's curve."""
+"""Number of latencies of the model's curve."""
 
 
 def changed(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
-    """Give a rig with other noise and latency."""
+    """Return the rig with changed noise, seed and latency."""
     virtual = rig.virtual
     louder = {name: noise * getattr(virtual, name) for name in NOISES}
     told = {"virtual": virtual.model_copy(update=louder | {"seed": seed})}
@@ -88,7 +85,7 @@ def changed(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
 
 
 def believed(rig: Rig, wrong: float, virtual: VirtualRig) -> Rig:
-    """Give what a host believes whose model is wrong, and where it finds the instruments of the true rig."""
+    """Return a wrong description of the rig, with the addresses of the true instruments."""
     stiffer = tuple(wrong**0.5 * each for each in rig.specimen.single_frequencies_hz)
     push = wrong * rig.shaker.force_constant_n_per_a
     return rig.model_copy(
@@ -103,7 +100,7 @@ def believed(rig: Rig, wrong: float, virtual: VirtualRig) -> Rig:
 
 
 def model_of(rig: Rig, plan: BranchContinuation) -> Branch:
-    """Follow the branch of the specimen that is really there."""
+    """Return the branch of the true specimen."""
     structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
     level_m = plan.base_level.displacement_m
     start = balance(structure, spring, plan.low_hz, level_m)
@@ -146,7 +143,7 @@ def compare(points: list[BranchPointNote], branch: Branch, level_m: float) -> No
 
 
 def compare_stability(notes: list[FeedbackNote | None], branch: Branch, level_m: float) -> None:
-    """Print what small changes told of each point, beside the model's largest multiplier there."""
+    """Print the measured stability of each point, beside the model's largest multiplier."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
     hertz = np.array([each.frequency_hz for each in points])
     turns = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
@@ -182,7 +179,7 @@ STOPS = BranchContinuation(
 
 
 def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
-    """Print how far motions with impacts lie from the model's, and how unstable those are."""
+    """Print how far measured motions with impacts lie from the model's, and the model's multipliers."""
     level_m = STOPS.base_level.displacement_m
     range_hz = STOPS.low_hz - 0.4, STOPS.high_hz
     branch = impact_branch(specimen, level_m, STOPS.start_hz, range_hz, "above")
@@ -216,7 +213,7 @@ def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
 
 
 def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
-    """Follow the branch beyond its first fold at a latency; give the highest frequency held, and the end."""
+    """Follow the branch at a latency; return the highest frequency held, and the reason for the end."""
     measurement = load_campaign("branch").measurements[0]
     plan = measurement.excitation.model_copy(update={"step_hz": 2.0, "most_points": 24, "perturbation": 0.0})
     controller = rig.controller.model_copy(update={"latency_s": latency_s})
@@ -236,12 +233,12 @@ def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
 
 
 def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
-    """Print and draw where branches are lost, beside where the model loses them."""
+    """Print and draw where branches are lost, in the measurement and in the model."""
     rig = load_rig(Path("virtual_rig_controller"))
     branch = model_of(rig, load_campaign("branch").measurements[0].excitation)
     fold = next(each.index for each in branch.events if each.kind.value == "fold")
     leg = np.arange(0, fold + 1, max(1, fold // 40))
-    # A host refuses these plans; what happens otherwise is what is measured here.
+    # Disable the check that refuses these plans, because this script measures when they fail.
     _continuation_controller.require_held = lambda *_: None
     rows = []
     for each in sorted(latencies_ms):
@@ -260,7 +257,7 @@ def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
 
 
 def model_loss(rig: Rig, branch: Branch, leg: np.ndarray, latency_ms: float) -> tuple[float, float]:
-    """Give where the loop's largest multiplier passes 1, else the fold, and the largest up to the fold."""
+    """Return where the loop's largest multiplier passes 1, or else the fold; and the largest one."""
     table = amplifier_of(rig), shaker_of(rig), specimen_of(rig)
     plant = SampledPlant(*table, LoopTiming(rig.controller.rate_hz, 1e-3 * latency_ms))
     multipliers, hertz = (
@@ -276,7 +273,7 @@ def model_loss(rig: Rig, branch: Branch, leg: np.ndarray, latency_ms: float) -> 
 
 
 def picture(rows: np.ndarray, model: np.ndarray, fold_hz: float, path: Path) -> None:
-    """Draw frequency of the loss over latency, held and by the model, and the model's largest multiplier."""
+    """Draw over latency: frequency of the loss, measured and modelled, and the model's largest multiplier."""
     with styled():
         figure = new_figure(3.2)
         left, right = figure.subplots(1, 2)
@@ -296,7 +293,7 @@ def picture(rows: np.ndarray, model: np.ndarray, fold_hz: float, path: Path) -> 
 
 
 def main() -> None:
-    """Follow, compare, print."""
+    """Follow the branch, compare it with the model, and print the differences."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--noise", type=float, default=1.0)
     parser.add_argument("--wrong", type=float, default=1.0)

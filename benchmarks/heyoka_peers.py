@@ -1,10 +1,9 @@
-"""heyoka on the motions of work_precision.py: as a plain user writes it, and as its best user would.
+"""heyoka on the motions of work_precision.py: a plain formulation, and one tuned for heyoka.
 
-The plain user gives it the equations of motion and an event for each stop and direction. The best user
-gives it what its Taylor series is at home in: in contact the penetration is w^2 and time runs as w (Hertz's
-force is then k w^3 and the equations are polynomials), one event tells touching and leaving, all variables
-are of order one, and eight trajectories share the lanes of a processor. High accuracy is off in both, as it
-is unless asked for.
+The plain formulation has the equations of motion, and an event for each stop and direction. The tuned one
+suits a Taylor series. In contact, the penetration is w^2 and time runs as w, so that Hertz's force is k w^3
+and the equations are polynomials. One event serves touching and leaving, all variables are of order one, and
+eight trajectories share the SIMD lanes of a processor. High accuracy is off in both, as by default.
 """
 
 import math
@@ -14,18 +13,18 @@ import heyoka as hy
 import numpy as np
 
 HAIR_M = 1e-11
-"""The plain series of depth^1.5 has no radius at depth zero: stops begin this much deeper for it."""
+"""Additional depth at which contact begins: the series of depth^1.5 does not converge at zero."""
 LANES = 8
 APART = 1e-6
-"""Of the gap, between the starts of the lanes."""
+"""Distance between the starts of the lanes, as a share of the gap."""
 SPEED = 2000.0
-"""Unit of speeds over the gap [1/s]; half and twice as much make no difference."""
+"""Unit of speeds, divided by the gap [1/s]; half or twice the value makes no difference."""
 ROOT_M = 1e-3
-"""Unit of w [m^0.5]: a collision of 0.1 m/s is as deep."""
+"""Unit of w [m^0.5]: the value of w at the largest depth of an impact at 0.1 m/s."""
 
 
 def plain(constants, tolerance, start, span_s):
-    """Run the plain equations; par[0] is the side whose stop acts."""
+    """Return a function that runs the plain equations; par[0] is the side of the active stop."""
     (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = constants[0:3], constants[3:6], constants[6:9]
     amplitude, omega, gap, stiffness, exponent, power, force, reference = constants[9:17]
     x, y, z, vx, vy, vz = hy.make_vars("x", "y", "z", "vx", "vy", "vz")
@@ -35,7 +34,7 @@ def plain(constants, tolerance, start, span_s):
     elif exponent == 1.0:
         push = stiffness * side * (side * p - gap)
     else:
-        # Zero to the power of a half has no series: away from the stop the depth is replaced by one.
+        # Away from the stop, replace the depth by one, because zero to the power 0.5 has no series.
         depth = side * side * (side * p - gap) + (1.0 - side * side)
         push = stiffness * side * depth**exponent
     inner = k1 * p + c1 * (vy - vz) + push
@@ -64,7 +63,7 @@ def plain(constants, tolerance, start, span_s):
 
 
 def _plain_events(p, gap):
-    """One event for each stop and direction, which switches its force on or off and goes on."""
+    """Return one event for each stop and direction, which switches the stop force on or off."""
 
     def switch(side):
         def callback(solver, _):
@@ -83,11 +82,11 @@ def _plain_events(p, gap):
 
 
 class AtHome:
-    """The equations in the variables in which heyoka's series is at home.
+    """The equations in variables that suit a Taylor series.
 
-    The first is p in flight and w in contact under Hertz's law, p throughout under the others; then dp/dt,
-    x, z, vx, vz, and under Hertz's law time. Displacements count in gaps (powers: in p_ref). Parameters are
-    the side, whether its stop pushes, and under Hertz's law whether it does not.
+    Under Hertz's law, the first variable is p in flight and w in contact; under the others it is p. Then
+    follow dp/dt, x, z, vx, vz, and under Hertz's law time. Displacements are in gaps (power laws: in p_ref).
+    Parameters are the side, whether its stop pushes, and under Hertz's law whether it does not.
     """
 
     def __init__(self, constants):
@@ -128,14 +127,14 @@ class AtHome:
             self.system.append((t, pace))
 
     def variables(self, start):
-        """Turn x, y, z, vx, vy, vz of a flight into the variables."""
+        """Return the variables for a state x, y, z, vx, vy, vz in flight."""
         x, y, z, vx, vy, vz = start
         assert self.is_power or abs(y - z) < self.length
         lengths, speeds = np.array([y - z, x, z]) / self.length, np.array([vy - vz, vx, vz]) / self.speed
         return np.array([lengths[0], speeds[0], *lengths[1:], *speeds[1:], 0.0])[: len(self.system)]
 
     def state(self, at, pars):
-        """Turn the variables into x, y, z, vx, vy, vz."""
+        """Return the state x, y, z, vx, vy, vz for the variables."""
         p = at[0] * self.length
         if self.is_hertz and pars[1] > 0.0:
             p = pars[0] * (self.length + (ROOT_M * at[0]) ** 2)
@@ -143,17 +142,17 @@ class AtHome:
         return np.array([x, z + p, z, vx, vz + rate, vz])
 
     def switched(self, q, pars):
-        """Touch the stop, or leave it: the first variable and the parameters from now on."""
+        """Return first variable and parameters after touching or leaving the stop."""
         if pars[1] > 0.0:
             return (pars[0] if self.is_hertz else q), self.flying
         return (0.0 if self.is_hertz else q), self.pushed_to(math.copysign(1.0, q))
 
     def pushed_to(self, side):
-        """Parameters of a contact."""
+        """Return the parameters of a contact."""
         return (side, 1.0, 0.0)[: len(self.flying)]
 
     def end(self, tolerance, start, span_s):
-        """Give the state after ``span_s``; None where heyoka gave up."""
+        """Return the state after ``span_s``; None if heyoka fails."""
         events, pars = [hy.t_event(self.time - span_s)] if self.is_hertz else [], {}
         if not self.is_power:
 
@@ -171,12 +170,12 @@ class AtHome:
         return self.state(solver.state, solver.pars) if reached >= span_s * (1.0 - 1e-9) else None
 
     def cost(self, lanes, tolerance, start, length_s):
-        """Processor time over simulated time, of eight trajectories at once or of one of them."""
+        """Return processor time over simulated time, with ``lanes`` trajectories at once."""
         at = np.repeat(self.variables(start)[:, None], lanes, axis=1)
         at[0] += APART * np.arange(lanes)
         held, more = [False] * lanes, {}
         if not self.is_power:
-            # Lanes that fly are told by a list: a quarter of the time of looking into an array.
+            # A list of flags per lane takes a quarter of the time of an array.
             flying, pushed = (
                 np.array(self.flying),
                 {side: np.array(self.pushed_to(side)) for side in (1.0, -1.0)},

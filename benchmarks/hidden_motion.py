@@ -1,7 +1,8 @@
-"""How well the hidden motion is told as noise, sample rate and the specimen's numbers get worse.
+"""Test the hidden-state estimate with more noise, lower sample rates and wrong specimen parameters.
 
-Every line is a fresh rig with seeds of its own for noise and excitation; the truth is the virtual world's.
-`python benchmarks/hidden_motion.py [--seeds N] [--first-seed N]` prints the table of docs/hidden-motion.md.
+Every row is a new rig with its own seeds for noise and excitation; the true motion is known from the
+simulation. `python benchmarks/hidden_motion.py [--seeds N] [--first-seed N]` prints the table of
+docs/hidden-motion.md.
 """
 
 import argparse
@@ -116,7 +117,7 @@ LINES = (
 
 
 def scored(line: Line, seed: int, world: ModuleType, folder: Path) -> str:
-    """Shake, tell, and compare with the truth: the cells of a row."""
+    """Simulate a recording, estimate the hidden motion, and return the comparison as one row."""
     shaken = world.shaken(
         folder,
         line.kind,
@@ -179,7 +180,7 @@ HEADINGS = (
 
 
 def main() -> None:
-    """Print the table."""
+    """Run all rows and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1, help="rigs a line")
     parser.add_argument("--first-seed", type=int, default=1001)

@@ -1,11 +1,12 @@
-"""Figures of the house: files, lines, faces, who enters whom, and the ways of three commands through it.
+"""Figures of the software structure: files, lines, public APIs, imports, and call paths of three commands.
 
     python benchmarks/house_figures.py [--checkout DIR]
 
-A room is a folder of modules. A module is *entered* when another package imports it or a name of it; a *pair*
-is two rooms that import each other. A *way* is followed through the calls of one run in the main thread: the
-files and rooms that it enters, the moves from package to package, and the returns to a package that is still
-open. Works on checkouts from before the namespace too, to compare.
+A *room* is a folder of modules, a *face* a public API. A module is *entered* when another package imports it
+or a name of it; a *pair* is two rooms that import each other. A *way* is the call path of one run in the main
+thread: the files and rooms with called functions, the moves from package to package, and the returns to a
+package that is still on the call stack. The script also works on older checkouts without the namespace
+package.
 """
 
 import argparse
@@ -66,7 +67,7 @@ Path(os.environ["HOUSE_ANSWER"]).write_text(json.dumps([code, list(steps)]))
 
 
 def source_folders(checkout: Path) -> dict[str, Path]:
-    """Name the folder of each package: of a namespace, or at the top of an older checkout."""
+    """Return the folder of each package, in the namespace or at the top of an older checkout."""
     inner = {name: checkout / name / "vibench" / name for name in PORTIONS}
     found = {name: folder for name, folder in inner.items() if folder.is_dir()}
     return found or {
@@ -75,7 +76,7 @@ def source_folders(checkout: Path) -> dict[str, Path]:
 
 
 def modules_of(folders: dict[str, Path]) -> dict[str, Path]:
-    """Every module by its dotted name below the packages."""
+    """Return the path of every module by its dotted name."""
     return {
         ".".join((package, *_parts(path, folder))): path
         for package, folder in folders.items()
@@ -89,7 +90,7 @@ def _parts(path: Path, folder: Path) -> tuple[str, ...]:
 
 
 def imports_of(name: str, path: Path, modules: dict[str, Path]) -> Iterator[str]:
-    """Modules of ours that a module imports, or imports names of."""
+    """Yield the modules of this project that a module imports, or from which it imports names."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.ImportFrom):
@@ -106,12 +107,12 @@ def imports_of(name: str, path: Path, modules: dict[str, Path]) -> Iterator[str]
 
 
 def room_of(name: str, modules: dict[str, Path]) -> str:
-    """Folder of a module."""
+    """Return the dotted name of the folder of a module."""
     return name if modules[name].name == "__init__.py" else name.rpartition(".")[0]
 
 
 def counted(checkout: Path) -> dict[str, int]:
-    """Count what needs no run."""
+    """Return the counts that need no run."""
     folders = source_folders(checkout)
     modules = modules_of(folders)
     edges = {(name, to) for name, path in modules.items() for to in imports_of(name, path, modules)}
@@ -131,23 +132,23 @@ def counted(checkout: Path) -> dict[str, int]:
 
 
 def _is_face(path: Path) -> bool:
-    """Whether a package says which names it shows."""
+    """Return whether a package declares its public names."""
     return "__all__" in path.read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
 class Way:
-    """Where the calls of one run in the main thread lead, each pair of functions counted once."""
+    """Call path of one run in the main thread; each pair of functions is counted once."""
 
     files: int
     rooms: int
     moves: int
-    """Pairs of packages of which one calls the other."""
+    """Number of pairs of packages of which one calls the other."""
     returns: int
-    """Calls into a package that is still open further up the stack: somebody is called back."""
+    """Number of calls into a package that is already on the call stack (callbacks)."""
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return the counts as one line."""
         return (
             f"{self.files} files in {self.rooms} rooms, {self.moves} moves between packages, "
             f"{self.returns} returns to an open package"
@@ -155,7 +156,7 @@ class Way:
 
 
 def followed(checkout: Path, arguments: list[str], folder: Path) -> Way:
-    """Run a command of a checkout and follow it."""
+    """Run a command of a checkout and return its call path."""
     folders = source_folders(checkout)
     is_namespace = any(path.parent.name == "vibench" for path in folders.values())
     answer = folder / "answer.json"
@@ -197,7 +198,7 @@ duration_s = 2.0
 
 
 def main() -> None:
-    """Count, follow, and print."""
+    """Print the counts and the call paths."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,9 +1,9 @@
-"""How many of the impacts that happen the live view counts.
+"""Share of the true impacts that the live view counts.
 
     python benchmarks/impact_counter.py
 
-The specimen is simulated under sines; m0's velocity gets the noise of the virtual rig's vibrometer and
-goes to the counter in blocks of 50 ms, as it does in a run. The simulation knows every impact.
+The specimen is simulated under sines, so that every impact is known. The velocity of m0 gets the noise of the
+virtual rig's vibrometer, and is passed to the counter in blocks of 50 ms, as in a run.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ RATE_HZ = 51_200.0
 BLOCK = 2560
 DURATION_S = 4.0
 NOISE_M_PER_S = 6e-6
-"""As recorded on the virtual rig, a sample."""
+"""Noise of a sample, as recorded on the virtual rig."""
 SINES = (
     (95.0, 3e-6),
     (190.0, 5e-6),
@@ -28,11 +28,11 @@ SINES = (
     (436.0, 20e-6),
 )
 VELOCITY = 3
-"""Column of a state: x, y, z, and then their velocities."""
+"""Column of the velocity of m0 in a state x, y, z, vx, vy, vz."""
 
 
 def main() -> None:
-    """Simulate, count, compare."""
+    """Simulate each sine, count its impacts, and print both numbers."""
     rng = np.random.default_rng(0)
     print("    drive            impacts a second    counted")
     for frequency_hz, amplitude_m in SINES:

@@ -19,17 +19,17 @@ from vibench.sim.accuracy_benchmark.equations import Law, Place, law_of, numbers
 from vibench.sim.specimen.state import Floats
 
 Rates = Callable[[float, Floats], Floats]
-"""(time, state) -> d state / dt, for general solvers."""
+"""Function from time and state to d state / dt, for general solvers."""
 Y, Z, VY, VZ = 1, 2, 4, 5
 
 
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
-    """Return d/dt of the state for as long as m1 stays at a place."""
+    """Return the rates of the state while m1 stays at one place."""
     return lambda time_s, state: rates(time_s, state, place, law, numbers)
 
 
 def place_of(state: Floats, law: Law) -> Place:
-    """Return where m1 is."""
+    """Return whether m1 is in flight or at which stop."""
     if law.terms:
         return Place.ANYWHERE
     below, above = _depths(state, law)
@@ -39,7 +39,7 @@ def place_of(state: Floats, law: Law) -> Place:
 
 
 def clearances_at(place: Place, state: Floats, law: Law) -> tuple[float, ...]:
-    """Return the distance to each end of a phase, positive while it lasts."""
+    """Return the distance to each possible end of a phase; positive during the phase."""
     below, above = _depths(state, law)
     match place:
         case Place.FLIGHT:
@@ -58,15 +58,15 @@ def _depths(state: Floats, law: Law) -> tuple[float, float]:
 
 
 TOLERANCE = 1e-13
-"""Relative error of a step; scipy refuses less than 2.2e-14."""
+"""Relative error of a step; scipy accepts 2.2e-14 at least."""
 STATE_UNITS = np.repeat([1e-4, 0.1], 3)
-"""Errors of a state are in units of 100 um and 0.1 m/s, the size of gaps and of the speeds of impacts."""
+"""Units of errors of a state: 100 um and 0.1 m/s, typical for gaps and impact velocities."""
 SMALLEST_PART = 1e-2
-"""Least scale of a component relative to its unit, for zero crossings."""
+"""Smallest scale of the error of a component, relative to its unit; it matters near zero crossings."""
 LONGEST_STEP_S = 2e-4
-"""Longest step, a tenth of the shortest period of the free specimen."""
+"""Longest step [s]: a tenth of the shortest natural period of the specimen without contact."""
 MOST_PHASES_PER_S = 100_000
-"""Most flights and contacts per second."""
+"""Largest number of flights and contacts per second."""
 
 
 def state_error(state: ArrayLike, truth: ArrayLike) -> float:
@@ -112,7 +112,7 @@ def independent_state(
 def _phase(
     rates: Rates, place: Place, law: Law, time_s: float, state: Floats, until_s: float, tolerance: float
 ) -> tuple[float, Floats, int | None]:
-    """Integrate until a clearance is used up; return which, or None at the end of the time."""
+    """Integrate until a phase ends; return its time, state and which end, or None at the end of the run."""
     solver = _solver(rates, time_s, state, until_s, tolerance)
     while solver.status == "running":
         before_s, before = solver.t, solver.y
@@ -155,7 +155,7 @@ def _state_at(rates: Rates, before_s: float, before: Floats, end_s: float, toler
 def _first_end(
     solver: DOP853, before_s: float, before: Floats, clearances: Callable[[Floats], tuple[float, ...]]
 ) -> tuple[float, int] | None:
-    """Find the first instant of the last step at which a clearance is used up, and which of them."""
+    """Return the first instant of the last step at which the phase ends, and which end it is."""
     turns = (before[VY] - before[VZ]) * (solver.y[VY] - solver.y[VZ]) < 0.0
     if not turns and all(left > 0.0 for left in clearances(solver.y)):
         return None

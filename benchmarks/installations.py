@@ -1,12 +1,12 @@
-"""Bare installations: how large they are, whether they work, and how long first uses take.
+"""Test new installations: their size, whether they work, and how long the first commands take.
 
     python benchmarks/installations.py --out table.md
     python benchmarks/installations.py --python python3.12 python3.13 --extra none bench --form wheel
 
-Each combination of interpreter, form (wheel, editable), extra and versions (newest, lowest) gets an
-environment and a compile cache of its own, and runs from an empty folder: ``vibench --version``, a
-prediction, the same again, then, where the extra has it, the shipped campaign by name and its analysis.
-Processor seconds, not seconds of a clock: other programs may run.
+Each combination of interpreter, form (wheel, editable), extra and versions (newest, lowest) gets a new
+environment, and runs from an empty folder. The commands are ``vibench --version``, a prediction, and the same
+again. If the extra allows it, the shipped campaign and its analysis follow. Times are processor time, because
+other programs may run.
 """
 
 import argparse
@@ -26,13 +26,13 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 EXTRAS = ("none", "figures", "bench", "gui")
-"""Each brings what those before it do."""
+"""Extras; each includes the ones before it."""
 PREDICT = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")
 
 
 @dataclass
 class Installation:
-    """One environment, and what was seen in it."""
+    """One environment with its results."""
 
     python: str
     form: str
@@ -45,13 +45,13 @@ class Installation:
 
     @property
     def target(self) -> str:
-        """What pip is told to install."""
+        """Requirement that pip installs."""
         extras = "" if self.extra == "none" else f"[{self.extra}]"
         return f"{ROOT}{extras}"
 
 
 def lowest(python_version: str, extra: str) -> list[str]:
-    """Give each library of an installation at its lowest allowed version."""
+    """Return each library of an installation with its lowest allowed version."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     wanted = EXTRAS[: EXTRAS.index(extra) + 1]
@@ -71,7 +71,7 @@ def lowest(python_version: str, extra: str) -> list[str]:
 
 
 def timed(command: list[str], folder: Path, environment: dict[str, str]) -> float:
-    """Run a command to its end, and give the processor time of it and its children."""
+    """Run a command, and return its processor time with that of its children [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -79,7 +79,7 @@ def timed(command: list[str], folder: Path, environment: dict[str, str]) -> floa
 
 
 def examine(each: Installation, folder: Path) -> None:
-    """Make the environment, and use it as a new user does."""
+    """Create the environment, and run the first commands of a new user."""
     subprocess.run([each.python, "-m", "venv", folder / "venv"], check=True)
     program = folder / "venv" / "bin"
     python = str(program / "python")
@@ -97,7 +97,7 @@ def examine(each: Installation, folder: Path) -> None:
     each.processor_s["install"] = timed(pip, folder, environment)
     installed = [python, "-m", "pip", "list", "--format", "json"]
     listed = subprocess.run(installed, check=True, capture_output=True, text=True).stdout
-    each.packages = len(json.loads(listed)) - 1  # pip itself is everybody's
+    each.packages = len(json.loads(listed)) - 1  # without pip, which every environment has
     each.megabytes = size_mb(folder / "venv" / "lib")
     empty = folder / "empty"
     empty.mkdir()
@@ -114,7 +114,7 @@ def examine(each: Installation, folder: Path) -> None:
 
 
 def size_mb(folder: Path) -> float:
-    """Give what the files of a folder take, without those of pip."""
+    """Return the size of the files of a folder without pip [MB]."""
     return (
         sum(
             path.stat().st_size
@@ -126,7 +126,7 @@ def size_mb(folder: Path) -> float:
 
 
 def table(installations: list[Installation]) -> str:
-    """Write the figures as a table of Markdown."""
+    """Return the results as a Markdown table."""
     steps = list(dict.fromkeys(step for each in installations for step in each.processor_s))
     head = ["Python", "form", "extra", "versions", "packages", "MB", *(f"{step} [s]" for step in steps)]
     rows = [head, ["---"] * len(head)]
@@ -139,7 +139,7 @@ def table(installations: list[Installation]) -> str:
 
 
 def main() -> None:
-    """Examine every combination that was requested, and print the table after each."""
+    """Test every requested combination, and print the table after each."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--python", nargs="+", default=[sys.executable], metavar="PROGRAM")
     parser.add_argument("--form", nargs="+", default=["wheel", "editable"], choices=["wheel", "editable"])

@@ -1,10 +1,10 @@
-"""What a change of the analysis costs sound recordings: which answers are withheld, how much bounds grow.
+"""Effect of a change of the analysis on sound recordings: withheld results, and growth of bounds.
 
     python benchmarks/kept_answers.py make FOLDER --count 200 --seed 1 --shard 1/4   # record on random rigs
     python benchmarks/kept_answers.py answers FOLDER --save before.json              # once with each version
     python benchmarks/kept_answers.py compare before.json after.json
 
-A recording that exists is kept, and so is an answer that stands in the file.
+Existing recordings, and results that are stored in the file, are used again.
 """
 
 import argparse
@@ -28,7 +28,7 @@ WITHHELD = None
 
 
 def make(folder: Path, count: int, seed: int, shard: tuple[int, int]) -> None:
-    """Record one plan on each of so many random rigs; a quarter so weakly that motion is linear."""
+    """Record one plan on each of ``count`` random rigs; a quarter are so weak that the motion is linear."""
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(shard[0] - 1, count, shard[1]):
         path = folder / f"r{number:04d}.h5"
@@ -46,7 +46,7 @@ def make(folder: Path, count: int, seed: int, shard: tuple[int, int]) -> None:
 
 
 def answers(path: Path) -> dict[str, float | str | None]:
-    """Give expanded uncertainties by quantity, and what is said in words; None for what is withheld."""
+    """Return relative expanded uncertainties and verdicts by quantity; None for withheld results."""
     done = analyse_files([path], "sound", Simulation.LEFT_OUT)
     if not done.results:
         return {"refused": str(done.failures)}
@@ -68,7 +68,7 @@ def answers(path: Path) -> dict[str, float | str | None]:
 
 
 def compare(before: dict[str, dict], after: dict[str, dict]) -> Iterator[str]:
-    """Count by quantity what is withheld now, what is told now, and by how much bounds grew."""
+    """Yield for each quantity the numbers of newly withheld and newly given results, and growth of bounds."""
     count: Counter[tuple[str, str]] = Counter()
     growth: dict[str, list[float]] = {}
     for name in sorted(before.keys() & after.keys()):
@@ -100,7 +100,7 @@ def compare(before: dict[str, dict], after: dict[str, dict]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Make, answer or compare."""
+    """Record, analyse or compare, as requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("what", choices=("make", "answers", "compare"))
     parser.add_argument("paths", type=Path, nargs="+", metavar="PATH")

@@ -1,10 +1,10 @@
-"""What the live twin costs and how late it is: a measurement on the virtual rig at the wall's pace.
+"""Cost and lag of the live twin, in a measurement on the virtual rig in real time.
 
     python benchmarks/live_twin.py                     # a chaotic dwell; its gaps widen by 1 um in the middle
     python benchmarks/live_twin.py --duration 300 --level 2 --widen 0
 
-The first use compiles for half a minute; start it twice. Lag: from the conversion of the newest sample of
-which p is told to the moment a viewer has it, the engine and its protocol included.
+The first use compiles for half a minute, so run the script twice. The lag is the time from the conversion of
+the newest sample with an estimate of p until a viewer has the estimate. It includes engine and protocol.
 """
 
 import argparse
@@ -36,15 +36,15 @@ LOOK_S = 0.01
 
 @dataclass
 class Seen:
-    """What a viewer saw."""
+    """Estimates that a viewer has received."""
 
     begun_s: float = np.inf
-    """On the wall's clock, when the first sample was converted, at the latest."""
+    """Latest possible time of the conversion of the first sample, on the monotonic clock [s]."""
     told: list[tuple[float, int, str]] = field(default_factory=list)
     last: EngineStatus | None = None
 
     def look(self, status: EngineStatus, rate_hz: float) -> None:
-        """Note the moment, and what is new."""
+        """Record the time and a new estimate, if any."""
         now_s = time.monotonic()
         if status.samples:
             self.begun_s = min(self.begun_s, now_s - status.samples / rate_hz)
@@ -56,14 +56,14 @@ class Seen:
             self.told.append((now_s, told.end_sample, told.state))
 
     def lags_s(self, rate_hz: float) -> np.ndarray:
-        """Give the lag of everything that was told while it was tracked."""
+        """Return the lags of all estimates that the twin tracked."""
         return np.array(
             [now - self.begun_s - end / rate_hz for now, end, state in self.told if state == "tracked"]
         )
 
 
 def campaign(duration_s: float, level_vpp: float) -> Campaign:
-    """Plan one dwell."""
+    """Return a campaign of one dwell."""
     dwell = {
         "kind": "dwell",
         "amplitude_vpp": level_vpp,
@@ -77,7 +77,7 @@ def campaign(duration_s: float, level_vpp: float) -> Campaign:
 
 
 def watched(client: EngineClient, rate_hz: float) -> Seen:
-    """Look until the run has ended."""
+    """Poll the status until the run has ended."""
     seen = Seen()
     while (status := client.status()).state is not EngineState.READY or not seen.told:
         seen.look(status, rate_hz)
@@ -86,7 +86,7 @@ def watched(client: EngineClient, rate_hz: float) -> Seen:
 
 
 def main() -> None:
-    """Measure, watch, and print."""
+    """Measure with a live twin, and print lag and cost."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--duration", type=float, default=60.0)
     parser.add_argument("--level", type=float, default=1.5, help="[Vpp]")

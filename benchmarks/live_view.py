@@ -1,10 +1,10 @@
-"""What one frame of a running measurement costs: 4 channels at 51.2 kS/s, 20 frames a second, 2 s in view.
+"""Cost of one frame of a live view: 4 channels at 51.2 kS/s, 20 frames a second, 2 s in view.
 
     python benchmarks/live_view.py
 
-Processor time per frame of everything that `vibench.analysis.live` computes; painting is not in it. Beside
-it the same lanes by pyqtgraph's way, every n-th sample and the peak of every n samples, and the share of
-frames in which an impact of three samples is seen.
+The script prints the processor time per frame of all computations of `vibench.analysis.live`, without
+painting. It also prints the share of frames in which an impact of three samples is visible, for the envelope
+and for drawing every n-th sample.
 """
 
 import time
@@ -27,7 +27,7 @@ CHANNELS = (
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure the cost per frame and print it."""
     rng = np.random.default_rng(1)
     view = LiveView(CHANNELS, RATE_HZ, band_hz=(150.0, 350.0))
     frames: dict[str, Callable[[], object]] = {
@@ -76,7 +76,7 @@ def _block(first: int, rng: np.random.Generator) -> "np.ndarray[tuple[int, int],
 
 
 def _seen(rng: np.random.Generator) -> None:
-    """Count the frames of a scrolling window in which an impact of three samples is drawn."""
+    """Print the share of frames of a scrolling window in which an impact of three samples is drawn."""
     count = round(SPAN_S * RATE_HZ)
     samples = np.zeros(count, dtype=np.float32)
     step = count // COLUMNS

@@ -1,8 +1,8 @@
 """Speed and memory of the analysis of a long recording, against scipy on the whole arrays.
 
 Run as ``python benchmarks/long_recording.py [MINUTES]``. The recording has 4 channels at 51.2 kS/s and is
-written by the program's own writer: streamed noise through a resonator, with converter noise on every
-channel. Each contestant runs in a process of its own, so that its peak memory is its own.
+written by vibench: streamed noise through a resonator, with converter noise on every channel. Each of the two
+analyses runs in a separate process, so that its peak memory can be measured.
 """
 
 import json
@@ -36,7 +36,7 @@ RESONANCE_HZ, DAMPING = 266.0, 0.01
 CONVERTER_NOISE = 1e-4
 RANGE_V = 10.0
 STEP_V = 2 * RANGE_V / 2**24
-"""Of a 24-bit converter."""
+"""Voltage step of a 24-bit converter [V]."""
 PER_VOLT = {DRIVE: 1.0, BASE: 10.0, RESPONSE: 0.1, "table_acceleration": 10.0}
 UNITS = {
     DRIVE: ("voltage", "V"),
@@ -49,7 +49,7 @@ KILOBYTES = 1 << 10
 
 
 def header(plan, samples):
-    """Describe four channels of a 24-bit converter."""
+    """Return the header of a recording with four channels of a 24-bit converter."""
     return RecordingHeader(
         channels=tuple(
             ChannelHeader(
@@ -72,7 +72,7 @@ def header(plan, samples):
 
 
 def write_recording(path, duration_s):
-    """Record noise of a resonator: the base follows the drive, the response is the filtered base."""
+    """Write a recording of noise: the base equals the drive, the response is the base after a resonator."""
     plan = StreamedNoise(
         amplitude_vpp=10.0, band_start_hz=20, band_stop_hz=2000, settle_s=0.0, duration_s=duration_s, seed=1
     )
@@ -94,14 +94,14 @@ def write_recording(path, duration_s):
 
 
 def ours(path):
-    """Analyse the recording as the command does: levels, checks, three estimates with bounds, resonances."""
+    """Analyse the recording as `vibench analyse` does: levels, checks, three estimates, resonances."""
     with open_recording(path) as recording:
         found = analyse(recording).response.h1
     return found.frequency_hz, found.magnitude
 
 
 def theirs(path):
-    """Form the six spectra that the same estimates need by scipy, from whole channels; nothing else."""
+    """Compute with scipy only the six spectra that these estimates need, from whole channels."""
     with open_recording(path) as recording:
         drive, base, response = (recording.read(role) for role in (DRIVE, BASE, RESPONSE))
     how = {"fs": RATE_HZ, "nperseg": round(SEGMENT_S * RATE_HZ), "detrend": False}
@@ -111,12 +111,12 @@ def theirs(path):
     _, s_xy = signal.csd(base, response, **how)
     signal.csd(drive, base, **how)
     signal.csd(drive, response, **how)
-    # Velocity over acceleration becomes displacement over displacement.
+    # Convert velocity over acceleration to displacement over displacement.
     return frequency_hz, np.abs(s_xy / s_xx) * 2 * np.pi * frequency_hz
 
 
 def measured(contestant, path, pipe):
-    """Run one contestant and send its time, its peak memory and its result."""
+    """Run one analysis and send its time, peak memory and result."""
     idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
     result = contestant(path)
@@ -127,7 +127,7 @@ def measured(contestant, path, pipe):
 
 
 def run(contestant, path):
-    """Give a contestant a process of its own."""
+    """Run one analysis in a new process and return what it sends."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=measured, args=(contestant, path, sender))
@@ -154,7 +154,7 @@ def compare(path):
 
 
 def main():
-    """Write a recording, compare, and throw it away."""
+    """Write a temporary recording and compare both analyses of it."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "long.h5"

@@ -1,8 +1,8 @@
-"""What exponents cost on this machine, and the paper's Figure 10: ``python benchmarks/lyapunov.py --help``.
+"""Cost of Lyapunov exponents, and the paper's Figure 10: ``python benchmarks/lyapunov.py --help``.
 
-Cost is given as a ratio to the same run without a tangent, both timed in turn, least of several. The
-figure's amplitudes are those of the paper's four cases; it does not state its frequencies: every hertz from
-10 to 600 here.
+Cost is the ratio to the same run without a tangent; both are timed in turn, and the shortest time counts. The
+amplitudes of the figure are those of the paper's four cases. The paper does not state the frequencies; here
+they are every hertz from 10 to 600.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from vibench.sim.exponents.lyapunov import Precision
 
 REPEATS = 5
 COST_S = 10.0
-"""Simulated time of a run whose cost is taken."""
+"""Simulated time of the runs that are timed [s]."""
 STATES = (
     ("hertz", Harmonic(260.0, 5e-6)),
     ("hertz", Harmonic(130.0, 20e-6)),
@@ -33,7 +33,7 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 
 
 def run(specimen, drive, changes):
-    """Follow ``changes`` small changes for a while; gives processor seconds and impacts."""
+    """Run with ``changes`` tangent vectors; return processor time [s] and number of impacts."""
     moving = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance)
     moving.carry(np.eye(6)[:changes])
     record = RunRecord(round(1e4 * COST_S))
@@ -43,7 +43,7 @@ def run(specimen, drive, changes):
 
 
 def report_cost():
-    """Ratio of a run with one change, and with six, to the run alone."""
+    """Print the cost of a run with one and with six tangent vectors, relative to the run alone."""
     for law, drive in STATES:
         specimen, times = gong2025(contact=law), {0: [], 1: [], 6: []}
         for _ in range(REPEATS):
@@ -59,7 +59,7 @@ def report_cost():
 
 
 def figure_10(contact, frequencies_hz, accuracy, precision, workers):
-    """Compute the largest exponents of every amplitude, on several threads, and print what they say."""
+    """Compute the largest exponents at every amplitude, on several threads, and print a summary."""
     specimen = gong2025(contact=contact)
     for amplitude in AMPLITUDES_M:
         start = time.perf_counter()
@@ -69,7 +69,7 @@ def figure_10(contact, frequencies_hz, accuracy, precision, workers):
             return lyapunov_exponent(specimen, drive, accuracy, precision=precision)
 
         with ThreadPoolExecutor(workers) as pool:
-            # The busiest first would be better still; they lie together, so a stride mixes them.
+            # Neighbouring points take similar times, so a stride distributes slow ones over the threads.
             order = np.argsort(np.arange(len(frequencies_hz)) % 7, kind="stable")
             found = list(pool.map(point, frequencies_hz[order]))
         taken = time.perf_counter() - start
@@ -92,7 +92,7 @@ def figure_10(contact, frequencies_hz, accuracy, precision, workers):
 
 
 def main():
-    """Measure what is asked for."""
+    """Measure the cost and compute the requested exponents."""
     parser = argparse.ArgumentParser(description="Cost of exponents, and the paper's Figure 10.")
     parser.add_argument("--start", type=float, default=10.0, help="first frequency [Hz]")
     parser.add_argument("--stop", type=float, default=600.0, help="last frequency [Hz]")

@@ -1,12 +1,11 @@
-"""Does a basin map state shares that hold those of independent starts, and what does a map cost?
+"""Test the shares that a basin map states against independent starts, and measure the cost of maps.
 
-`basin` draws starts at random from the rectangle of a basin map and counts what they come to, beside the
-shares that the map states. `map` computes a map with so many points along each axis and says what it took:
-processor time, time to the first picture, points computed, and what an estimate made before had said;
-with `--one-by-one` without lanes.
-`lanes` follows random motions in lanes and one by one, in the same run: time per impact on one core, and
-how far both lie from strict steps; some of them by heyoka too, if it is installed; then settles points of a
-map both ways, and counts those that came to another motion, and those where several starts agree.
+`basin` draws random starts from the rectangle of a basin map, and compares the motions they reach with the
+stated shares. `map` computes a map with the given number of points, and prints processor time, time to the
+first picture, points computed, and the estimate made before; with `--one-by-one` without SIMD lanes. `lanes`
+follows random motions in SIMD lanes and one by one, and prints the time per impact on one core and the error
+of both; with heyoka too, if installed. Then it settles points of a map in both ways. It counts the points
+that reached another motion, and those at which several starts agree.
 """
 
 import argparse
@@ -29,12 +28,12 @@ from vibench.sim.study import ExistingStudy, executor_of, store_of
 
 STANDARD = Accuracy.STANDARD.tolerance
 SAME = 2e-3
-"""Relative difference of Response I of one periodic motion."""
+"""Largest relative difference of Response I of equal periodic motions."""
 FIELDS = ("x_m", "y_m", "z_m", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s")
 
 
 def drawn_scene(plan: Map, rng: np.random.Generator):
-    """Give the scene of a start drawn from the rectangle that the map covers."""
+    """Return the scene of a random start in the rectangle of the map."""
     state = []
     for name in FIELDS:
         value = getattr(plan, name)
@@ -44,7 +43,7 @@ def drawn_scene(plan: Map, rng: np.random.Generator):
 
 
 def basin(asked: argparse.Namespace) -> int:
-    """Count independent starts beside a map."""
+    """Compare the shares of a map with independent starts; return the number of differences."""
     results = open_map(asked.map)
     rng = np.random.default_rng(asked.seed)
     scenes = [drawn_scene(results.plan, rng) for _ in range(asked.starts)]
@@ -73,12 +72,12 @@ def basin(asked: argparse.Namespace) -> int:
 
 
 def cost(asked: argparse.Namespace) -> int:
-    """Compute a map and say what it took."""
+    """Compute a map and print its cost."""
     plan = load_toml(Path(__file__).parents[1] / "studies" / "maps" / "map.toml", Map)
     said = plan.model_dump(exclude={"specimen"})
     said["frequency_hz"]["points"], said["amplitude_m"]["points"] = asked.columns, asked.rows
     plan = Map(specimen=plan.specimen, **said)
-    # Modules and tables are loaded before the clock starts.
+    # Load modules and tables before the time is measured.
     solver = settle_scene if asked.one_by_one else map_solver(plan)
     solver(plan.scene((0, 0, asked.columns // 2)))
     solver(plan.scene((asked.rows - 1, 0, asked.columns // 2)))
@@ -112,21 +111,21 @@ def cost(asked: argparse.Namespace) -> int:
 
 
 ROUNDS = 5
-"""Both ways in turn; the shortest time of each counts."""
+"""Number of rounds, both ways in turn; the shortest time of each counts."""
 WANDERED_S = 1.0
-"""Before a motion is timed."""
+"""Simulated time before a motion is timed [s]."""
 COMPARED_S = 0.01
-"""After which both ways are compared with strict steps: chaos magnifies by e in a few ms."""
+"""Time until the comparison with strict steps [s]; short, as errors in chaos grow by e in a few ms."""
 PEERS = 4
 PEER_TOLERANCES = 1e-6, 1e-9, 1e-12
 PEER_S = 0.3
-"""Simulated, where two solvers are timed."""
+"""Simulated time for timing two solvers [s]."""
 STARTS = 8
 PUSH_M = 4.5e-11
 
 
 def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
-    """Give motions on their way, at a whole drive period, in flight: 60 to 420 Hz, 2 to 50 um."""
+    """Return random runs after 1 s, at a whole drive period, in flight: 60 to 420 Hz, 2 to 50 um."""
     runs = []
     while len(runs) < count:
         drive = Harmonic(rng.uniform(60.0, 420.0), math.exp(rng.uniform(math.log(2e-6), math.log(5e-5))))
@@ -138,12 +137,12 @@ def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
 
 
 def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[Stretch]:
-    """Follow motions side by side."""
+    """Follow motions together in SIMD lanes."""
     return follow_together([each.apart() for each in runs], periods)
 
 
 def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | None = None) -> list[Stretch]:
-    """Follow the same ones after the other."""
+    """Follow the same motions one after the other."""
     twins = [each.apart(tolerance) for each in runs]
     return [
         follow_with_section(each, (each.periods + count) / each.drive.frequency_hz)
@@ -152,14 +151,14 @@ def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | N
 
 
 def ns_per_impact(follow, runs: list[FollowedRun], periods: list[int]) -> float:
-    """Follow motions one way, and say what an impact took."""
+    """Follow motions in one way, and return the time per impact [ns]."""
     began_s = time.thread_time()
     found = follow(runs, periods)
     return 1e9 * (time.thread_time() - began_s) / sum(each.impacts for each in found)
 
 
 def lanes(asked: argparse.Namespace) -> int:
-    """Compare lanes with one motion after the other."""
+    """Compare SIMD lanes with one motion after the other."""
     rng = np.random.default_rng(asked.seed)
     runs = random_runs(asked.motions, rng)
     periods = [asked.periods] * len(runs)
@@ -188,7 +187,7 @@ def lanes(asked: argparse.Namespace) -> int:
 
 
 def peer(runs: list[FollowedRun]) -> None:
-    """Follow some of the motions in heyoka's batches, eight neighbours of each, and say time and error."""
+    """Follow some motions in heyoka's batches, eight neighbours of each, and print time and error."""
     from heyoka_peers import LANES, AtHome  # noqa: PLC0415 - only where the peer is there
     from work_precision import constants_of  # noqa: PLC0415
 
@@ -220,9 +219,9 @@ def peer(runs: list[FollowedRun]) -> None:
 
 
 def labels(asked: argparse.Namespace) -> int:
-    """Settle random points of a map both ways; gives 1 if more came to another motion than chance would have.
+    """Settle random points of a map in both ways; return 1 if more motions differ than by chance.
 
-    What chance does is counted one by one, from starts a millionth of a gap away.
+    The differences by chance are counted one by one, from starts a millionth of a gap away.
     """
     plan = Map(
         frequency_hz=Range(start=60.0, stop=420.0, points=600),
@@ -265,7 +264,7 @@ def labels(asked: argparse.Namespace) -> int:
 
 
 def main() -> int:
-    """Read what is asked."""
+    """Run the requested part."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--workers", type=int, default=2)
     parts = parser.add_subparsers(required=True)

@@ -1,10 +1,10 @@
-"""Count the lines that the native engine replaces, and the lines that replace them.
+"""Count the lines that the native engine replaced, and the lines of their replacement.
 
     python benchmarks/native_size.py [--before COMMIT]
 
-Replaced are, as they stood at COMMIT, the packages of `sim` that exist only for compiled kernels, and every
-other module that compiles a kernel. `native/`, `vibench.sim.engine`, the build hook and what is left of the
-replaced files take their place. Stubs, comments and blank lines count.
+Replaced are, as of COMMIT, the packages of `sim` that existed only for compiled kernels, and every other
+module with a compiled kernel. The replacement is `native/`, `vibench.sim.engine`, the build hook and the
+remaining parts of the replaced files. Stubs, comments and blank lines count.
 """
 
 import argparse
@@ -20,7 +20,7 @@ PACKAGES = (
     *("collision", "contact", "flight", "kernels", "lanes"),
     *("power_law", "rigid", "slots", "stepping", "sticking"),
 )
-"""Packages of `sim` that go as a whole."""
+"""Packages of `sim` that are replaced completely."""
 PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
 KERNEL = re.compile(r"^@(kernel|kernel_without_refcount|inlined|njit|rates_of)\b", re.MULTILINE)
 NATIVE = ("native", "sim/vibench/sim/engine", "hatch_build.py")

@@ -1,9 +1,9 @@
-"""Is what a prediction says beside a bifurcation still true minutes later?
+"""Test whether predictions near a bifurcation still hold minutes later.
 
     python benchmarks/near_bifurcations.py --count 100 --seed 1 [--shard 1/4] [--save FILE.json]
 
-Each scene is asked for with a fixed duration of 30 s, an automatic one, and an error of 1 %. Each answer is
-then followed on from its end for 300 s. It was wrong
+Each scene is predicted with a fixed duration of 30 s, an automatic duration, and an error of 1 %. The motion
+is then continued from the end of each prediction for 300 s. The prediction was wrong
 
 - if it is periodic, and the later motion has another kind or period, or responses beyond both errors;
 - if it is quasi-periodic, and the later motion repeats or is chaotic;
@@ -42,11 +42,11 @@ from vibench.sim import (
 LATER_S, WINDOW_S = 300.0, 5.0
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 LEAST = 2e-6
-"""Relative difference that is granted to a later window: what `standard` promises, twice."""
+"""Allowed relative difference of a later window: twice the promised error of `standard`."""
 
 
 def main() -> None:
-    """Draw, predict, follow on, and count."""
+    """Draw scenes, predict and continue them, and count the wrong predictions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
@@ -94,7 +94,7 @@ def _compared(seed: int, number: int) -> list[dict[str, str]]:
 
 
 def _fault(request: Scene, answer: ScenePrediction) -> str | None:
-    """Return what is wrong with an answer; None if nothing was found."""
+    """Return a description of what is wrong with a prediction; None if nothing was found."""
     if answer.outcome is not Outcome.REACHED_END:
         return None
     if isinstance(request.duration, FixedDuration) and answer.memory is StartMemory.KEPT:
@@ -115,7 +115,7 @@ def _fault(request: Scene, answer: ScenePrediction) -> str | None:
 
 
 def _later(request: Scene, answer: ScenePrediction) -> Scene:
-    """Return the scene that goes on where an answer ended."""
+    """Return the scene that continues from the end of a prediction."""
     drive = request.drive
     turn = 2.0 * math.pi * math.fmod(drive.frequency_hz * answer.duration_s, 1.0)
     return replace(
@@ -129,7 +129,7 @@ def _later(request: Scene, answer: ScenePrediction) -> Scene:
 
 
 def _beyond(answer: ScenePrediction, truth: ScenePrediction, granted: float) -> str | None:
-    """Return the first response that lies further from the truth than both errors and what is granted."""
+    """Return a text on the first response that differs by more than both errors and ``granted``; or None."""
     for name in RESPONSES:
         value, true = getattr(answer, name), getattr(truth, name)
         bound = (getattr(answer, f"{name}_error") or 0.0) + (getattr(truth, f"{name}_error") or 0.0)

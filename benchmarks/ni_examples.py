@@ -1,11 +1,11 @@
-"""NI's own examples for nidaqmx-python on the virtual rig, unchanged: which run, what the others are told.
+"""Run NI's examples for nidaqmx-python unchanged on the virtual rig; list those that fail, with the error.
 
     git clone https://github.com/ni/nidaqmx-python
     python benchmarks/ni_examples.py nidaqmx-python
 
-Each example is a process of its own, at the wall's pace, once with the simulated USB-4431 and once with the
-USB-6211 in the place of its devices. From outside it is only given what a person gives: a connection, two
-edges on each of the lines PFI0 and PFI8, Enter after some seconds, and Ctrl-C to those that wait for it.
+Each example runs in a separate process in real time, once with the simulated USB-4431 and once with the
+USB-6211 in place of its devices. The script supplies what a person would: a connection, two edges on each of
+the lines PFI0 and PFI8, Enter after some seconds, and Ctrl-C for examples that wait for it.
 """
 
 import argparse
@@ -44,7 +44,7 @@ LONGEST_SENTENCE = 90
 
 
 def catalogue(product: str):
-    """Give a system in which Dev1 and Dev2 are both of that product, and cDAQ1Mod1 is an NI 9234."""
+    """Return a system in which Dev1 and Dev2 are this product, and cDAQ1Mod1 is an NI 9234."""
     usual = catalogue_with("USB-4431", "Dev1")
     one = next(device for device in usual.devices if device.product_type == product)
     chassis = [device for device in usual.devices if device.name.startswith("cDAQ")]
@@ -52,7 +52,7 @@ def catalogue(product: str):
 
 
 def connect(options: GrpcSessionOptions) -> None:
-    """Let tasks and systems that name no server be those of ``options``."""
+    """Connect tasks and systems without a named server to that of ``options``."""
     ours = nidaqmx.Task
 
     class Task(ours):
@@ -65,7 +65,7 @@ def connect(options: GrpcSessionOptions) -> None:
 
 
 def give(server, began_s: float) -> None:
-    """Raise the lines that examples wait for, then press Ctrl-C."""
+    """Send edges on the lines that examples wait for, then send Ctrl-C."""
     for moment_s in EDGES_S:
         time.sleep(max(0.0, began_s + moment_s - time.monotonic()))
         for line in ("/Dev1/PFI0", "/Dev1/PFI8"):
@@ -75,9 +75,9 @@ def give(server, began_s: float) -> None:
 
 
 def run_one(example: Path, product: str) -> None:
-    """Run one example, and print what became of it as the last line."""
+    """Run one example, and print its result as the last line."""
     os.environ["MPLBACKEND"] = "Agg"
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # because a background job of a shell ignores it
     warnings.filterwarnings("ignore", message="FigureCanvasAgg")
     world = VirtualRig(load_rig("virtual_rig_streaming")).world
     with (
@@ -93,11 +93,11 @@ def run_one(example: Path, product: str) -> None:
         except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - whatever an example ends with is told
             told = TOLD + sentence(error)
         print(f"\n{told}", flush=True)
-        os._exit(0)  # an example that was interrupted may have left its threads
+        os._exit(0)  # at once, because an interrupted example may have left threads
 
 
 def sentence(error: BaseException) -> str:
-    """Say an error in one line: its code, and its first sentence or the call that is not simulated."""
+    """Return an error as one line: code, and first sentence or the call that is not simulated."""
     code = getattr(error, "error_code", None)
     text = " ".join(str(error).split())
     kept = text[text.index("Property:") :] if "Property:" in text else text
@@ -105,7 +105,7 @@ def sentence(error: BaseException) -> str:
 
 
 def outcome(example: Path, product: str) -> str:
-    """Run an example in a process and a folder of its own."""
+    """Run an example in a new process and folder, and return its result."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, __file__, "--one", str(example.resolve()), "--product", product]
         try:
@@ -117,7 +117,7 @@ def outcome(example: Path, product: str) -> str:
 
 
 def main() -> None:
-    """Print a table of those that do not run on both products, and how many do."""
+    """Print a table of the examples that do not run on both products, and the number that do."""
     asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     asked.add_argument("checkout", type=Path, nargs="?")
     asked.add_argument("--only", default="", help="part of the names of the examples to run")

@@ -1,12 +1,12 @@
-"""How often linear noise behind a static nonlinearity is called chaotic, and how often chaos is.
+"""Test how often the verdict "chaotic" is given to noise behind a static nonlinearity, and to chaos.
 
     python benchmarks/noise_verdicts.py --count 100 --seed 1
     python benchmarks/noise_verdicts.py --count 100 --seed 1 --shard 1/4 --save verdicts.json
 
-The points are narrow-band noise, one value a drive period, through a cubic, a saturation, a soft dead zone
-or a square. Chaos comes from maps, from Duffing oscillators and from the specimen with stops; its exponent is
-known from the tangent, and its lower bound is wrong where it exceeds that. Regular motions, which are never
-chaotic nor repeat after many periods, are decaying transients, hum of a grid, slow drifts and modulations.
+Noise is narrow-band, one value per drive period, after a nonlinearity such as a cubic or a saturation. Chaos
+comes from maps, from Duffing oscillators and from the specimen with stops. Its exponent is known from the
+tangent; a stated lower bound above it is wrong. Regular motions are decaying transients, mains hum, slow
+drifts and modulations; they are neither chaotic nor of a long period.
 """
 
 import argparse
@@ -29,9 +29,9 @@ DRIVE_HZ = 260.0
 NOISE = 1e-5
 PERIODS = 700
 REGULAR, CLEARLY = 0.005, 0.1
-"""Exponents per drive period below which a motion is regular, and above which it is chaos."""
+"""Exponents per drive period: below the first a motion is regular, above the second chaotic."""
 FEW = 4
-"""Periods of a motion that a regular one is not said to exceed."""
+"""Longest period that a verdict may state for a regular motion, in drive periods."""
 BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "cube": lambda x: x**3,
     "x + cube": lambda x: x + 0.5 * x**3,
@@ -46,7 +46,7 @@ BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 
 def narrow_band(rng: np.random.Generator) -> np.ndarray:
-    """Give autoregressive noise of the second order with a random line, of unit variance."""
+    """Return second-order autoregressive noise with a random centre frequency and unit variance."""
     radius, turn = 1 - 10 ** rng.uniform(-1.7, -0.7), 2 * np.pi * rng.uniform(0.05, 0.45)
     values = np.zeros(PERIODS + 300)
     pushes = rng.standard_normal(values.size)
@@ -58,7 +58,7 @@ def narrow_band(rng: np.random.Generator) -> np.ndarray:
 
 
 def noise_points(number: int, seed: int) -> tuple[str, Points]:
-    """Draw noise; displacement and velocity are it and its past, or two series, bent alike."""
+    """Return points of nonlinear noise: a series and its past value, or two series."""
     rng = np.random.default_rng((seed, number))
     name = list(BENT)[number % len(BENT)]
     line = narrow_band(rng)
@@ -68,7 +68,7 @@ def noise_points(number: int, seed: int) -> tuple[str, Points]:
 
 
 def chaos_points(number: int, seed: int) -> tuple[str, Points, float]:
-    """Draw a motion and its exponent per drive period; of the stops it is only known to be positive."""
+    """Return points of a chaotic system and its exponent per drive period; infinite for the stops."""
     rng = np.random.default_rng((seed, number, 1))
     noise = float(rng.choice((0.0, 1e-4, 1e-3, 1e-2, 3e-2)))
     if number % 4 == 0:
@@ -85,7 +85,7 @@ def chaos_points(number: int, seed: int) -> tuple[str, Points, float]:
 
 
 def henon(bend: float, fold: float) -> tuple[np.ndarray, float]:
-    """Iterate x' = 1 - a x^2 + y, y' = b x from a start in its basin, with a tangent."""
+    """Return points of the Henon map x' = 1 - a x^2 + y, y' = b x, and its exponent."""
     value, logs, tangent = np.empty((PERIODS + 200, 2)), [], np.array([1.0, 0.0])
     x = y = 0.1
     for each in value:
@@ -98,7 +98,7 @@ def henon(bend: float, fold: float) -> tuple[np.ndarray, float]:
 
 
 def duffing(damping: float, force: float, turn: float = 1.2) -> tuple[np.ndarray, float]:
-    """Follow x'' + c x' - x + x^3 = f cos(w t) and a tangent by Runge-Kutta, once a period."""
+    """Return points of x'' + c x' - x + x^3 = f cos(w t) once a period, and the exponent, by Runge-Kutta."""
     steps, periods = 60, PERIODS + 200
     step = 2 * math.pi / turn / steps
 
@@ -126,7 +126,7 @@ def duffing(damping: float, force: float, turn: float = 1.2) -> tuple[np.ndarray
 
 
 def regular_points(number: int, seed: int) -> tuple[str, Points]:
-    """Draw what moves about one point without any dynamics of its own."""
+    """Return points of a regular motion about one point."""
     rng = np.random.default_rng((seed, number, 2))
     size, place = 10 ** rng.uniform(-2.5, -0.3), np.arange(PERIODS)
     noise = float(10 ** rng.uniform(-5, -2.5))
@@ -154,7 +154,7 @@ def regular_points(number: int, seed: int) -> tuple[str, Points]:
 
 
 def found_in(number: int, seed: int) -> dict[str, str]:
-    """Judge one draw of each; what must not be said begins with WRONG."""
+    """Return the verdicts for one draw of each kind; wrong ones begin with WRONG."""
     name, points = noise_points(number, seed)
     kind = motion_verdict(points, DRIVE_HZ).kind
     found = {name: f"{'WRONG ' if kind is MotionKind.CHAOTIC else ''}{kind.value}"}
@@ -174,7 +174,7 @@ def found_in(number: int, seed: int) -> dict[str, str]:
     found[name] = f"{'WRONG ' if is_wrong else ''}{verdict.kind.value}{bound if is_wrong else ''}"
     name, points = regular_points(number, seed)
     verdict = motion_verdict(points, DRIVE_HZ)
-    # A modulation may come again after whole drive periods.
+    # A modulation may repeat after many whole drive periods.
     is_long = (verdict.period or 1) > FEW and not name.endswith("modulated")
     is_wrong = verdict.kind is MotionKind.CHAOTIC or is_long
     found[name] = f"{'WRONG ' if is_wrong else ''}{verdict.kind.value} {verdict.period or ''}".strip()
@@ -182,7 +182,7 @@ def found_in(number: int, seed: int) -> dict[str, str]:
 
 
 def main() -> None:
-    """Judge and count."""
+    """Compute all verdicts and count them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,13 +1,13 @@
-"""A loop whose observer follows the contacts, beside the usual one whose observer knows none, by the model.
+"""Model of a control loop whose observer includes the stops, beside the usual loop whose observer does not.
 
     python benchmarks/observed_stops.py [--latency 3e-4] [--shifted 2e-7]
 
-Along the paper's motions with impacts behind their fold (base 1 um), for the rig with a controller: the
-largest multiplier over a period of table, specimen and law together. *Linear* is the usual law: its Kalman
-filter predicts without stops. *Constant* predicts with the slope of the stops along the motion under the same
-gain; *Riccati* under the gain that follows the covariance round the period, as an extended Kalman filter of
-the hidden motion does on it. With ``--shifted`` [m] both believe that p goes further by so much than it does.
-Deviations are linear: how large they may be is not told.
+For the paper's motions with impacts behind their fold (base 1 um), and the rig with a controller, the script
+prints the largest multiplier over a period of table, specimen and control law together. *Linear* is the usual
+law, whose Kalman filter predicts without stops. *Constant* predicts with the slope of the stop force along
+the motion, with the same gain. *Riccati* also updates the gain along the period, as an extended Kalman filter
+does. With ``--shifted`` [m], both assume a p that is larger by this value. Deviations are linearised; the
+result holds for small ones.
 """
 
 import argparse
@@ -25,16 +25,16 @@ from vibench_fast_loop.law import LawWeights, design_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 SUBSTEPS = 40
-"""Of a sample: contacts are shorter."""
+"""Number of parts of a sample, because contacts are shorter than a sample."""
 TURNS = 12
-"""Periods in which the covariance becomes periodic."""
+"""Number of periods after which the covariance is periodic."""
 OPEN = (1.1, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0)
-"""Multipliers without a law, at whose motions the loops are compared."""
+"""Multipliers without control, which select the motions at which the loops are compared."""
 LEVEL_M, START_HZ, RANGE_HZ = 1e-6, 97.5, (95.0, 100.0)
 
 
 def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Give what each sample of a period makes of a deviation, and what its new volt adds.
+    """Return for each sample the transition matrix of a deviation, and the effect of its new voltage.
 
     Shapes (samples, n, n) and (samples, n); ``slopes`` of the stops' force, shape (samples, parts).
     """
@@ -54,7 +54,7 @@ def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
-    """Give the Kalman gain at each sample of a period, shape (samples, n, 2), scaled as ``moved`` is."""
+    """Return the Kalman gain at each sample of a period, shape (samples, n, 2), scaled as ``moved`` is."""
     weights, scale = LawWeights(), plant.scales
     step, volt = plant.step[0] * scale / scale[:, None], plant.step[1] / scale
     shown, pushed = plant.shown * scale, step @ (plant.spring[0] / scale) * plant.timing.step_s
@@ -71,7 +71,7 @@ def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
 
 
 def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -> list[float]:
-    """Give the largest multiplier of a period with both observers that know the stops."""
+    """Return the largest multiplier of a period with each of both observers that include the stops."""
     scale, law = plant.scales, design_law(plant)
     shown, step = plant.shown * scale, plant.step[0] * scale / scale[:, None]
     true, volts = struck(plant, slopes)
@@ -80,7 +80,7 @@ def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -
     volts, seen_volts = volts / scale, seen_volts / scale
     count = len(true)
     plain = gains_along(plant, step[None])[:1].repeat(count, axis=0)
-    # u = -feedback (estimate): the law's output for what its memory estimates, after the sample.
+    # Find the feedback matrix, u = -feedback @ estimate, from the output of the law after a sample.
     kept = np.eye(plant.size) - plain[0] @ shown
     feedback = -np.linalg.lstsq(kept.T, law.output.T, rcond=None)[0].T
     observers = (

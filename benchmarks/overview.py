@@ -1,10 +1,10 @@
-"""How fast half a gigabyte of recording is opened and looked at, against reading whole channels.
+"""Time to open and draw a recording of half a gigabyte, against reading whole channels.
 
     python benchmarks/overview.py [MINUTES] [FOLDER]
 
-The recording has 4 channels at 51.2 kS/s, 20 bits of noise around a sweep, and is written by the
-program's own writer. Times are wall clock of one thread, the file in the page cache; the largest of
-five pictures at random places for every zoom.
+The recording has 4 channels at 51.2 kS/s with 20 bits of noise, and is written by vibench. Times are elapsed
+times of one thread, with the file in the page cache. For every zoom, five pictures at random places are
+drawn.
 """
 
 import json
@@ -36,7 +36,7 @@ ZOOMS_S = (600.0, 60.0, 6.0, 2.5, 2.4, 0.6, 0.06, 0.001)
 
 
 def main() -> None:
-    """Write, open, look."""
+    """Write the recording if it does not exist, open it and draw it."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(sys.argv[2]) if len(sys.argv) > 2 else Path(temporary)
@@ -51,7 +51,7 @@ def main() -> None:
 
 
 def write(path: Path, samples: int) -> None:
-    """Record noise of 20 bits."""
+    """Write a recording with noise of 20 bits."""
     plan = StreamedNoise(
         amplitude_vpp=10.0, band_start_hz=20, band_stop_hz=2000, settle_s=0.0, duration_s=600.0, seed=1
     )
@@ -78,7 +78,7 @@ def write(path: Path, samples: int) -> None:
 
 
 def look(path: Path, minutes: float) -> None:
-    """Open the file and draw pictures of it."""
+    """Open the file and print the times to draw pictures of it."""
     begun = time.perf_counter()
     with open_recording(path) as recording:
         overview = overview_of(recording)

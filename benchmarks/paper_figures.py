@@ -1,10 +1,10 @@
-"""The paper's Figures 3 and 10, and a usual curve, timed: ``python benchmarks/paper_figures.py``.
+"""Computing time of the paper's Figures 3 and 10 and of a curve: ``python benchmarks/paper_figures.py``.
 
-The figures: every hertz from 10 to 600 at four amplitudes, 30 s each with the last 5 s observed, standard
-accuracy; Figure 10 asks for exponents besides. Figure 3 to 1 %: every tenth hertz, and five seconds a point
-at most; exponents take no target. The curve: 121 points at 20 um, with other starts where the
-start is forgotten, as `vibench predict` draws it. As many threads as processors. Each
-in batches, as studies of this size are solved, and one motion after the other.
+The figures have every hertz from 10 to 600 at four amplitudes, 30 s each with the last 5 s observed, at
+standard accuracy; Figure 10 also has exponents. "3 to 1 %" is Figure 3 with a requested error at every tenth
+hertz, and at most five seconds per point. The curve has 121 points at 20 um, with other starts where needed,
+as `vibench predict` computes it. Each runs on one thread per processor, in batches as for a study of this
+size, and one motion after the other.
 """
 
 import argparse
@@ -38,7 +38,7 @@ SOLVERS = {"in batches": InBatches(), "one by one": solve_scene}
 
 
 def main():
-    """Time what is asked for."""
+    """Time the requested figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("asked", nargs="*", default=list(ASKED), help=", ".join(ASKED))
     for name in parser.parse_args().asked:

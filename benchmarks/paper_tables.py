@@ -1,7 +1,7 @@
-"""Numbers behind docs/paper.md: ``python benchmarks/paper_tables.py``, minutes.
+"""Tables of docs/paper.md: ``python benchmarks/paper_tables.py``, which takes minutes.
 
-Where linear motion reaches the gap; exponents at 5 um around two resonances; what textbook methods do to
-the energy of an impact and to the exponent at 260 Hz. Options are those of `vibench reproduce`.
+The tables show where linear motion reaches the gap, exponents at 5 um around two resonances, and how textbook
+methods change the energy of an impact and the exponent at 260 Hz. Options are those of `vibench reproduce`.
 """
 
 from dataclasses import replace
@@ -17,18 +17,18 @@ from vibench.sim.study import solve_study
 SHOWN_HZ = (90.0, 95.0, 100.0, 105.0, 250.0, 260.0, 270.0, 280.0)
 NEAR_HZ, SECOND_HZ = np.arange(80.0, 110.0, 0.01), np.arange(230.0, 310.0, 0.01)
 SPEEDS = (0.03, 0.1, 0.3)
-"""Of approach in the impacts at these drives, about [m/s]."""
+"""Typical approach velocities of the impacts at these drives [m/s]."""
 METHODS = (ode45(), *(runge_kutta(each) for each in (2e-5, 1e-5, 5e-6)))
 SHORT_M, LONG_S = 1e-5, 1e-3
-"""A gap that is soon crossed, and a time after which any impact is over."""
+"""A gap that is crossed quickly [m], and a time after which every impact is over [s]."""
 MOTIONS, DECAYED_S = 50, 0.25
-"""Motions that go together, begun at other phases of the drive, and when their starts are forgotten [s]."""
+"""Number of motions, which start at different drive phases, and time until their transients decay [s]."""
 PHASES = 50
-"""Of a step in which a contact begins."""
+"""Number of phases within a step at which a contact begins."""
 
 
 def main():
-    """Print the tables as they stand in the page."""
+    """Print the tables of the page."""
     case = Case(accuracy=Accuracy.QUICK)
     evidence = Evidence(solve_study)
     head = "damping", "peak near 95 Hz", "A0 at which p reaches the gap there [um]", "at 5 um between [Hz]"
@@ -51,7 +51,7 @@ def show(headings, rows):
 
 
 def reach(case):
-    """When m1 first reaches its stops at the first resonance, and between which frequencies at 5 um."""
+    """Return a row: level at which p reaches the gap at the first resonance, and range of contact at 5 um."""
     specimen = case.specimen()
     x, _, _, p = np.abs(base_transmissibility(specimen, NEAR_HZ)).T
     over = SECOND_HZ[np.abs(base_transmissibility(specimen, SECOND_HZ)[:, 3]) * MODERATE_M > case.gap_m]
@@ -60,7 +60,7 @@ def reach(case):
 
 
 def textbook(case, method):
-    """Energy of impacts, and exponent at 260 Hz and 5 um, of a method."""
+    """Return a row: energy kept in impacts, and exponent at 260 Hz and 5 um, of a method."""
     specimen, settle_s = case.specimen(), case.window_s
     kept = ", ".join(f"{energy_kept(specimen, method, each):.3g}" for each in SPEEDS)
     drives = [Harmonic(260.0, MODERATE_M, phase) for phase in 2.0 * np.pi * np.arange(MOTIONS) / MOTIONS]
@@ -70,7 +70,7 @@ def textbook(case, method):
 
 
 def energy_kept(specimen, method, speed):
-    """Energy of m1 and m2 after an impact that nothing else takes part in, over that before."""
+    """Return the energy of m1 and m2 after an isolated impact, over that before."""
     free = replace(specimen, stiffnesses=(1e-9,) * 3, dampings=(0.0,) * 3, lower_gap_m=np.inf, gap_m=SHORT_M)
     step_s = min(method.longest_s, SHORT_M / speed)
     before = np.zeros((PHASES, 6))

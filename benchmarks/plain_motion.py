@@ -1,11 +1,10 @@
-"""Motions of the specimen by a code that shares nothing with the engine, for judging what it states.
+"""Motions of the specimen by a code that shares nothing with the engine, to check its results.
 
-The paper's equations as a textbook writes them, no modes, no other unknowns in contact, advanced by compiled
-steps of DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, section
-II.10). Where m1 touches or leaves a stop the instant is found by taking the step again, shorter, and the
-method begins anew beyond it. Responses are taken on the way: extremes where the speed passes zero, found
-likewise, and integrals of x and p against the drive as four more unknowns. It needs numba, which the extra
-`peers` brings.
+The paper's equations are written as in a textbook, without modes, and advanced by compiled steps of DOP853
+(Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, section II.10). When m1
+touches or leaves a stop, the last step is repeated with a shorter length to find the instant, and the method
+restarts there. Extremes are found in the same way, where the velocity passes zero. The integrals of x and p
+against the drive are four additional unknowns. The code needs numba, which the extra `peers` installs.
 """
 
 import math
@@ -22,36 +21,36 @@ A, B, C, E3, E5 = dop853.A, dop853.B, dop853.C, dop853.E3, dop853.E5
 FLIGHT, ON_UPPER, ON_LOWER = 0, 1, -1
 NOTHING, PEAKS = 0, 1
 SIZE = 10
-"""x, y, z, vx, vy, vz and the integrals of x and p against cosine and sine of the drive."""
+"""Number of unknowns: x, y, z, vx, vy, vz, and integrals of x and p against cosine and sine of the drive."""
 UNITS = np.repeat([1e-4, 0.1], 3)
-"""Errors of a state are in units of 100 um and 0.1 m/s."""
+"""Units of errors of a state: 100 um and 0.1 m/s."""
 SMALLEST_PART = 1e-2
-"""A component counts as at least this part of its unit, or of the drive's where that is less."""
+"""Smallest scale of the error of a component, relative to its unit; less for small drive amplitudes."""
 MOST_STEPS = 400_000
-"""In a drive period: more is given up."""
+"""Largest number of steps in a drive period; with more, the run fails."""
 FIRST_STEP_S = 1e-7
 LONGEST_STEP_S = 1e-5
-"""A step finds one touch of a stop; of a bounce in a longer one it would see neither beginning nor end."""
+"""Longest step [s]; in a longer one, a complete bounce could be missed."""
 REPEATED = 1e-7
-"""A motion repeats when its states once a drive period come back to this part of their size."""
+"""Relative difference below which states once per drive period count as repeated."""
 MOST_PERIODS = 32
 
 
 @dataclass(frozen=True)
 class PlainMotion:
-    """What a run saw of its last part. SI units."""
+    """Responses observed in the last part of a run. SI units."""
 
     responses: np.ndarray
     """Response I and II of m0, and of p, shape (4,)."""
     final_state: np.ndarray
     period: int | None
-    """Of a motion that repeats in the window, in drive periods."""
+    """Period in drive periods; None if the motion does not repeat in the window."""
 
 
 def plain_motion(specimen, drive, duration_s, window_s, start=(0.0,) * 6, tolerance=1e-12):
-    """Follow a motion from time zero and observe the last ``window_s`` of it; None when it was given up.
+    """Simulate from time zero and observe the last ``window_s``; return None if the run fails.
 
-    Lines are taken over the most whole periods that the window holds: of the motion, if it repeats.
+    Spectral lines are taken over whole drive periods, or over whole periods of a repeating motion.
     """
     numbers, powers, forces = _numbers(specimen, drive)
     period_s = 1.0 / drive.frequency_hz
@@ -86,7 +85,7 @@ def plain_motion(specimen, drive, duration_s, window_s, start=(0.0,) * 6, tolera
 
 
 def _period(sections, drive):
-    """Drive periods after which a section repeats throughout; None where it does not."""
+    """Return the number of drive periods after which the section repeats; None if it does not."""
     points = sections / np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
     size = np.abs(points).max()
     for period in range(1, min(MOST_PERIODS, len(points) - 1) + 1):
@@ -96,7 +95,7 @@ def _period(sections, drive):
 
 
 def _numbers(specimen, drive):
-    """Masses, stiffnesses, dampings, gaps, stop (stiffness, exponent), drive; powers and their forces."""
+    """Return the parameters of specimen, stop and drive, and powers and forces of a power law."""
     law, powers, forces = specimen.contact, np.zeros(0), np.zeros(0)
     lower, upper = specimen.gaps_m
     stiffness, exponent, reference = 0.0, 1.0, 1.0
@@ -144,7 +143,7 @@ def _rates(tau, state, place, numbers, powers, forces, out):
 
 @njit(cache=True)
 def _step(state, tau, length, place, numbers, powers, forces, stages, end):
-    """Make one step from the rates in the first stage."""
+    """Compute one step from the rates in the first stage."""
     trial = np.empty(SIZE)
     for i in range(1, STAGES):
         for n in range(SIZE):
@@ -179,7 +178,7 @@ def _error(stages, state, end, length, tolerance, sizes):
 
 @njit(cache=True)
 def _clearance(state, place, which, numbers):
-    """Tell how far the end of a phase is, positive while it lasts: at stop 1 (upper) or -1 (lower)."""
+    """Return the distance to the end of a phase at stop 1 (upper) or -1 (lower); positive during it."""
     p = which * (state[1] - state[2])
     left = (numbers[10] if which > 0 else numbers[9]) - p
     return left if place == FLIGHT else -left
@@ -193,14 +192,14 @@ def _closing(state, place, which):
 
 @njit(cache=True)
 def _shorter(state, tau, place, numbers, powers, forces, stages, length, other, end):
-    """Take the step again with another length; the first stage is known."""
+    """Repeat the step with another length; the first stage is reused."""
     other[0] = stages[0]
     _step(state, tau, length, place, numbers, powers, forces, other, end)
 
 
 @njit(cache=True)
 def _turn(state, tau, place, numbers, powers, forces, stages, length, first, second, other, end):
-    """Find the length of the step at whose end the speed of one coordinate over another passes zero."""
+    """Return the step length after which the velocity of one coordinate relative to another is zero."""
     low, high = 0.0, length
     _shorter(state, tau, place, numbers, powers, forces, stages, length, other, end)
     at_low = state[first] - (state[second] if second >= 0 else 0.0)
@@ -227,7 +226,7 @@ def _turn(state, tau, place, numbers, powers, forces, stages, length, first, sec
 
 @njit(cache=True)
 def _end_of_phase(state, tau, place, which, numbers, powers, forces, stages, high, other, end):
-    """Find the length of the step at whose end a clearance is used up; it is by ``high``."""
+    """Return the step length after which the phase ends; it is at most ``high``."""
     low = 0.0
     for _ in range(200):
         at = 0.5 * (low + high)
@@ -235,7 +234,7 @@ def _end_of_phase(state, tau, place, which, numbers, powers, forces, stages, hig
         left = _clearance(end, place, which, numbers)
         closing = -_closing(end, place, which)
         for _ in range(4):
-            # Newton's method, as long as it stays within the bracket.
+            # Use Newton's method while it stays within the bracket.
             if closing == 0.0 or not low < at + left / closing < high:
                 break
             at += left / closing
@@ -255,7 +254,7 @@ def _end_of_phase(state, tau, place, which, numbers, powers, forces, stages, hig
 
 @njit(cache=True)
 def _peak(best, state, tau, place, numbers, powers, forces, stages, length, end, which, other, spare):
-    """Largest abs(x) (which = 0) or abs(p) within a step."""
+    """Return the largest abs(x) (which = 0) or abs(p) within a step, at least ``best``."""
     if which == 0:
         a, b, va, vb, first, second = state[0], end[0], state[3], end[3], 3, -1
     else:
@@ -273,12 +272,12 @@ def _peak(best, state, tau, place, numbers, powers, forces, stages, length, end,
 def _follow(
     state, place, at_s, length_s, period_s, numbers, powers, forces, tolerance, sizes, observe, peaks
 ):
-    """Advance by a length of time, a drive period at a time so that its phase stays exact."""
+    """Advance by a length of time, one drive period at a time, so that the drive phase stays exact."""
     begin = at_s / period_s
     turns = begin - math.floor(begin + 1e-9)
     whole = math.floor(length_s / period_s + 1e-9)
     for k in range(whole + 1):
-        # A clock that adds up lengths would drift away from the drive.
+        # A sum of step lengths would drift away from the drive.
         part = period_s if k < whole else length_s - whole * period_s
         tau = turns * period_s
         if part > 1e-12 * period_s and not _advance(
@@ -317,7 +316,7 @@ def _advance(state, place, tau, until, numbers, powers, forces, tolerance, sizes
         if ends != 0:
             end[:] = spare
             is_last = False
-            # The force begins or ends as a power of time that no polynomial is: small steps first.
+            # Start with small steps, because the force is a fractional power of time near the contact's end.
             step = FIRST_STEP_S
         for which in range(2 * observe):
             args = (numbers, powers, forces, stages, within, end, which, other, spare)
@@ -331,7 +330,7 @@ def _advance(state, place, tau, until, numbers, powers, forces, tolerance, sizes
 
 @njit(cache=True)
 def _first_end(state, tau, place, numbers, powers, forces, stages, length, end, other, spare):
-    """Find the stop at which a phase ends within a step, and when; 0 where it goes on."""
+    """Return the stop at which a phase ends within a step, and the step length; 0 if it does not end."""
     for which in (1, -1):
         if place not in (FLIGHT, which):
             continue

@@ -1,8 +1,8 @@
-"""Planned over actual processor time of predictions, as the ledger of costs learns from them.
+"""Planned over actual processor time of predictions, while the cost ledger learns from them.
 
 ``python benchmarks/planned_costs.py --seed S --count 200 [--save FILE]`` draws random scenes of all contact
-laws as `error_targets.py` does, plans each, runs it and learns from it. Plans are counted once more after
-every learned cost was doubled by hand. A file that is there is continued: its runs are learned from again.
+laws as `error_targets.py` does, plans and runs each, and learns from it. The plans are evaluated again after
+all learned costs were doubled. An existing file is continued: its runs are learned from again.
 """
 
 import argparse
@@ -20,11 +20,11 @@ from vibench.sim import StartMemory, plan_scene, solve_scene
 from vibench.sim.scene.cost import CostLedger
 
 LEARNING = 0.4
-"""Part of the scenes from which the ledger learns before plans are counted."""
+"""Share of scenes from which the ledger learns before plans are counted."""
 
 
 def measured(seed, index, budget_s):
-    """Plan and run one scene; returns plain values."""
+    """Plan and run one scene; return plain values."""
     law, scene = drawn_scene(seed, index)
     scene = replace(scene, budget_s=budget_s)
     plan = plan_scene(scene)
@@ -47,7 +47,7 @@ def double(path):
 
 
 def ratios(ledger, rows):
-    """Plan each run by those before it, and learn from it; planned over actual time, shape (runs,)."""
+    """Return planned over actual time of each run, planned from the runs before it, shape (runs,)."""
     found = []
     for row in rows:
         found.append(ledger.expected(row["kind"], row["planned_s"]).time_s / row["taken_s"])
@@ -56,13 +56,13 @@ def ratios(ledger, rows):
 
 
 def report(name, values):
-    """Print how good plans were."""
+    """Print how well the plans match the actual times."""
     within = np.mean((values > 0.5) & (values < 2.0))
     print(f"{name}: {len(values)} plans, median {np.median(values):.2f}, within a factor of 2 {within:.0%}")
 
 
 def main():
-    """Measure, plan again in order, double, and plan on."""
+    """Measure all scenes, then evaluate the plans with learned and with doubled costs."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=77)
     parser.add_argument("--count", type=int, default=200)

@@ -1,11 +1,11 @@
-"""How often bounds from statistics of chaos hold the truth, on random specimens whose motion is not tracked.
+"""Test how often parameter bounds from statistics of chaos contain the truth, on random specimens.
 
     python benchmarks/posterior_coverage.py --draws 30 --seed 1
     python benchmarks/posterior_coverage.py --draws 30 --seed 1 --shard 1/3
 
-Each draw is another specimen (gaps of both sides, m1, c1, contact stiffness), another description of it,
-another sine or random noise, and three to a hundred times the usual rig's sensor noise. The recording is
-the virtual world's. A draw whose motion does not collide is drawn again.
+Each draw has a random specimen (both gaps, m1, c1, contact stiffness), a random wrong description of it, a
+random sine or noise, and three to a hundred times the usual sensor noise. The motion is not tracked. The
+recording is simulated. A draw without enough impacts is drawn again.
 """
 
 import argparse
@@ -34,7 +34,7 @@ CONFIDENCE_Z = 1.96
 
 
 def other(specimen: Specimen, rng: np.random.Generator, shares: tuple[float, ...]) -> Specimen:
-    """Draw a specimen about another: mean gap, gaps apart, m1, c1 and stiffness by factors up to these."""
+    """Return a random specimen: mean gap, gap ratio, m1, c1 and stiffness changed by up to these factors."""
     mean, apart, m1, c1, force = (math.exp(rng.uniform(-1, 1) * math.log(share)) for share in shares)
     masses, dampings = list(specimen.masses), list(specimen.dampings)
     masses[1] *= m1
@@ -52,7 +52,7 @@ def other(specimen: Specimen, rng: np.random.Generator, shares: tuple[float, ...
 
 
 def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool | None]]:
-    """Draw, record, and hold bounds against the truth: None where a number is not determined."""
+    """Return a text, and whether each bound contains the truth; None if a parameter is not determined."""
     rng = np.random.default_rng([seed, index])
     while True:
         true = other(
@@ -99,7 +99,7 @@ def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool 
 
 
 def wilson(held: int, count: int) -> tuple[float, float]:
-    """Give the interval of 95 % of a share."""
+    """Return the 95 % interval of a share."""
     z2 = CONFIDENCE_Z**2
     middle = (held + z2 / 2) / (count + z2)
     half = CONFIDENCE_Z / (count + z2) * math.sqrt(held * (count - held) / count + z2 / 4)
@@ -107,7 +107,7 @@ def wilson(held: int, count: int) -> tuple[float, float]:
 
 
 def counted(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
-    """Say how often each number's bounds held."""
+    """Yield for each parameter how often its bounds contain the truth."""
     by_name: dict[str, list[bool | None]] = defaultdict(list)
     for each in found:
         for what, held in each.items():
@@ -125,7 +125,7 @@ def counted(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Draw and count."""
+    """Run all draws and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=30)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,13 +1,13 @@
-"""Measurements of control-based continuation that others published, beside what their authors state.
+"""Published measurements of control-based continuation, compared with the values that their authors state.
 
     python benchmarks/published_branches.py [FOLDER --rate 5000]
 
-Reads limit cycles of an airfoil in wind, held at the University of Bristol, through an import mapping (source
-and licence: tests/analysis/exchange/flutter_rig/README.md), and prints what five periods at a time tell of
-each: frequency, amplitude of the heave (mean, least and largest), and how invasive the control was, the
-fundamental of control target less response, over that of the response. Beside them stand the authors'
+The script imports limit cycles of an airfoil in wind, held at the University of Bristol, with an import
+mapping (source and licence: tests/analysis/exchange/flutter_rig/README.md). For each it prints frequency,
+amplitude of the heave over five periods at a time (mean, least and largest), and how invasive the control
+was: the fundamental of control target less response, over that of the response. Beside them are the authors'
 amplitude, measured over five periods before the samples were kept, and the largest heave less its mean, which
-their script takes from the samples. With a FOLDER the files as published.
+their script computes from the samples. With a FOLDER, the complete published files are used.
 """
 
 import argparse
@@ -37,13 +37,13 @@ class HeldCycle:
     frequency_hz: float
     stated_hz: float
     heave_m: np.ndarray
-    """Of each five periods."""
+    """Amplitude of the heave over each five periods."""
     stated_m: float
     largest_m: float
     invasive: float
-    """Mean fundamental of target less response, over that of the response."""
+    """Mean fundamental of control target less response, over that of the response."""
     criterion: float
-    """What their search brings below `stated_criterion`: root of the difference of both squares [V]."""
+    """Criterion of the authors' search, the root of the difference of both squares [V]."""
     stated_criterion: float
 
 
@@ -83,7 +83,7 @@ def held_cycles(source: Path, mapping: ImportMapping) -> list[HeldCycle]:
 
 
 def main() -> None:
-    """Print one row of a table for each."""
+    """Print one row of a table for each limit cycle."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, nargs="?", default=EXCERPTS)
     parser.add_argument("--rate", type=float)

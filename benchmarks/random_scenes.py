@@ -1,4 +1,4 @@
-"""Scenes drawn at random over all that is asked: models, damping, gaps, frequencies and amplitudes."""
+"""Random scenes over all models, damping times, gaps, frequencies and amplitudes of the benchmarks."""
 
 from dataclasses import replace
 
@@ -21,13 +21,13 @@ from vibench.sim.branches import MotionSearch, periodic_motions
 
 MODELS = ("hertz", "linear_gap", "power:3", "power:5", "power:7")
 EDGE = 0.004
-"""How close to an edge of chaos a scene lies, over its frequency."""
+"""Largest distance of a scene from the edge of chaos, relative to its frequency."""
 STEP = 0.06
-"""Distance over which a change from chaos is looked for, over the frequency."""
+"""Distance within which an edge of chaos is searched for, relative to the frequency."""
 
 
 def random_scene(random: np.random.Generator) -> Scene:
-    """Draw a scene: 20 to 700 Hz, 0.2 to 200 um, gaps of 5 to 100 um, half of them unequal, damped or not."""
+    """Return a random scene: 20 to 700 Hz, 0.2 to 200 um, gaps of 5 to 100 um, half of them unequal."""
     model = str(random.choice(MODELS))
     gap_m = float(random.uniform(5e-6, 100e-6))
     gaps_m = (gap_m, float(random.uniform(5e-6, 100e-6))) if random.random() < 0.5 else gap_m
@@ -39,7 +39,7 @@ def random_scene(random: np.random.Generator) -> Scene:
 
 
 def edge_scene(random: np.random.Generator) -> Scene:
-    """Draw a scene at the edge of a range of frequencies where the motion is chaotic, on its outer side."""
+    """Return a random scene with chaos, next to a frequency at which the motion is not chaotic."""
     while True:
         scene = random_scene(random)
         outside = at(scene, scene.drive.frequency_hz * (1.0 + STEP * float(random.choice([-1.0, 1.0]))))
@@ -56,7 +56,7 @@ def edge_scene(random: np.random.Generator) -> Scene:
 
 
 def quasi_periodic_scene(random: np.random.Generator) -> Scene:
-    """Draw a scene of the paper's specimen that neither repeats nor is chaotic: a torus, or a drift."""
+    """Return a random scene of the paper's specimen that is quasi-periodic or undecided."""
     while True:
         drive = Harmonic(float(random.uniform(100.0, 140.0)), float(random.uniform(8e-6, 40e-6)))
         specimen = gong2025(float(random.uniform(2e-5, 5e-5)))
@@ -67,13 +67,13 @@ def quasi_periodic_scene(random: np.random.Generator) -> Scene:
 
 
 FEW = MotionSearch(places=2, starts=2)
-"""Starts of the search for a motion whose branch has a bifurcation."""
+"""Small search for a motion whose branch has a bifurcation."""
 
 
 def near_bifurcation(random: np.random.Generator) -> tuple[BranchEvent, Scene]:
-    """Draw a bifurcation and a scene beside it, from rest or from near the motion that bifurcates.
+    """Return a random bifurcation, and a scene near it that starts from rest or near its motion.
 
-    The frequency is 1e-6 to 1e-3 of it away, the start 1e-6 to 1e-1 of the size of the motion.
+    The relative distance of the frequency is 1e-6 to 1e-3, that of the start 1e-6 to 1e-1.
     """
     while True:
         scene = random_scene(random)
@@ -97,18 +97,18 @@ def near_bifurcation(random: np.random.Generator) -> tuple[BranchEvent, Scene]:
 
 
 def at(scene: Scene, frequency_hz: float) -> Scene:
-    """Drive a scene at another frequency."""
+    """Return the scene at another frequency."""
     return replace(scene, drive=Harmonic(frequency_hz, scene.drive.amplitude_m))
 
 
 def is_chaotic(scene: Scene) -> bool:
-    """Whether a motion is chaotic some seconds after its start."""
+    """Return whether the motion of a scene is chaotic."""
     found = solve_scene(replace(scene, budget_s=0.0))
     return found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}
 
 
 def described(scene: Scene) -> str:
-    """Name a scene in a line."""
+    """Return the parameters of a scene as one line."""
     specimen, drive = scene.specimen, scene.drive
     gaps = "/".join(f"{1e6 * gap_m:.4g}" for gap_m in dict.fromkeys(specimen.gaps_m))
     damping_s = specimen.dampings[0] / specimen.stiffnesses[0]

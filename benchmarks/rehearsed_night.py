@@ -1,13 +1,13 @@
-"""A night rehearsed: eight hours of rig time, unattended, with a script of twenty faults.
+"""Test an unattended night: eight hours of rig time with a script of twenty faults.
 
     python benchmarks/rehearsed_night.py [HOURS]
 
-A campaign of dwells along branches runs in this process as `vibench measure` runs it, on the virtual rig
-with four channels at 6.4 kS/s and 12.8 thousand steps a second, with the faults of
-hardware_configs/faults/night.toml (their times scaled to the length of the night), three attempts a point,
-going on after failures, and resumed when the disk was full. Printed are memory and open files at every
-tenth of the night, how every point came out, and how much faster than the wall clock it went; `--say` prints
-what happens.
+A campaign of dwells along branches runs in this process, as `vibench measure` would run it. The virtual rig
+has four channels at 6.4 kS/s and 12.8 thousand steps a second. The faults are those of
+hardware_configs/faults/night.toml, with times scaled to the length of the night. Each point has three
+attempts, the campaign continues after failures, and it is resumed after a full disk. The script prints memory
+and open files at every tenth of the night, the result of every point, and the speed relative to real time.
+`--say` also prints all events.
 """
 
 import os
@@ -43,7 +43,7 @@ MORNINGS = 3
 
 
 def campaign(duration_s: float) -> Campaign:
-    """Dwells at rising frequencies, up and down, at two levels."""
+    """Return a campaign of dwells along branches, up and down in frequency, at two levels."""
     points = max(8, round(duration_s / POINT_S))
     steps = points // 4
     frequencies = {"start": 200.0, "stop": 200.0 + 100.0, "step": 100.0 / (steps - 1)}
@@ -61,7 +61,7 @@ def campaign(duration_s: float) -> Campaign:
 
 
 def rig_of(folder: Path, duration_s: float) -> Rig:
-    """Give the virtual rig at the rate of the night, with its faults at their share of the time."""
+    """Return the virtual rig with the sample rate and the scaled faults of the night."""
     script = load_fault_script(ROOT / "hardware_configs" / "faults" / "night.toml")
     lines = []
     for fault in script.faults:
@@ -81,7 +81,7 @@ def rig_of(folder: Path, duration_s: float) -> Rig:
 
 
 class Account:
-    """What became of the points, and what the process held on the way."""
+    """Results of all points, with memory and open files of the process."""
 
     def __init__(self, plan: Campaign) -> None:
         self._plan = plan
@@ -90,7 +90,7 @@ class Account:
         self._last: dict[str, PointResult] = {}
 
     def ended(self, point_result: PointResult) -> None:
-        """Note how a point came out; a resumed campaign tells the earlier ones again."""
+        """Record the result of a point; a resumed campaign reports the earlier points again."""
         is_new = self._last.get(point_result.name) is None
         self._last[point_result.name] = point_result
         if is_new and len(self._last) % max(1, len(self._names) // TENTHS) == 0:
@@ -98,17 +98,17 @@ class Account:
             print(f"{len(self._last):4} points  {held}  {self.wall_s:6.0f} s", flush=True)
 
     def happened(self, event: CampaignEvent) -> None:
-        """Print what happens, if the caller wants it."""
+        """Print an event if `--say` was given."""
         if "--say" in sys.argv:
             print(f"{self.wall_s:7.1f} s {event.kind}: {event.text}"[:200], flush=True)
 
     @property
     def wall_s(self) -> float:
-        """Time since the campaign began, by the clock on the wall [s]."""
+        """Elapsed time since the campaign began [s]."""
         return time.monotonic() - self._began_s
 
     def tell(self) -> None:
-        """Print the reckoning."""
+        """Print the summary of the night."""
         wall_s, used = self.wall_s, os.times()
         print(
             f"points: {dict(Counter(each.reason_code.value for each in self._last.values()))} "
@@ -124,7 +124,7 @@ class Account:
 
 
 def main() -> None:
-    """Live through the night and tell."""
+    """Run the campaign and print the results."""
     duration_s = HOUR_S * float(sys.argv[1]) if len(sys.argv) > 1 else NIGHT_S
     with tempfile.TemporaryDirectory() as temporary, closing(Engine(Supervision.UNATTENDED)) as engine:
         folder = Path(temporary)
@@ -140,7 +140,7 @@ def main() -> None:
                 engine.measure(orders, account.ended, account.happened)
                 break
             except RecordingError as error:
-                # In the morning somebody makes room on the disk.
+                # Resume, as a user would after making room on the disk.
                 print(f"ended: {str(error)[:150]}; resumed", flush=True)
                 orders = orders.model_copy(update={"existing": ExistingRecordings.RESUME})
         account.tell()
@@ -148,7 +148,7 @@ def main() -> None:
 
 
 def resident_mb() -> float:
-    """Memory that the process holds now [MB]."""
+    """Return the present memory of the process [MB]."""
     for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
         if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
@@ -156,7 +156,7 @@ def resident_mb() -> float:
 
 
 def open_files() -> int:
-    """Descriptors that the process holds now."""
+    """Return the present number of open file descriptors."""
     return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - numbers, not paths
 
 

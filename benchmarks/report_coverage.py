@@ -1,16 +1,15 @@
-"""How often the bounds of a report hold, on short measurements of every kind with random rigs.
+"""Test how often the bounds of a report contain the truth, on short measurements with random rigs.
 
     python benchmarks/report_coverage.py --rigs 125 --seed 1                # 1000 measurements of each kind
     python benchmarks/report_coverage.py --rigs 125 --seed 1 --shard 1/10   # a tenth of them
     python benchmarks/report_coverage.py --rigs 30 --seed 48 --sensors      # another set of sensors on each
 
-Each rig has another specimen and shaker, and measures one plan `REPEATS` times: with other noise, with a
-converter whose clock is off by another error within what the configuration states, and, where the drive is
-random, with other phases. A quarter of the rigs measures so weakly that motion is linear, whose truth is a
-closed form: modes, transmissibility, both Responses of a dwell. So is that of noise elsewhere in which
-nothing was heard to collide. Any other value is held against the median of the repeats that collided as it
-did, and its bound is as much wider as that median scatters. Each kind of bound has a row: how many held, and
-how probable so few are where each holds in 95 of 100 cases.
+Each rig has a random specimen and shaker, and measures one plan `REPEATS` times with new noise, new random
+phases and a new clock error within the stated limit. A quarter of the rigs measures so weakly that the motion
+is linear. Then modes, transmissibility and both Responses of a dwell are known in closed form, as for noise
+without detected collisions. Any other value is compared with the median of the repeats of the same kind; its
+bound is widened by the scatter of this median. Each kind of bound has a row: how many contain the truth, and
+how probable so few are if each does in 95 of 100 cases.
 """
 
 import argparse
@@ -37,37 +36,37 @@ from vibench.sim import Specimen, base_transmissibility
 
 REPEATS = 8
 FEWEST_ALIKE = 5
-"""Repeats that a median is taken of."""
+"""Smallest number of repeats for a median."""
 CLOCK_PPM = 50.0
 WEAK_VPP = 0.03
-"""At which nothing collides but in a dwell at a resonance, which is looked at."""
+"""Level without collisions, except for dwells at a resonance, which are checked [Vpp]."""
 KINDS = ("noise", "dwell", "sweep", "steps")
 LINES = "transmissibility, line by line"
 FARTHEST_HZ = 5.0
-"""Between a mode and the resonance that is taken for it."""
+"""Largest distance between a mode and a resonance that is assigned to it [Hz]."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """One bound of one measurement against what is true."""
+    """One bound of one measurement, compared with the truth."""
 
     kind: str
     quantity: str
     is_linear: bool
     off: float
-    """Error over the expanded uncertainty (k = 2), or the share of lines that their bounds miss."""
+    """Error over the expanded uncertainty (k = 2), or share of lines whose bounds miss the truth."""
     scene: str
 
     @property
     def row(self) -> tuple[str, str]:
-        """What is counted together."""
+        """Row of the table in which the bound is counted."""
         return f"{self.kind}, {'linear' if self.is_linear else 'any motion'}", self.quantity
 
 
 def drawn(
     rng: np.random.Generator, kind: str, *, is_weak: bool
 ) -> WhiteNoise | Dwell | SineSweep | SteppedSine:
-    """Draw a short plan of a kind."""
+    """Return a random short plan of a kind."""
     level_vpp = WEAK_VPP if is_weak else float(10 ** rng.uniform(-1, 0.9))
     at_hz = float(np.round(rng.uniform(90, 480), 1))
     match kind:
@@ -91,7 +90,7 @@ def drawn(
 
 
 def repeated(rig: Rig, rng: np.random.Generator) -> Rig:
-    """Give the same rig with other noise, and with another converter's clock, as wrong as it may be."""
+    """Return the same rig with other noise, and another clock error within the stated limit."""
     other = {
         "seed": int(rng.integers(1, 1 << 30)),
         "converter_clock_ppm": float(rng.uniform(-CLOCK_PPM, CLOCK_PPM)),
@@ -100,14 +99,14 @@ def repeated(rig: Rig, rng: np.random.Generator) -> Rig:
 
 
 def with_stated_clock(rig: Rig) -> Rig:
-    """Let the configuration say how wrong the converter's clock may be."""
+    """Return the rig with the clock error of the converter stated in its configuration."""
     document = rig.model_dump(mode="json")
     document["daq"]["clock_ppm"] = {"value": CLOCK_PPM, "source": "drawn within it"}
     return Rig.model_validate(document)
 
 
 def random_sensors(rig: Rig, rng: np.random.Generator) -> tuple[Rig, str]:
-    """Draw the sensor of m0, and in half of the sets a further sensor in place of the amplifier's wire."""
+    """Return the rig with a random sensor on m0, and in half of the cases one on the amplifier's channel."""
     document = rig.model_dump(mode="json")
     channels = {each["role"]: each for each in document["daq"]["channels"]}
     kinds = {
@@ -136,7 +135,7 @@ def random_sensors(rig: Rig, rng: np.random.Generator) -> tuple[Rig, str]:
 
 
 def modes(specimen: Specimen) -> tuple[np.ndarray, np.ndarray]:
-    """Natural frequencies [Hz] and damping ratios, by the poles."""
+    """Return natural frequencies [Hz] and damping ratios, from the poles."""
     motion = -np.linalg.solve(
         specimen.mass_matrix, np.hstack((specimen.stiffness_matrix, specimen.damping_matrix))
     )
@@ -147,12 +146,12 @@ def modes(specimen: Specimen) -> tuple[np.ndarray, np.ndarray]:
 
 
 def peak(specimen: Specimen, near_hz: float) -> float:
-    """Give the largest transmissibility to m0 at a mode."""
+    """Return the largest transmissibility to m0 near a mode."""
     return float(np.max(np.abs(base_transmissibility(specimen, near_hz + np.arange(-3, 3, 0.002))[:, 0])))
 
 
 def true_values(rig: Rig, plan: object) -> dict[str, float]:
-    """Give what linear motion has in closed form, by the names of the table."""
+    """Return the closed-form values of linear motion, by their names in the table."""
     specimen = specimen_of(rig)
     if isinstance(plan, Dwell):
         played_hz = plan.frequency_hz * (1 + 1e-6 * rig.virtual.generator_clock_ppm)
@@ -169,7 +168,7 @@ def true_values(rig: Rig, plan: object) -> dict[str, float]:
 
 
 def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]) -> bool:
-    """Whether m1 would go beyond a gap if there were none: at a resonance even the weakest dwell may."""
+    """Return whether linear motion of m1 would exceed a gap, as even a weak dwell may at a resonance."""
     if not isinstance(plan, Dwell) or "base amplitude A0" not in found:
         return False
     specimen = specimen_of(rig)
@@ -178,7 +177,7 @@ def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]
 
 
 def named(quantity: str, specimen: Specimen) -> str | None:
-    """Give the name that repeats share: modes by their number, and without where a largest value was."""
+    """Return a name that is the same in all repeats: modes by number, largest values without frequency."""
     found = re.search(r"([\d.]+) Hz", quantity)
     if found is None or "largest" in quantity or "A0" in quantity:
         return re.sub(r",? at [\d.]+ Hz", "", quantity)
@@ -189,7 +188,7 @@ def named(quantity: str, specimen: Specimen) -> str | None:
 
 
 def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float, float]], object]:
-    """Measure once: value and expanded uncertainty of each quantity whose scatter is told; the analysis."""
+    """Measure once; return value and expanded uncertainty by quantity, and the analysis."""
     with open_bench(rig) as bench:
         run_measurement(bench, Measurement(name="measured", excitation=plan, ramp_s=0.3), path)
     done = analyse_files([path], "measured", Simulation.LEFT_OUT)
@@ -209,7 +208,7 @@ def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float,
 def scenes(
     rigs: int, seed: int, shard: tuple[int, int], kinds: list[str], *, draws_sensors: bool
 ) -> Iterator[Held]:
-    """Measure every kind on every rig of a shard."""
+    """Yield the compared bounds of every kind of measurement on every rig of a shard."""
     first, of = shard
     for number in range(first - 1, rigs, of):
         rng = np.random.default_rng((seed, number))
@@ -229,7 +228,7 @@ def scenes(
 def within_limits(
     rig: Rig, plan: object, seeds: tuple[int, int, int], words: str, *, is_weak: bool
 ) -> list[Held]:
-    """Hold the bounds of a plan, at half its level where it would move the specimen beyond its limits."""
+    """Return the compared bounds of a plan; halve its level as long as it exceeds the limits."""
     scene = f"{words}, {plan.amplitude_vpp:.2g} Vpp"
     rng, kind = np.random.default_rng(seeds), KINDS[seeds[-1]]
     try:
@@ -242,7 +241,7 @@ def within_limits(
 def repeats(
     rig: Rig, plan: object, rng: np.random.Generator, kind: str, *, is_weak: bool, scene: str
 ) -> Iterator[Held]:
-    """Measure a plan again and again, and hold every bound."""
+    """Measure a plan repeatedly, and yield every bound compared with the truth."""
     told: dict[tuple[str, bool], list[tuple[float, float]]] = defaultdict(list)
     for _ in range(REPEATS):
         again = plan.model_copy(update={"seed": int(rng.integers(1, 1 << 30))}) if kind == "noise" else plan
@@ -264,7 +263,7 @@ def repeats(
         if is_linear and name in true:
             off = (value - true[name]) / expanded
         elif count >= FEWEST_ALIKE:
-            # Against the median of the others, which scatters too.
+            # Compare with the median of the others, and add its scatter.
             others = np.array([np.median(np.delete(value, place)) for place in range(count)])
             off = (value - others) / (expanded * np.sqrt(1 + np.pi / 2 / (count - 1)))
         else:
@@ -274,7 +273,7 @@ def repeats(
 
 
 def table(found: list[Held]) -> Iterator[str]:
-    """Count, a row for each kind of bound."""
+    """Yield the lines of the table, one row for each kind of bound."""
     rows = defaultdict(list)
     for each in found:
         rows[each.row].append(abs(each.off))
@@ -295,7 +294,7 @@ def table(found: list[Held]) -> Iterator[str]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the measurements of a shard and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rigs", type=int, default=4)
     parser.add_argument("--seed", type=int, default=0)

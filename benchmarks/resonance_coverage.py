@@ -1,14 +1,13 @@
-"""How often bounds of the resonances of streamed noise hold, on signals whose truth is a closed form.
+"""Test how often bounds of resonances from streamed noise contain the truth, which is a closed form.
 
     python benchmarks/resonance_coverage.py --count 20 --seed 1
     python benchmarks/resonance_coverage.py --count 20 --seed 1 --shard 1/10 --save part1.json
     python benchmarks/resonance_coverage.py --count 1 --seed 1 --scenes random --random 120
 
-Each scene is one mode with a damping ratio, a window and sensor noise, two or three modes close to each
-other, or the modes of the paper's specimen. `--random` adds scenes of two or three close modes drawn at
-random. A row gives how many of its modes were found, and in how many
-k = 2 holds frequency, damping and peak. A mode that is reported, explained and more than five standard
-deviations off is counted as wrong.
+A scene has one mode with a given damping ratio, window and sensor noise, or two or three close modes, or the
+modes of the paper's specimen. `--random` adds random scenes of two or three close modes. Each row shows how
+many modes were found, and how often k = 2 contains frequency, damping and peak. A mode that is reported as
+explained, but more than five standard deviations off, counts as wrong.
 """
 
 import argparse
@@ -27,16 +26,16 @@ from vibench.sim import gong2025
 RATE_HZ = 2048.0
 SECONDS = 60.0
 WINDOWS = {"hann": 0.5, "blackmanharris": 0.75, "flattop": 0.75, "boxcar": 0.0}
-"""With the overlap of their segments."""
+"""Windows, with the overlap of their segments."""
 DAMPINGS = (0.0005, 0.0015, 0.005, 0.015, 0.02, 0.05)
 CLOSE_HZ = (2.0, 4.0)
-"""Distance of close modes with a damping ratio of 1 %."""
+"""Distances of close modes with a damping ratio of 1 % [Hz]."""
 SHARES = ((1.0, 1.0), (1.0, 0.4), (1.0, -0.7), (1.0, 0.6, 1.0))
-"""Static shares of close modes."""
+"""Static shares of the two or three close modes."""
 NOISES = (0.001, 0.05)
-"""Of the response's sensor, relative to the response."""
+"""Noise of the response sensor, relative to the response."""
 DAMPING_TIMES_S = (4e-6, 2e-5)
-"""Of the paper's specimen."""
+"""Damping times of the paper's specimen [s]."""
 WRONG = 5.0
 
 Mode = tuple[float, float, float]
@@ -46,7 +45,7 @@ Scene = tuple[str, float, float, list[Mode]]
 
 
 def transmission(frequency_hz: np.ndarray, modes: list[Mode]) -> np.ndarray:
-    """Give 1 + sum of share / (1 - r^2 + 2 i zeta r)."""
+    """Return the transmissibility 1 + sum of share / (1 - r^2 + 2 i zeta r)."""
     value = np.ones(frequency_hz.size, dtype=complex)
     for natural_hz, damping, share in modes:
         ratio = frequency_hz / natural_hz
@@ -55,13 +54,13 @@ def transmission(frequency_hz: np.ndarray, modes: list[Mode]) -> np.ndarray:
 
 
 def peak(modes: list[Mode], natural_hz: float, damping: float) -> float:
-    """Give the largest magnitude about a mode."""
+    """Return the largest magnitude near a mode."""
     fine_hz = natural_hz * (1 + np.linspace(-2 * damping, 2 * damping, 20001))
     return float(np.abs(transmission(fine_hz, modes)).max())
 
 
 def paper_modes(damping_time_s: float) -> list[Mode]:
-    """Give the modes of the paper's specimen without stops, as m0 shows them."""
+    """Return the modes of the paper's specimen without stops, as seen at m0."""
     specimen = gong2025(damping_time_s=damping_time_s)
     root = np.sqrt(np.diag(specimen.mass_matrix))
     _, vectors = np.linalg.eigh(specimen.stiffness_matrix / np.outer(root, root))
@@ -71,7 +70,7 @@ def paper_modes(damping_time_s: float) -> list[Mode]:
 
 
 def scenes() -> Iterator[tuple[str, Scene]]:
-    """Name every scene."""
+    """Yield every scene with its name."""
     for window, damping, noise in product(WINDOWS, DAMPINGS, NOISES):
         yield f"{window:15} {damping:7.2%} noise {noise:g}", (window, noise, 4.0, [(200.0, damping, 1.0)])
     for window, apart_hz, shares in product(WINDOWS, CLOSE_HZ, SHARES):
@@ -83,7 +82,7 @@ def scenes() -> Iterator[tuple[str, Scene]]:
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
-    """Draw two or three modes, 0.25 to 3 half-power bandwidths apart, any window, noise and segment."""
+    """Return a random scene of two or three modes, 0.25 to 3 half-power bandwidths apart."""
     natural_hz, damping = float(rng.uniform(150.0, 300.0)), float(10 ** rng.uniform(-2.3, -1.5))
     apart_hz = float(rng.uniform(0.25, 3.0)) * 2 * damping * natural_hz
     modes = [
@@ -99,7 +98,7 @@ def random_scene(rng: np.random.Generator) -> Scene:
 
 
 def scores(window: str, noise: float, segment_s: float, modes: list[Mode], rng: np.random.Generator) -> dict:
-    """Measure once: errors over standard deviations of each mode that was found."""
+    """Simulate one measurement; return the error over the standard deviation for each mode found."""
     samples = int(SECONDS * RATE_HZ)
     drive = rng.standard_normal(samples)
     spectrum = np.fft.rfft(drive)

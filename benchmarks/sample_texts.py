@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("acquisition", "analysis", "cli", "extensions", "gui", "sim", "studies", "virtual_rig")
 MESSAGE_WORDS = 6
-"""A literal with fewer words is a label, a key or a name."""
+"""Smallest number of words of a message; shorter literals are labels, keys or names."""
 
 Text = tuple[str, str]
 """Place of a text, and the text."""
@@ -41,7 +41,7 @@ def product_sources() -> list[Path]:
 
 
 def docstrings(path: Path) -> Iterator[Text]:
-    """Yield every docstring of a file, those of fields and constants too."""
+    """Yield every docstring of a file, including those of fields and constants."""
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             text = node.value.value
@@ -50,7 +50,7 @@ def docstrings(path: Path) -> Iterator[Text]:
 
 
 def comments(path: Path) -> Iterator[Text]:
-    """Yield every comment of a file, consecutive lines joined."""
+    """Yield every comment of a file, with consecutive lines joined."""
     place, last, said = 0, -1, list[str]()
     for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline):
         if token.type != tokenize.COMMENT or re.match(r"#\s*(noqa|type:|fmt:|pragma|SPDX)", token.string):
@@ -118,7 +118,7 @@ def _from_files(read: str, paths: list[Path]) -> list[Text]:
 
 
 def drawn(seed: int, count: int, since: str | None) -> dict[str, list[Text]]:
-    """Return texts by kind, in equal numbers, the same for the same seed and sources."""
+    """Return random texts by kind, in equal numbers; the same seed and sources give the same texts."""
     sources = product_sources()
     kinds = {
         "document": _from_files("document", _tracked("README.md", "CONTRIBUTING.md", "docs/*.md")),
@@ -134,7 +134,7 @@ def drawn(seed: int, count: int, since: str | None) -> dict[str, list[Text]]:
 
 
 def main() -> None:
-    """Print the texts."""
+    """Draw the texts and print them with their places."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--count", type=int, default=200)

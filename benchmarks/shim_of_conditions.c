@@ -1,6 +1,6 @@
-/* Makes a process believe that there are no threads left, or that the clock was set an hour forward.
+/* LD_PRELOAD library that simulates two conditions: no threads left, and a clock set an hour forward.
 
-   For LD_PRELOAD. A condition begins when the file SHIM_FOLDER/<condition>.<pid> is made. Without it, this would
+   A condition begins when the file SHIM_FOLDER/<condition>.<pid> is created. Otherwise, a test would
    need another user and the right to set the clock. */
 #define _GNU_SOURCE
 #include <dlfcn.h>

@@ -1,17 +1,17 @@
-"""Is the generator's terminal silent after every stop, whatever the state, the condition and the cause?
+"""Test whether the generator's output is silent after every stop, for all states, conditions and causes.
 
     python benchmarks/stops_from_outside.py --seed 42 --count 300 --shard 1/2 --save stops_1.jsonl
     python benchmarks/stops_from_outside.py --only window idle --seed 42 --save windows.jsonl
     python benchmarks/stops_from_outside.py --dead-man --seed 42 --count 60 --save kills.jsonl
     python benchmarks/stops_from_outside.py --sum stops_*.jsonl
 
-This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
-terminal. What drives is another process, which reaches the rig as it reaches real instruments: `vibench
-measure` on a separate terminal, the window (offscreen), or another process that attends an engine. Each cell
-runs one process: it reaches the state, the condition is created, the cause happens, and the witness waits for
-silence. Time counts from Enter: `vibench stop` is the installed command. Cells are drawn by
-the seed and written to ``--save`` one by one; those that stand there are not measured again. Linux only; two
-conditions need a C compiler.
+This process runs the virtual rig in real time, and a witness that watches the generator's output. Another
+process drives the rig through the same interfaces as real instruments: `vibench measure` on a separate
+terminal, the window (offscreen), or a process that attends an engine. Each cell of the test runs one such
+process. It reaches the state, the condition is created, the cause happens, and the witness waits for silence.
+Time counts from Enter, because `vibench stop` is the installed command. Cells are drawn by the seed and
+written to ``--save`` one by one; stored cells are not measured again. Linux only; two conditions need a C
+compiler.
 """
 
 import argparse
@@ -64,22 +64,22 @@ from vibench.virtual_rig import VirtualRig
 
 VIBENCH = str(Path(sys.executable).with_name("vibench"))
 ENTER_S = 0.2
-"""A command takes to start on an idle computer [s]."""
+"""Time that a command takes to start on an idle computer [s]."""
 LOADED_S = 3.0
-"""An abort from Enter where other programs ask for many times the cores [s]."""
+"""Allowed time from Enter for an abort on an overloaded computer [s]."""
 STANDSTILL_S = 1.5
-"""Until a run that no longer advances is silenced, once it is stopped [s]."""
+"""Allowed time to silence a stopped run that no longer advances [s]."""
 DEAD_MAN_S = 1.0
 LATE_S = 0.3
-"""The witness looks that often on a busy computer [s]."""
+"""Interval between looks of the witness on a busy computer [s]."""
 SHIM = Path(__file__).with_name("shim_of_conditions.c")
 ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted")
-"""Conditions that may end a run before its stop does, or keep its recording from being finished."""
+"""Conditions that may end a run before its stop, or prevent its recording from being finished."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One stop."""
+    """One stop: the driving program, cause, condition and state."""
 
     subject: str
     cause: str
@@ -89,7 +89,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Found:
-    """What became of it."""
+    """Result of one cell."""
 
     cell: Cell
     took_s: float
@@ -99,7 +99,7 @@ class Found:
 
     @property
     def complaint(self) -> str:
-        """Say what is wrong; empty where nothing is."""
+        """Description of what is wrong; empty if nothing is."""
         if self.took_s > self.within_s:
             return f"silent after {self.took_s:.2f} s, {self.within_s:.2f} s are allowed"
         may_have_ended = self.cell.condition in ENDED_BY_ITSELF
@@ -108,7 +108,7 @@ class Found:
             if what == "stop" and may_have_ended:
                 allowed = {0, 1}
             if what == "measure" and self.cell.cause == "limit passed":
-                # No limit applies to the ramp of a stop: that run was stopped by a person.
+                # No limit applies during the ramp of a stop, so this run counts as stopped by a person.
                 allowed = {3} if self.cell.state == "ramping_down" else {1}
             elif what == "measure" and not may_have_ended and self.cell.cause != "Ctrl-C twice":
                 allowed = {3}
@@ -118,7 +118,7 @@ class Found:
 
 
 class Laboratory:
-    """A rig, its witness, and one process that drives it."""
+    """A virtual rig with its witness, and one process that drives it."""
 
     def __init__(self, virtual: VirtualRig, folder: Path, dead_man_s: float | None) -> None:
         self.virtual = virtual
@@ -144,13 +144,13 @@ class Laboratory:
         self._said = b""
 
     def start(self, subject: str) -> None:
-        """Let a process begin to drive."""
+        """Start the process that drives the rig."""
         self.recordings = self.folder / str(int(self.recordings.name) + 1)
         self._said = b""
         self._terminal, slave = os.openpty()
         words = [subject, str(self.rig_path), str(self.knobs_path), str(self.recordings)]
         script = [sys.executable, __file__, "--as", *words]
-        # The leader of a session gets the terminal that it opens first.
+        # A session leader gets the first terminal that it opens as its controlling terminal.
         shell = f'exec "$@" <{os.ttyname(slave)} >{os.ttyname(slave)} 2>&1'
         self.process = subprocess.Popen(["/bin/sh", "-c", shell, "sh", *script], start_new_session=True)
         os.close(slave)
@@ -159,7 +159,7 @@ class Laboratory:
         self.client = EngineClient.attach(self.engine.address, patience_s=PATIENCE_S)
 
     def run_into(self, state: str, after_s: float) -> None:
-        """Wait for a state of the run, and a little more."""
+        """Wait for a state of the run, and then for ``after_s``."""
         first = "recording" if state in ("held", "ramping_down") else state
         self.until(lambda: self.run_state() == first and self.is_loud(), first)
         if state == "held":
@@ -170,20 +170,20 @@ class Laboratory:
         time.sleep(after_s)
 
     def run_state(self) -> str:
-        """Where the run stands."""
+        """Return the state of the run; empty without a run."""
         run = self.client.status().run
         return "" if run is None else run.run_state.value
 
     def is_loud(self) -> bool:
-        """Whether anything was at the terminal a moment ago."""
+        """Return whether the output was loud within the last 0.1 s."""
         return time.monotonic() - self.witness.last_loud_s < 0.1
 
     def type(self, keys: bytes) -> None:
-        """Press keys on the terminal of the process."""
+        """Type keys on the terminal of the process."""
         os.write(self._terminal, keys)
 
     def until(self, is_so: Callable[[], bool], what: str) -> None:
-        """Wait, or raise TimeoutError."""
+        """Wait for a condition; raise TimeoutError if it takes too long or the process ends."""
         give_up_s = time.monotonic() + 2 * PATIENCE_S
         while not is_so():
             if time.monotonic() > give_up_s or self.process.poll() is not None:
@@ -191,14 +191,14 @@ class Laboratory:
             time.sleep(0.005)
 
     def ended(self) -> int | None:
-        """Wait for the process to end, and return its exit code; None where it goes on."""
+        """Wait for the process to end and return its exit code; None if it continues."""
         try:
             return self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             return None
 
     def close(self) -> str:
-        """End whatever still runs; return the last words on its terminal."""
+        """End all processes that still run; return the last output on the terminal."""
         with suppress(EngineError, OSError, AttributeError):
             self.client.close()
         self.process.kill()
@@ -223,7 +223,7 @@ class Laboratory:
 
 
 def stop_by_command(level: str) -> Callable[[Laboratory], int]:
-    """Type `vibench stop`, and return its exit code."""
+    """Return a function that runs `vibench stop` and returns its exit code."""
 
     def stop(_: Laboratory) -> int:
         command = [VIBENCH, "stop", "--level", level, "--reason", "witness"]
@@ -236,12 +236,12 @@ def stop_by_command(level: str) -> Callable[[Laboratory], int]:
 
 
 def send(number: int) -> Callable[[Laboratory], None]:
-    """Send a signal to what drives."""
+    """Return a function that sends a signal to the driving process."""
     return lambda laboratory: os.kill(laboratory.engine.pid, number)
 
 
 def press_twice(laboratory: Laboratory) -> None:
-    """Press Ctrl-C, and again."""
+    """Press Ctrl-C twice."""
     laboratory.type(b"\x03")
     time.sleep(0.1)
     laboratory.type(b"\x03")
@@ -270,7 +270,7 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
         signal_name(number): (
             send(number), WITHIN_ABORT_S + (RAMP_S if number == signal.SIGINT else 0.0), SUBJECTS
         )
-        for number in sorted({*heeded_signals(), signal.SIGHUP})  # under nohup, too: the draw is the same
+        for number in sorted({*heeded_signals(), signal.SIGHUP})  # nohup must not change the draw
         if signal_name(number) in signal.Signals.__members__
     },
 }  # fmt: skip
@@ -278,13 +278,13 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
 
 @contextmanager
 def limited(pid: int, what: int, most: int) -> Iterator[None]:
-    """Set a limit of a process."""
+    """Set a resource limit of a process."""
     resource.prlimit(pid, what, (most, resource.prlimit(pid, what)[1]))
     yield
 
 
 def exhausted(laboratory: Laboratory) -> Iterator[None]:
-    """Let the process have no more memory than it has."""
+    """Limit the memory of the process to its present size."""
     status = Path(f"/proc/{laboratory.engine.pid}/status").read_text()
     size_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmSize"))
     with limited(laboratory.engine.pid, resource.RLIMIT_AS, 1024 * size_kb):
@@ -292,14 +292,14 @@ def exhausted(laboratory: Laboratory) -> Iterator[None]:
 
 
 def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
-    """Let the process open nothing more."""
+    """Prevent the process from opening more files."""
     highest = max(int(each.name) for each in Path(f"/proc/{laboratory.engine.pid}/fd").iterdir())
     with limited(laboratory.engine.pid, resource.RLIMIT_NOFILE, highest + 1):
         yield
 
 
 def disk_full(laboratory: Laboratory) -> Iterator[None]:
-    """Every write to a file is refused."""
+    """Make every write to a file fail."""
     with limited(laboratory.engine.pid, resource.RLIMIT_FSIZE, 0):
         yield
 
@@ -311,7 +311,7 @@ def folder_gone(laboratory: Laboratory) -> Iterator[None]:
 
 
 def shimmed(condition: str) -> Callable[[Laboratory], Iterator[None]]:
-    """Begin a condition of the shim."""
+    """Return a function that starts a condition of the shim."""
 
     def make(laboratory: Laboratory) -> Iterator[None]:
         flag = Path(os.environ["SHIM_FOLDER"]) / f"{condition}.{laboratory.engine.pid}"
@@ -323,12 +323,12 @@ def shimmed(condition: str) -> Callable[[Laboratory], Iterator[None]]:
 
 
 def nothing(_: Laboratory) -> Iterator[None]:
-    """Leave everything as it is."""
+    """Change nothing."""
     yield
 
 
 def both_cores_busy(_: Laboratory) -> Iterator[None]:
-    """Let as many programs calculate as there are cores."""
+    """Run one busy program per core."""
     with busy(_):  # type: ignore[arg-type]  # it looks at none of the laboratory
         yield
 
@@ -348,7 +348,7 @@ DEAD_STATES = tuple(each for each in STATES if each != "held")
 
 
 def bound_s(cell: Cell, load: float) -> float:
-    """Return within what time the terminal must be silent [s]."""
+    """Return the time within which the output must be silent [s]."""
     within_s = CAUSES[cell.cause][1]
     if cell.condition == "memory exhausted":
         within_s += STANDSTILL_S
@@ -356,7 +356,7 @@ def bound_s(cell: Cell, load: float) -> float:
 
 
 def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
-    """Carry out one cell."""
+    """Run one cell and return its result."""
     happen, _, _ = CAUSES[cell.cause]
     exits: dict[str, int | None] = {}
     load = os.getloadavg()[0]
@@ -376,7 +376,7 @@ def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
 
 
 def killed(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
-    """Kill what drives, where the drive ends by itself."""
+    """Kill the driving process; with a dead man's switch, the drive must end by itself."""
     load = os.getloadavg()[0]
     laboratory.start(cell.subject)
     laboratory.run_into(cell.state, after_s)
@@ -387,7 +387,7 @@ def killed(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
 
 
 def stop_cells() -> list[Cell]:
-    """List every stop that there is."""
+    """Return all cells of stops."""
     return [
         Cell(subject, cause, condition, state)
         for (cause, (_, _, subjects)), condition, state in product(CAUSES.items(), CONDITIONS, STATES)
@@ -396,12 +396,12 @@ def stop_cells() -> list[Cell]:
 
 
 def kill_cells() -> list[Cell]:
-    """List the kills of every state that may have a dead man, many times over: the moment is drawn anew."""
+    """Return 20 kills for every state with a dead man's switch, each at another random moment."""
     return [Cell(subject, "SIGKILL", "idle", state) for subject in SUBJECTS for state in DEAD_STATES] * 20
 
 
 def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
-    """Be the process that drives: `vibench measure`, the window, or another one that attends an engine."""
+    """Run as the driving process: `vibench measure`, the window, or a program that attends an engine."""
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     rig = Rig.model_validate_json(Path(rig_path).read_text())
     campaign = Path(folder).with_suffix(".toml")
@@ -430,7 +430,7 @@ def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
 
 
 def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
-    """Let the window open, arm and start, and stay until it is killed."""
+    """Open the window, arm and start the campaign, and wait until killed."""
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
     from PySide6.QtCore import QTimer  # noqa: PLC0415 - of this subject only
 
@@ -459,7 +459,7 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
 
 
 def compiled_shim(folder: Path) -> Path | None:
-    """Compile the shim; None where there is no compiler."""
+    """Compile the shim; return None without a compiler."""
     compiler, shim = shutil.which("cc"), folder / "shim.so"
     if compiler is None:
         return None
@@ -468,7 +468,7 @@ def compiled_shim(folder: Path) -> Path | None:
 
 
 def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
-    """Measure the cells of a shard that no line of the file holds yet."""
+    """Measure the cells of a shard that are not in the file yet."""
     number, count = (int(each) for each in options.shard.split("/"))
     chooser = random.Random(options.seed)
     cells = kill_cells() if options.dead_man else stop_cells()
@@ -481,10 +481,10 @@ def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
         if at % count != number - 1 or at in done:
             continue
         found, said = None, ""
-        for attempt in range(3):  # on a crowded computer a run may fail its check, or a state pass unseen
+        for attempt in range(3):  # on a busy computer a check may fail, or a state may be missed
             place = folder / f"{at}-{attempt}"
             place.mkdir()
-            # A new rig each time: a client that was killed leaves its task behind in the old one.
+            # A new rig each time, because a killed client leaves its task in the old one.
             with VirtualRig(wall_rig()) as virtual:
                 laboratory = Laboratory(virtual, place, DEAD_MAN_S if options.dead_man else None)
                 try:
@@ -514,7 +514,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def summed(paths: list[Path]) -> bool:
-    """Print how many stops were silent in time, and the worst of each cause; says whether all held."""
+    """Print how many stops were silent in time, and the worst of each cause; return whether all were."""
     found = [json.loads(line) for path in paths for line in _lines(path)]
     keys = ("took_s", "within_s", "exits", "load")
     for each in found:
@@ -535,7 +535,7 @@ def summed(paths: list[Path]) -> bool:
 
 
 def main() -> None:
-    """Measure, and tell by the exit code whether every stop was silent in time."""
+    """Measure, and exit with code 0 if every stop was silent in time."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=300)

@@ -1,14 +1,14 @@
-"""Subharmonic motions of the paper's specimen and its kin: where they are stable, and how their phase goes.
+"""Stability and phase of subharmonic motions of the paper's specimen and similar specimens.
 
     python benchmarks/subharmonics.py [--laws stops p3] [--levels 1e-6 2e-6] [--starts 12] [--seed 1]
 
-For each contact law, level of the base and period of two and three drives: motions of that period are looked
-for from random starts over a band around so many times the first mode, and each branch is followed along
-frequency. Printed is, over its stable points: frequencies, amplitude of m0 at the subharmonic, and the phase
-for which a phase-locked loop would have to aim: as many times the subharmonic's as the motion has drives,
-less the base's. A quarter of a period behind for three drives (three eighths for two) is what Volvert and
-Kerschen (J. Sound Vib. 511, 2021) call phase resonance. A loop needs a stable point there, and a phase that
-falls as the frequency rises.
+For each contact law, level of the base and period of two and three drive periods, motions of that period are
+searched for. Random starts cover a band around two or three times the first mode, and each branch is followed
+along frequency. For the stable parts, the script prints frequencies, amplitude of m0 at the subharmonic, and
+the phase for a phase-locked loop. This phase is that of the subharmonic, times the number of drive periods,
+less that of the base. A quarter of a period behind for three drives (three eighths for two) is what Volvert
+and Kerschen (J. Sound Vib. 511, 2021) call phase resonance. A loop needs a stable point there, and a phase
+that falls as the frequency rises.
 """
 
 import argparse
@@ -29,14 +29,14 @@ LAWS = {
     "p5": ("gong2025", "power:5"),
     "bumpers": ("asymmetric", "linear_gap:100"),
 }
-"""Specimen and contact law of each."""
+"""Specimen and contact law by name."""
 SAMPLES = 128
 LEAST_M = 1e-8
-"""A smaller subharmonic is none: the motion repeats sooner."""
+"""Smallest amplitude that counts as a subharmonic [m]; below, the motion has a shorter period."""
 
 
 def subharmonic(specimen: Specimen, drive: Harmonic, state: np.ndarray, periods: int) -> tuple[float, float]:
-    """Give amplitude [m] and phase [degrees] of m0 at the drive's frequency over ``periods``."""
+    """Return amplitude [m] and phase [degrees] of m0 at the drive frequency divided by ``periods``."""
     rate_hz = SAMPLES * drive.frequency_hz
     run = integrate(
         specimen, drive, periods / drive.frequency_hz, Accuracy.STANDARD, state, sample_rate_hz=rate_hz
@@ -48,13 +48,13 @@ def subharmonic(specimen: Specimen, drive: Harmonic, state: np.ndarray, periods:
 
 
 def stable_stretches(branch: Branch) -> Iterator[slice]:
-    """Give the stretches of a branch on which its motions are stable."""
+    """Yield the parts of a branch with stable motions."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], branch.is_stable.astype(int), [0]])))
     yield from (slice(first, end) for first, end in zip(edges[::2], edges[1::2], strict=True))
 
 
 def describe(specimen: Specimen, level_m: float, periods: int, search: MotionSearch) -> Iterator[str]:
-    """Say what is found at a level, a stretch of stable motions a row."""
+    """Yield one line for each stable part of the branches at a level."""
     path = FrequencyPath((level_m,))
     for found in shot_branches(specimen, path, *BANDS_HZ[periods], search):
         if found.periods != periods:
@@ -83,7 +83,7 @@ def describe(specimen: Specimen, level_m: float, periods: int, search: MotionSea
 
 
 def main() -> None:
-    """Print every stretch of stable subharmonic motions."""
+    """Print every stable part of all branches of subharmonic motions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--starts", type=int, default=12, help="random starts at each of 9 frequencies")
     parser.add_argument("--seed", type=int, default=1)

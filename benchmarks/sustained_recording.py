@@ -2,8 +2,8 @@
 
     python benchmarks/sustained_recording.py [MINUTES]
 
-Prints the real-time factor (seconds of signal per second of wall time), processor time per second of signal,
-and memory after each minute; everything runs in one process, the simulated instruments included.
+The script prints the real-time factor (seconds of signal per second of wall time), processor time per second
+of signal, and memory after each minute. Everything runs in one process, including the simulated instruments.
 """
 
 import resource
@@ -21,7 +21,7 @@ MINUTE_S = 60.0
 
 
 def resident_mb() -> float:
-    """Memory that the process holds now, where the system tells it; else its peak [MB]."""
+    """Return the present memory of the process if the system reports it, otherwise its peak [MB]."""
     try:
         for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
             if line.startswith("VmRSS:"):
@@ -32,7 +32,7 @@ def resident_mb() -> float:
 
 
 def sustained(minutes: float, folder: Path) -> list[float]:
-    """Record a colliding dwell; give the memory at the end of each minute [MB]."""
+    """Record a dwell with impacts; return the memory at the end of each minute [MB]."""
     memory_mb: list[float] = []
 
     def watch(progress: Progress) -> None:
@@ -48,7 +48,7 @@ def sustained(minutes: float, folder: Path) -> list[float]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Record, and print speed and memory."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)

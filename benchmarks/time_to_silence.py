@@ -1,14 +1,14 @@
-"""How long until the generator's terminal is silent, for each cause, state of a run and condition?
+"""Measure the time until the generator's output is silent, for each cause, state of a run and condition.
 
     python benchmarks/time_to_silence.py [--cells SHARE] [--seed N]
     python benchmarks/time_to_silence.py --tries 10000 --commands 200
 
-This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
-terminal that notes when it was last loud. The engine is a process of its own, which reaches it as it reaches
-real instruments. A cell of the table is one run: it is brought into a state, the condition is made, the cause
-happens, and the witness waits for silence. Counted is from the cause, or from the engine's continuation where
-it stood still. ``--cells 0.1`` measures a tenth of the cells, drawn with the seed. The second form counts how
-often an engine that lives was not found, through the client and through the command. Linux only.
+This process runs the virtual rig in real time, and a witness that records when the generator's output was
+last loud. The engine is a separate process, which reaches the rig as it reaches real instruments. A cell of
+the table is one run. It is brought into a state, the condition is created, the cause happens, and the witness
+waits for silence. Time counts from the cause, or from the engine's continuation if it was suspended.
+``--cells 0.1`` measures a tenth of the cells, drawn with the seed. The second form counts how often a living
+engine was not found, through the client and through the command. Linux only.
 """
 
 import argparse
@@ -51,7 +51,7 @@ from vibench.virtual_rig import VirtualRig
 RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
 BUSY = "while True: sum(i * i for i in range(100_000))"
 LOUD_V = 5e-3
-"""At the terminal; the dwell has 0.75 V."""
+"""Voltage above which the output counts as loud [V]; the dwell has 0.75 V."""
 SILENT_FOR_S = 0.4
 PATIENCE_S = 30.0
 ATTEMPTS = 5
@@ -76,7 +76,7 @@ STATES = ("checking", "ramping_up", "settling", "recording", "held", "ramping_do
 
 
 class Witness:
-    """Looks at what the generator's terminal gives, as it is rendered, and notes when it was last loud."""
+    """Observer of the generator's rendered output that records when it was last loud."""
 
     def __init__(self, virtual: VirtualRig) -> None:
         self._render = virtual.generator.render
@@ -92,7 +92,7 @@ class Witness:
         return volts
 
     def silent_since_s(self) -> float:
-        """Wait until it has been silent for a while; returns the moment at which that began."""
+        """Wait until the output has been silent for a while; return the time at which the silence began."""
         give_up_s = time.monotonic() + PATIENCE_S
         while self.last_look_s - self.last_loud_s < SILENT_FOR_S:
             if time.monotonic() > give_up_s:
@@ -102,7 +102,7 @@ class Witness:
 
 
 class Laboratory:
-    """A rig, its witness, and an engine that is there whenever it is needed."""
+    """A virtual rig with its witness, and an engine that is started when needed."""
 
     def __init__(self, virtual: VirtualRig, folder: Path) -> None:
         self.virtual = virtual
@@ -122,12 +122,12 @@ class Laboratory:
 
     @property
     def pid(self) -> int:
-        """The engine's process."""
+        """Process id of the engine."""
         assert self.engine is not None
         return self.engine.pid
 
     def ready(self) -> None:
-        """Have an engine with an open bench, a new one if need be."""
+        """Provide an engine with an open bench; start a new one if necessary."""
         if self.engine is not None and not self.engine.is_alive:
             self.close()
         if self.engine is None:
@@ -143,7 +143,7 @@ class Laboratory:
         self.until(lambda: self.client.status().state is EngineState.READY, "an open bench")
 
     def run_into(self, state: str) -> None:
-        """Begin a recording and wait for a state of it; on a crowded computer one may fail its check."""
+        """Start a recording and wait for a state; repeat, because a check may fail on a busy computer."""
         for _ in range(ATTEMPTS):
             self._begin()
             first = "recording" if state in ("held", "ramping_down") else state
@@ -160,7 +160,7 @@ class Laboratory:
         self.until(lambda: self.run_state() == state, state)
 
     def has_ended(self) -> bool:
-        """Whether nothing runs any more."""
+        """Return whether the run has ended."""
         return self.client.status().state is EngineState.READY
 
     def _begin(self) -> None:
@@ -174,16 +174,16 @@ class Laboratory:
         self.client.start()
 
     def run_state(self) -> str:
-        """Where the run stands."""
+        """Return the state of the run; empty without a run."""
         run = self.client.status().run
         return "" if run is None else run.run_state.value
 
     def is_loud(self) -> bool:
-        """Whether anything was at the terminal a moment ago."""
+        """Return whether the output was loud within the last 0.1 s."""
         return time.monotonic() - self.witness.last_loud_s < 0.1
 
     def until(self, is_so: Callable[[], bool], what: str) -> None:
-        """Wait, or end the program."""
+        """Wait for a condition; exit with an error if it takes too long."""
         give_up_s = time.monotonic() + PATIENCE_S
         while not is_so():
             if time.monotonic() > give_up_s:
@@ -191,7 +191,7 @@ class Laboratory:
             time.sleep(0.005)
 
     def forget_viewer(self) -> None:
-        """Attend no more."""
+        """Stop attending the engine."""
         attendant, self._attendant = self._attendant, None
         if attendant is not None:
             attendant.close()
@@ -211,14 +211,14 @@ class Laboratory:
 
 @dataclass(frozen=True)
 class Cause:
-    """What ends a run, and within what time the terminal is silent by what docs/safety.md states [s]."""
+    """Cause of a stop, and the time to silence that docs/safety.md states [s]."""
 
     happen: Callable[[Laboratory], None]
     within_s: float
 
 
 def stop_by_command(level: StopLevel) -> Callable[[Laboratory], None]:
-    """Stop as the command does."""
+    """Return a function that stops the engine as the command does."""
 
     def stop(laboratory: Laboratory) -> None:
         assert stop_engine(the_engine(laboratory.pid), level, "measured") in StopDelivery
@@ -227,17 +227,17 @@ def stop_by_command(level: StopLevel) -> Callable[[Laboratory], None]:
 
 
 def refuse_writing(laboratory: Laboratory) -> None:
-    """Let the engine's disk take nothing more."""
+    """Make every write of the engine to a file fail."""
     resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
 
 
 def lose_samples(laboratory: Laboratory) -> None:
-    """Let the converter's buffer run over."""
+    """Cause an overrun of the converter's buffer."""
     laboratory.virtual.faults.overrun()
 
 
 MARGIN_S = 1.0
-"""Commands over the cable, the watchdog's round, and a computer that has other things to do."""
+"""Margin for commands over the cable, the watchdog's interval, and a busy computer [s]."""
 CAUSES = {
     "stop --level ramp": Cause(stop_by_command(StopLevel.RAMP), BLOCK_S + RAMP_S + MARGIN_S),
     "stop --level abort": Cause(stop_by_command(StopLevel.ABORT), BLOCK_S + ABORT_S + MARGIN_S),
@@ -245,7 +245,7 @@ CAUSES = {
     "viewer gone": Cause(Laboratory.forget_viewer, 0.55 + BLOCK_S + ABORT_S + MARGIN_S),
     "limit passed": Cause(
         lambda laboratory: laboratory.virtual.faults.turn_amplifier_gain(40.0),
-        # Counted from the turn of the gain: while the drive rises, the limit is passed that much later.
+        # Counted from the change of gain; while the drive ramps up, the limit is passed later.
         RAMP_S + 2 * BLOCK_S + ABORT_S + MARGIN_S,
     ),
     "samples lost": Cause(lose_samples, BLOCK_S + MARGIN_S),
@@ -258,13 +258,13 @@ CAUSES = {
 
 @contextmanager
 def idle(_: Laboratory) -> Iterator[None]:
-    """Nothing."""
+    """Change nothing."""
     yield
 
 
 @contextmanager
 def busy(_: Laboratory) -> Iterator[None]:
-    """As many processes as there are cores calculate."""
+    """Run one busy process per core."""
     with ExitStack() as stack:
         for _ in range(os.cpu_count() or 1):
             process = subprocess.Popen([sys.executable, "-c", BUSY])
@@ -276,7 +276,7 @@ def busy(_: Laboratory) -> Iterator[None]:
 
 @contextmanager
 def connections(laboratory: Laboratory) -> Iterator[None]:
-    """Two thousand connections to the engine that say nothing."""
+    """Open two thousand connections to the engine that send nothing."""
     assert laboratory.engine is not None
     address = laboratory.engine.address
     with ExitStack() as stack:
@@ -289,7 +289,7 @@ def connections(laboratory: Laboratory) -> Iterator[None]:
 
 @contextmanager
 def limited(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
-    """Set a limit of the engine's process, and take it back."""
+    """Set a resource limit of the engine's process, and restore it at the end."""
     pid = laboratory.pid
     before = resource.prlimit(pid, what)
     resource.prlimit(pid, what, (most, before[1]))
@@ -302,7 +302,7 @@ def limited(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
 
 @contextmanager
 def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
-    """Let the engine open nothing more."""
+    """Prevent the engine from opening more files."""
     highest = max(int(each.name) for each in Path(f"/proc/{laboratory.pid}/fd").iterdir())
     with limited(laboratory, resource.RLIMIT_NOFILE, highest + 1):
         yield
@@ -310,14 +310,14 @@ def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
 
 @contextmanager
 def disk_full(laboratory: Laboratory) -> Iterator[None]:
-    """Every write to a file is refused."""
+    """Make every write to a file fail."""
     with limited(laboratory, resource.RLIMIT_FSIZE, 0):
         yield
 
 
 @contextmanager
 def stalled(laboratory: Laboratory) -> Iterator[None]:
-    """Let the engine stand still for a second, and go on."""
+    """Suspend the engine for a second, then continue it."""
     os.kill(laboratory.pid, signal.SIGSTOP)
     begun_s = time.monotonic()
     try:
@@ -338,7 +338,7 @@ CONDITIONS = {
 
 
 def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> float:
-    """Time to silence of one cell [s]."""
+    """Run one cell and return its time to silence [s]."""
     laboratory.ready()
     before = resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE)
     with ExitStack() as stack:
@@ -364,7 +364,7 @@ def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> 
 
 
 def table(laboratory: Laboratory, share: float, seed: int) -> bool:
-    """Measure cells in a random order, print the worst of each cause and condition; says whether all held."""
+    """Measure cells in random order, print the worst times; return whether all were within the bounds."""
     cells = list(product(CAUSES, STATES, CONDITIONS))
     random.Random(seed).shuffle(cells)
     cells = cells[: max(1, round(share * len(cells)))]
@@ -384,11 +384,11 @@ def table(laboratory: Laboratory, share: float, seed: int) -> bool:
 
 
 def tried(laboratory: Laboratory, tries: int, commands: int) -> bool:
-    """Look for a living engine again and again under each condition, and count how often it was not found."""
+    """Count how often a living engine is not found under each condition; return whether it always was."""
     missed = 0
     for condition, make in CONDITIONS.items():
         laboratory.ready()
-        # Each stop of one that stands still takes its patience: there are fewer of those.
+        # A stop of a suspended engine waits for a timeout, so make fewer of these.
         count, most = tries // len(CONDITIONS), commands // len(CONDITIONS) + 1
         delivered: dict[str, int] = {}
         began_s = time.monotonic()
@@ -415,7 +415,7 @@ def tried(laboratory: Laboratory, tries: int, commands: int) -> bool:
 
 
 def wall_rig() -> Rig:
-    """Put the shipped rig on the wall's clock, with a world that leaves the cores to the conditions."""
+    """Return the shipped rig in real time, at low rates that leave the processor to the conditions."""
     rig = load_rig(RIG)
     assert rig.virtual is not None
     virtual = rig.virtual.model_copy(update={"pace": "wall", "grid_rate_hz": 25_600.0})
@@ -424,7 +424,7 @@ def wall_rig() -> Rig:
 
 
 def main() -> None:
-    """Measure, and tell by the exit code whether every bound held."""
+    """Measure, and exit with code 0 if every time was within its bound."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--cells", type=float, default=1.0, help="share of the table")
     parser.add_argument("--seed", type=int, default=1)

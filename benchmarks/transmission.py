@@ -1,7 +1,8 @@
 """Speed and memory of the averaged spectra against scipy on the whole array.
 
-Run as ``python benchmarks/transmission.py [MINUTES]``. Each contestant runs in a process of its own, so that
-its peak memory is its own; the recording (4 channels at 51.2 kS/s) lies in a file, as it does in the lab.
+Run as ``python benchmarks/transmission.py [MINUTES]``. Each of the two programs runs in a separate process,
+so that its peak memory can be measured. The recording (4 channels at 51.2 kS/s) is in a file, as in the
+laboratory.
 """
 
 import multiprocessing
@@ -25,12 +26,12 @@ KILOBYTES = 1 << 10
 
 
 def channel_file(folder, channel):
-    """Where one channel lies."""
+    """Return the path of the file of one channel."""
     return folder / f"channel{channel}.f64"
 
 
 def write_recording(folder, samples):
-    """Write noise, one file a channel."""
+    """Write noise, one file per channel."""
     rng = np.random.default_rng(1)
     for channel in range(CHANNELS):
         with channel_file(folder, channel).open("wb") as file:
@@ -52,7 +53,7 @@ def ours(folder, samples):
 
 
 def theirs(folder, _samples):
-    """Average the same ten by scipy, on the whole arrays in memory."""
+    """Average the same ten spectra with scipy, on the whole arrays in memory."""
     record = [np.fromfile(channel_file(folder, channel), np.float64) for channel in range(CHANNELS)]
     settings = {"fs": RATE_HZ, "nperseg": SEGMENT, "detrend": False}
     result = None
@@ -65,7 +66,7 @@ def theirs(folder, _samples):
 
 
 def measured(contestant, folder, samples, pipe):
-    """Run one contestant and send its time, its peak memory and its result."""
+    """Run one program and send its time, peak memory and result."""
     idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     begin = time.perf_counter()
     result = contestant(folder, samples)
@@ -75,7 +76,7 @@ def measured(contestant, folder, samples, pipe):
 
 
 def run(contestant, folder, samples):
-    """Give a contestant a process of its own."""
+    """Run one program in a new process and return what it sends."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=measured, args=(contestant, folder, samples, sender))
@@ -86,7 +87,7 @@ def run(contestant, folder, samples):
 
 
 def main():
-    """Compare and print."""
+    """Run both programs and print time, memory and agreement."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
     samples = int(minutes * 60 * RATE_HZ)
     with tempfile.TemporaryDirectory() as name:

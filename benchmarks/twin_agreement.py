@@ -1,4 +1,4 @@
-"""Whether measurements are draws of their twins: ranks over seeds of one rig, z on random rigs and levels.
+"""Test whether measurements agree with their twins: ranks over seeds of one rig, z on random rigs.
 
     python benchmarks/twin_agreement.py --ranks 20           # one chaotic dwell, 20 seeds of the rig's noise
     python benchmarks/twin_agreement.py --rigs 10 --seed 3   # other rigs, levels, frequencies: dwells, noise
@@ -7,9 +7,9 @@
     python benchmarks/twin_agreement.py --wrong 1            # the same under four wrong specimens
     python benchmarks/twin_agreement.py --stop 200           # verdicts of 16 draws and of fewer
 
-Every measurement is made on the virtual rig with another seed of its noise, and analysed with 19 draws. Of an
-agreeing twin every rank is as likely as any other, and one set of values in a hundred lies outside its limit.
-With --sweeps, draws take the place of the measurement too, each against 16 of the others, in 400 choices.
+Every measurement is made on the virtual rig with another noise seed, and analysed with 19 draws. If the twin
+agrees, all ranks are equally likely, and one set of values in a hundred is outside its limit. With --sweeps,
+draws also replace the measurement, each against 16 of the others, in 400 choices.
 """
 
 import argparse
@@ -36,12 +36,12 @@ RIG = load_rig(Path(__file__).parents[1] / "hardware_configs" / "virtual_rig.tom
 DRAWS = 19
 DRAWS_OF_SWEEPS = 24
 BINS = 5
-"""Of the ranks: 20 seeds fill four to a bin."""
+"""Number of bins of the ranks; 20 seeds give four ranks per bin."""
 
 
 @dataclass(frozen=True)
 class Compared:
-    """One quantity of one measurement."""
+    """Comparison of one quantity of one measurement with its draws."""
 
     scene: str
     quantity: str
@@ -50,7 +50,7 @@ class Compared:
     largest_z: float
     limit_z: float
     rank: int | None
-    """Of single values, among the draws."""
+    """Rank of a single value among the draws."""
     draws: int
 
 
@@ -86,19 +86,19 @@ def compared(
 
 
 def seeded(rig: Rig, seed: int) -> Rig:
-    """Give the same rig with other noise."""
+    """Return the same rig with another noise seed."""
     return rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"seed": seed})})
 
 
 def same_dwell(first_seed: int, seeds: int) -> Iterator[Compared]:
-    """Repeat one chaotic dwell."""
+    """Yield the comparisons of one chaotic dwell, repeated with other noise."""
     plan = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.5, duration_s=4.0)
     for seed in range(first_seed, first_seed + seeds):
         yield from compared(seeded(RIG, seed), plan, f"seed {seed}")
 
 
 def random_rig(rng: np.random.Generator) -> tuple[Rig, str]:
-    """Draw another specimen on another shaker."""
+    """Return a rig with a random specimen and shaker, and its description."""
     gap_m, damping_s = float(rng.uniform(25e-6, 80e-6)), float(10 ** rng.uniform(-4.9, -4.4))
     shaker = RIG.shaker.model_copy(
         update={
@@ -120,7 +120,7 @@ def random_rig(rng: np.random.Generator) -> tuple[Rig, str]:
 
 
 def random_scenes(count: int, seed: int) -> Iterator[Compared]:
-    """Measure a dwell and noise on each of so many random rigs."""
+    """Measure a dwell and noise on each of ``count`` random rigs."""
     rng = np.random.default_rng(seed)
     for number in range(count):
         rig, words = random_rig(rng)
@@ -143,7 +143,7 @@ def random_scenes(count: int, seed: int) -> Iterator[Compared]:
 
 
 def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSweep]:
-    """Give a sweep of 200 intervals, at half the usual rate of samples."""
+    """Return a rig with half the usual sample rate, and a sweep of 200 intervals."""
     daq = rig.daq.model_copy(update={"sample_rate_hz": 25_600.0})
     return rig.model_copy(update={"daq": daq}), SineSweep(
         amplitude_vpp=level_vpp, start_hz=start_hz, stop_hz=start_hz + 20, duration_s=20, hold="displacement"
@@ -151,7 +151,7 @@ def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSwee
 
 
 def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> Iterator[Compared]:
-    """Measure sweeps of the shipped rig and of random ones in turn."""
+    """Measure sweeps of the shipped rig and of random rigs in turn."""
     for number in range(seed, seed + count):
         rng = np.random.default_rng(number)
         rig, words = (seeded(RIG, number), "shipped rig") if number % 2 else random_rig(rng)
@@ -163,7 +163,7 @@ def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> I
 
 
 def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
-    """Compare sweeps with specimens that are a few bounds of a fit off."""
+    """Compare sweeps with specimens that are wrong by a few bounds of a fit."""
     true = gong2025()
     m0, m1, m2 = true.masses
     wrong = {
@@ -181,7 +181,7 @@ def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
 def false_alarms(
     curves: dict[str, list[np.ndarray]], draws: int = 16, choices: int = 400
 ) -> dict[str, object]:
-    """Take draws as measurements: sweeps laid end to end, their draws in random order each time."""
+    """Return the rates of false alarms when draws replace measurements, over random choices."""
     rng, found = np.random.default_rng(0), {}
     for name, sets in curves.items():
         rows = []
@@ -202,7 +202,7 @@ def false_alarms(
 
 
 def stopped_early(trials: int, seed: int) -> Iterator[dict[str, object]]:
-    """Compare the verdicts of 16 draws with those of the first that agree clearly, on synthetic values."""
+    """Compare verdicts of 16 draws with those of an early stop at clear agreement, on synthetic values."""
     rng = np.random.default_rng(seed)
     tails = {
         "normal": rng.standard_normal,
@@ -232,7 +232,7 @@ def stopped_early(trials: int, seed: int) -> Iterator[dict[str, object]]:
 
 
 def summary(found: list[Compared]) -> dict[str, object]:
-    """Count what lies outside, and test the ranks."""
+    """Return the number of quantities outside their limits, and a test of the ranks."""
     with_values = [each for each in found if each.compared]
     outside = sum(each.outside > 0 for each in with_values)
     places = [(each.rank + 0.5) / (each.draws + 1) for each in with_values if each.rank is not None]
@@ -247,7 +247,7 @@ def summary(found: list[Compared]) -> dict[str, object]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the requested comparisons and print them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--ranks", type=int, default=0, metavar="SEEDS")
     parser.add_argument("--first-seed", type=int, default=1000, help="of the ranks")

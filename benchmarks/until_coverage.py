@@ -1,4 +1,4 @@
-"""How often bounds hold where a recording ends by them, and what such an end saves.
+"""Test how often bounds contain the truth when recordings end by them, and how much time this saves.
 
     python benchmarks/until_coverage.py --rule                           # the rule alone, on Gaussian records
     python benchmarks/until_coverage.py --count 60 --seed 1 --shard 1/2 --save part1.json
@@ -7,10 +7,10 @@
 
 The virtual rig makes one recording of each scene at its longest time, in simulated time and with noisier
 sensors. The rule of `vibench.acquisition.run.until` is then applied to its beginning, at the times of the
-looks and with the analysis that runs beside a measurement: each recording ends where one would whose
-analysis takes no time. Wishes are those that the description of the rig promises after several times.
-Linear motion of random rigs is compared with closed forms. The paper's specimen in chaos is compared with
-the mean of the other records, whose scatter widens the bound. A shard that was ended goes on from its file.
+looks and with the analysis that runs during a measurement. Thus each recording ends as if the analysis took
+no time. The requested uncertainties are those predicted from the description of the rig for several times.
+Linear motion of random rigs is compared with closed forms. The paper's specimen in chaos is compared with the
+mean of the other recordings, whose scatter widens the bound. A shard that was ended continues from its file.
 """
 
 import argparse
@@ -60,15 +60,15 @@ LONGEST_S = 32.0
 PIECE_S = 0.5
 WEAK_VPP = 0.03
 SHARES = (0.1, 0.3, 0.5, 0.7)
-"""Where in the time from the first look to the longest a wish is promised, of its logarithm."""
+"""Positions between first look and longest time, on a logarithmic scale, for which requests are chosen."""
 NOISIER = (10.0, 100.0)
-"""Factor on the noise of the sensors."""
+"""Range of the factor on the noise of the sensors."""
 FARTHEST_HZ = 5.0
 
 
 @dataclass(frozen=True)
 class Ended:
-    """One quantity of one recording, ended by one wish."""
+    """One quantity of one recording that was ended by one requested uncertainty."""
 
     scene: int
     kind: str
@@ -78,17 +78,17 @@ class Ended:
     stopped_s: float
     longest_s: float
     expected_s: float | None
-    """Predicted before, as `vibench measure --estimate` does; None where it is not known."""
+    """Time predicted as by `vibench measure --estimate` [s]; None if it is not known."""
     value: float
     bound: float
-    """Relative, of 95 %, at the end."""
+    """Relative 95 % bound at the end."""
     whole: float
-    """Value of the whole record."""
+    """Value of the whole recording."""
     true: float | None
 
 
 def looks_s(first_s: float, longest_s: float, piece_s: float) -> list[float]:
-    """Give the times of looks, as `UntilWatch` chooses them."""
+    """Return the times of the looks, as `UntilWatch` chooses them [s]."""
     due_s, found = first_s, []
     for number in range(1, round(longest_s / piece_s) + 1):
         if number * piece_s >= due_s * (1 - 1e-9):
@@ -99,7 +99,7 @@ def looks_s(first_s: float, longest_s: float, piece_s: float) -> list[float]:
 
 
 def drawn(number: int, seed: int) -> tuple[str, Rig, Measurement]:
-    """Draw a kind, a rig with noisier sensors, and a plan."""
+    """Return a kind, a random rig with noisier sensors, and a plan."""
     rng = np.random.default_rng((seed, number))
     kind = KINDS[number % len(KINDS)]
     rig, _ = random_rig(rng) if kind != "chaos" else (load_rig(VIRTUAL), "")
@@ -124,7 +124,7 @@ def drawn(number: int, seed: int) -> tuple[str, Rig, Measurement]:
 
 
 def true_value(rig: Rig, plan: Measurement, quantity: str) -> float | None:
-    """Give what linear motion has in closed form; None where no mode is near."""
+    """Return the closed-form value of linear motion; None if no mode is near."""
     specimen = specimen_of(rig)
     if isinstance(plan.excitation, Dwell):
         played_hz = plan.excitation.frequency_hz * (1 + 1e-6 * rig.virtual.generator_clock_ppm)
@@ -141,12 +141,12 @@ def record(rig: Rig, plan: Measurement, path: Path) -> None:
     """Record a plan at its longest time."""
     with open_bench(rig) as bench:
         outcome = run_measurement(bench, plan.model_copy(update={"until": None}), path)
-    if outcome.state is not RunState.FINISHED:  # a signal ends the recording softly; keep nothing of it
+    if outcome.state is not RunState.FINISHED:  # stopped by a signal; do not use the recording
         raise SystemExit(outcome.reason)
 
 
 def scene(number: int, seed: int) -> Iterator[Ended]:
-    """Record once, and end that record by wishes of several sizes."""
+    """Record once, and end this recording by several requested uncertainties."""
     kind, rig, plan = drawn(number, seed)
     is_noise = kind == "noise"
     first_s, piece_s = (FEWEST_REALISATIONS * 1.0, 1.0) if is_noise else (plan.until.shortest_s, PIECE_S)
@@ -197,7 +197,7 @@ def scene(number: int, seed: int) -> Iterator[Ended]:
 
 
 def wishes(expected: tuple[Expected, ...], name: str, first_s: float) -> Iterator[float]:
-    """Give wishes that the description of the rig promises after several times."""
+    """Yield the uncertainties that are predicted for several times from the description of the rig."""
     mine = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
     scatter = max((each.scatter or 0.0 for each in mine), default=0.0)
     for share in SHARES if scatter else ():
@@ -206,7 +206,7 @@ def wishes(expected: tuple[Expected, ...], name: str, first_s: float) -> Iterato
 
 
 def table(found: list[Ended]) -> Iterator[str]:
-    """Count: coverage at the end, with and without widening, time against fixed plans, predictions."""
+    """Yield the table: coverage with and without widening, time saved, quality of predictions."""
     chaos = {each.scene: each.whole for each in found if each.kind == "chaos"}
     rows, times, ratios = defaultdict(list), defaultdict(dict), defaultdict(dict)
     for each in found:
@@ -244,10 +244,10 @@ def table(found: list[Ended]) -> Iterator[str]:
 
 
 def saving(found: list[Ended], row: tuple[str, str]) -> float:
-    """Give the time saved against a fixed plan long enough for 95 % of the records with wishes alike.
+    """Return the share of time saved against a fixed plan that suffices for 95 % of similar requests.
 
-    Wishes are alike that are promised after the same time; what such records need differs by noise and by
-    what the description of a rig does not tell.
+    Requests are similar if they are predicted to take the same time. The time that they really need depends
+    on noise and on properties that the description of a rig does not contain.
     """
     alike = defaultdict(dict)
     for each in found:
@@ -274,7 +274,7 @@ SYNTHETIC = {
 
 
 def synthetic_record(kind: str, rng: np.random.Generator) -> np.ndarray:
-    """Make drive, base and response, shape (3, samples), whose Response or resonance is known."""
+    """Return drive, base and response with a known Response or resonance, shape (3, samples)."""
     samples = round((LONGEST_S + 2.0) * SYNTHETIC_HZ)
     omega, time_s = 2 * np.pi * AT_HZ, np.arange(samples) / SYNTHETIC_HZ
     if kind == "streamed noise":
@@ -284,7 +284,7 @@ def synthetic_record(kind: str, rng: np.random.Generator) -> np.ndarray:
         return np.stack([drive, drive, response + 0.3 * np.std(response) * rng.standard_normal(samples)])
     wander = np.zeros(samples)
     if kind == "sine that wanders":
-        # Amplitude and phase that a motion without period has: correlated for some twentieth of a second.
+        # Let amplitude and phase vary as without a period, with a correlation time of about 0.05 s.
         white = rng.standard_normal((2, samples))
         smooth = lfilter([1.0], [1.0, -np.exp(-20.0 / SYNTHETIC_HZ)], white, axis=1)
         smooth *= 0.15 / np.std(smooth)
@@ -297,7 +297,7 @@ def synthetic_record(kind: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def synthetic_results(kind: str, record: np.ndarray, time_s: float) -> dict[str, tuple[float, float]]:
-    """Analyse the beginning of a record: value and relative standard uncertainty of each result."""
+    """Return value and relative standard uncertainty of each result from the beginning of a record."""
     if kind != "streamed noise":
         data = record[:, : round((time_s + 2.0) * SYNTHETIC_HZ)]
         found = dwell_response(*data, SYNTHETIC_HZ, near_hz=AT_HZ, window_s=time_s)
@@ -316,7 +316,7 @@ def synthetic_results(kind: str, record: np.ndarray, time_s: float) -> dict[str,
 
 
 def synthetic(number: int, seed: int) -> Iterator[Ended]:
-    """End one synthetic record by wishes that other records of its kind meet after several times."""
+    """End one synthetic record by uncertainties that other records of its kind reach after random times."""
     kind = tuple(SYNTHETIC)[number % len(SYNTHETIC)]
     first_s = 8.0 if kind == "streamed noise" else 2.0
     scatter = promised(kind)
@@ -350,7 +350,7 @@ def shown_peak() -> float:
 
 @cache
 def promised(kind: str) -> dict[str, float]:
-    """Return the scatter of whole records, from eight others: rms of their standard uncertainties."""
+    """Return the rms standard uncertainty of eight other whole records, by result."""
     found = defaultdict(list)
     for number in range(8):
         record = synthetic_record(kind, np.random.default_rng((99, number)))
@@ -360,7 +360,7 @@ def promised(kind: str) -> dict[str, float]:
 
 
 def rule(runs: int, seed: int) -> Iterator[str]:
-    """Give the coverage at the end of Gaussian records of ten parts, in the worst of all wishes."""
+    """Yield the worst coverage over all requested uncertainties, for Gaussian records of ten parts."""
     rng = np.random.default_rng(seed)
     lengths = [round(2 * LOOK_FACTOR**look) for look in range(9)]
     sd, mean = np.empty((runs, len(lengths))), np.empty((runs, len(lengths)))
@@ -383,7 +383,7 @@ def rule(runs: int, seed: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Run the requested scenes and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--count", type=int, default=4, help="recordings")
     parser.add_argument("--seed", type=int, default=1)

@@ -1,7 +1,7 @@
-"""How fast the virtual rig runs: rig seconds per second, four channels at 51.2 kS/s.
+"""Speed of the virtual rig in rig seconds per second, with four channels at 51.2 kS/s.
 
-Run ``python benchmarks/virtual_rig.py``. Each line is the best of three: the world alone (generator,
-amplifier, shaker, specimen, sensors, converter), and once more through real pyvisa and nidaqmx.
+Run ``python benchmarks/virtual_rig.py``. Each line is the best of three runs of the simulated world alone
+(generator, amplifier, shaker, specimen, sensors, converter). The last line is with real pyvisa and nidaqmx.
 """
 
 import time
@@ -32,7 +32,7 @@ LEVELS_VPP = {"linear": 0.05, "colliding": 1.5, "strongly colliding": 10.0}
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure the speed at every level and print it."""
     rig = load_rig(Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml")
     print(f"{'motion at 260 Hz':22}{'level':>10}{'impacts/s':>11}{'steps/s':>12}{'x real time':>13}")
     for motion, amplitude_vpp in LEVELS_VPP.items():
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def world_speed(rig: Rig, amplitude_vpp: float) -> tuple[float, float]:
-    """Rig seconds per second of the world alone, and impacts per rig second."""
+    """Return rig seconds per second of the simulated world alone, and impacts per rig second."""
     inputs = tuple(
         Input(f"{rig.daq.device}/{one.physical}", one.range_v, Coupling(one.coupling), one.iepe_current_a)
         for one in rig.daq.channels
@@ -53,14 +53,14 @@ def world_speed(rig: Rig, amplitude_vpp: float) -> tuple[float, float]:
     for command in sine(amplitude_vpp):
         generator.execute(command.encode())
     sampler = world.sample(inputs, RATE_HZ)
-    sampler.read(RATE_HZ)  # compiles, and lets the motion settle
+    sampler.read(RATE_HZ)  # loads all code, and lets the motion settle
     before = world.plant.impacts
     best = min(timed(lambda: sampler.read(BLOCK)) for _ in range(REPEATS))
     return SECONDS / best, (world.plant.impacts - before) / (REPEATS * SECONDS)
 
 
 def whole_chain_speed(rig: Rig, amplitude_vpp: float) -> float:
-    """Rig seconds per second seen by a program that reads with nidaqmx."""
+    """Return rig seconds per second for a program that reads with nidaqmx."""
     with ExitStack() as resources:
         virtual = resources.enter_context(VirtualRig(rig))
         manager = pyvisa.ResourceManager("@py")
@@ -82,12 +82,12 @@ def whole_chain_speed(rig: Rig, amplitude_vpp: float) -> float:
 
 
 def sine(amplitude_vpp: float) -> tuple[str, ...]:
-    """Commands of a sine at the paper's 260 Hz."""
+    """Return the commands for a sine at the paper's 260 Hz."""
     return ("OUTP1:IMP INF", "FUNC SIN", "FREQ 260", f"VOLT {amplitude_vpp}VPP", "OUTP1:STAT ON")
 
 
 def timed(read: Callable[[], object]) -> float:
-    """Seconds that it takes to read ``SECONDS`` of rig time, block by block."""
+    """Return the time to read ``SECONDS`` of rig time, block by block [s]."""
     begun = time.perf_counter()
     for _ in range(SECONDS * RATE_HZ // BLOCK):
         read()

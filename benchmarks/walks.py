@@ -1,9 +1,10 @@
-"""Count what three numbers pass through: ``python benchmarks/walks.py [predict] [measure] [analyse]``.
+"""Count the calls on three data paths: ``python benchmarks/walks.py [predict] [measure] [analyse]``.
 
-An amplitude from `vibench predict` to the call of the native engine, a block of samples from a campaign to
-the recording's writer, and a recording through `analyse`. Of each: the frames from the first function to the
-last, both counted, the first time that the last is called, and the files and folders of vibench whose
-functions are called meanwhile. Of `predict` also the files that are loaded, in all and by the command itself.
+The paths are an amplitude from `vibench predict` to the native engine, a block of samples from a campaign to
+the writer of the recording, and a recording through `analyse`. For each, the script counts the stack frames
+from the first to the last function, at the first call of the last. It also counts the files and folders of
+vibench with functions called meanwhile. For `predict`, it counts the files loaded, in all and by the command
+itself.
 """
 
 import argparse
@@ -72,12 +73,12 @@ settle_s = 0.5
 
 @dataclass(frozen=True)
 class Walk:
-    """What was passed through."""
+    """Functions and files on one data path."""
 
     frames: tuple[str, ...]
-    """From the first function to the last, ``file:function``."""
+    """Stack frames from the first function to the last, as ``file:function``."""
     files: tuple[str, ...]
-    """Whose functions were called while the first function ran."""
+    """Files with functions that were called while the first function ran."""
     loaded: tuple[str, ...]
     """Files of vibench that the process had imported at its end."""
 
@@ -88,9 +89,9 @@ class Walk:
 
 
 def walk(begin: str, end: str, *words: str) -> Walk:
-    """Run a command, and follow it from the function ``begin`` to the first call of ``end``.
+    """Run a command, and record the path from the function ``begin`` to the first call of ``end``.
 
-    Both are the ends of ``file:function``.
+    Both names are matched with the end of ``file:function``.
     """
     with tempfile.TemporaryDirectory() as folder:
         answer = Path(folder) / "answer.json"
@@ -101,17 +102,17 @@ def walk(begin: str, end: str, *words: str) -> Walk:
 
 
 def amplitude_to_engine() -> Walk:
-    """Follow `vibench predict` of one point to the call of the native engine."""
+    """Return the path of `vibench predict` for one point to the call of the native engine."""
     return walk("cli/predict.py:predict", "engine/library.py:Engine.run", *PREDICT)
 
 
 def files_of_a_start() -> set[str]:
-    """Files that any command loads: those that the version alone needs."""
+    """Return the files that every command loads, which are those that ``--version`` loads."""
     return set(walk("", "", "--version").loaded)
 
 
 def main() -> None:
-    """Follow the walks that are asked for, and print them."""
+    """Record and print the requested paths."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -140,7 +141,7 @@ def main() -> None:
 
 
 def tell(what: str, found: Walk) -> None:
-    """Print a walk."""
+    """Print one path."""
     print(f"{what}: {len(found.frames)} frames; {len(found.files)} files in {len(found.folders)} folders")
     for frame in found.frames:
         print(f"  {frame}")

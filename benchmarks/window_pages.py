@@ -1,9 +1,9 @@
-"""How long the window's own thread is busy on the Files, Compare and Simulate pages.
+"""Processor time of the window's thread on the Files, Compare and Simulate pages.
 
     python benchmarks/window_pages.py RECORDING.h5
 
-Processor time of the thread that draws, offscreen, 1400 x 900: what other processes of the machine do
-is not in it. The recording should be large: benchmarks/overview.py leaves one in the folder it is given.
+The times are processor time of the thread that draws, offscreen at 1400 x 900; other processes do not affect
+them. The recording should be large: benchmarks/overview.py leaves one in the folder that it is given.
 """
 
 import os
@@ -34,11 +34,11 @@ SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)
 TRIES = 7
 LOOKS = 20
-"""After the picture is there, for what was left for later."""
+"""Number of timer events after the picture is shown, for work that was deferred."""
 
 
 def main() -> None:
-    """Open, zoom, draw."""
+    """Measure all three pages."""
     application(["benchmark"])
     with tempfile.TemporaryDirectory() as folder:
         context = AppContext(Settings(Path(folder) / "window.ini"))
@@ -75,7 +75,7 @@ def files(context: AppContext, path: Path) -> None:
 
 
 def until(is_so: Callable[[], bool]) -> None:
-    """Let the window live until something is so."""
+    """Run the event loop until a condition is true."""
     loop = QEventLoop()
     timer = QTimer(interval=5)
     timer.timeout.connect(lambda: loop.quit() if is_so() else None)
@@ -84,13 +84,13 @@ def until(is_so: Callable[[], bool]) -> None:
 
 
 def zoom(page: FilesPage, starts_s: Iterator[float], span_s: float) -> None:
-    """Show the next stretch."""
+    """Show the next time range."""
     start_s = next(starts_s)
     page.time_histories.show_range(start_s, start_s + span_s)
 
 
 def compare(context: AppContext) -> None:
-    """Lay six curves of 4000 points over one another."""
+    """Overlay six curves of 4000 points."""
     page = ComparePage(context)
     page.resize(*SIZE)
     page.show()
@@ -113,7 +113,7 @@ def compare(context: AppContext) -> None:
 
 
 def simulate(context: AppContext) -> None:
-    """Draw a simulation of 2 x 500 points anew, as each tick of the clock does while it grows."""
+    """Redraw a simulation of 2 x 500 points, as every tick does while it grows."""
     page = SimulatePage(context)
     page.resize(*SIZE)
     page.show()
@@ -129,7 +129,7 @@ def simulate(context: AppContext) -> None:
 
 
 def report(name: str, act: Callable[[], object], tries: int = TRIES) -> None:
-    """Print how long an act and the drawing after it keep the thread busy."""
+    """Print how long an action and the drawing after it keep the thread busy."""
     if tries > 1:
         busy(act)
     taken = [busy(act) for _ in range(tries)]
@@ -137,7 +137,7 @@ def report(name: str, act: Callable[[], object], tries: int = TRIES) -> None:
 
 
 def busy(act: Callable[[], object]) -> float:
-    """Processor time of this thread, for an act and the events that follow from it [s]."""
+    """Return the processor time of this thread for an action and the resulting events [s]."""
     begun = time.thread_time()
     act()
     QApplication.processEvents()

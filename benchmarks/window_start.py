@@ -1,8 +1,8 @@
-"""How long a warm `vibench gui` takes from the command to the first painted window.
+"""Time from the command `vibench gui` to the first painted window, with files in the disk cache.
 
     python benchmarks/window_start.py [TIMES]
 
-Each start is a process of its own; the time runs from before the process exists until its window has been
+Each start is a separate process; the time runs from before the process exists until its window has been
 painted once. The first start, which may have to read everything from the disk, is not counted.
 """
 
@@ -33,7 +33,7 @@ print(time.time())
 
 
 def start_s(settings: Path) -> float:
-    """Start a window once; gives the time until it was painted [s]."""
+    """Start a window once; return the time until it was painted [s]."""
     environment = {
         "QT_QPA_PLATFORM": "offscreen",
         **os.environ,
@@ -52,7 +52,7 @@ def start_s(settings: Path) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Start the window repeatedly and print the times."""
     times = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     with tempfile.TemporaryDirectory() as folder:
         settings = Path(folder) / "window.ini"

@@ -1,7 +1,7 @@
-"""Work against precision: this engine and general solvers on the same motions, in one run.
+"""Compare cost and error of this engine and of general solvers, on the same motions in one run.
 
 ``python benchmarks/work_precision.py --markdown docs/accuracy.md``; peers: ``pip install -e '.[peers]'``
-(numbalsoda is built from source and wants a Fortran compiler). A peer that is not installed is left out,
+(numbalsoda is built from source and needs a Fortran compiler). A peer that is not installed is omitted,
 and the page says so.
 
 Every solver starts in the same settled state; its error is the distance from the independent solution
@@ -38,31 +38,31 @@ from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.specimen.state import Floats
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
-"""For errors. Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""
+"""Spans for errors [s]; in 0.03 s, chaos of 112 per second magnifies an error only by e^3."""
 COST_S, SLOW_COST_S = 3.0, 0.3
-"""For costs, and for those of solvers that are a thousand times slower: what a call costs beside its motion
-is next to nothing then."""
+"""Spans for costs, and for costs of solvers that are a thousand times slower [s]; they are so long that the
+overhead of a call is negligible."""
 REPEATS = 5
 HEADING = "## Other solvers"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 LOWEST_M = 1e-13
-"""Absolute tolerance over the relative one, for solvers that want one."""
+"""Absolute tolerance over the relative one, for solvers that need one."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """One solver at one tolerance."""
+    """Cost and error of one solver at one tolerance."""
 
     solver: str
     tolerance: float
     cost: float
     """Processor time over simulated time."""
     error: float
-    """Of the state, in units of 100 um and 0.1 m/s."""
+    """Error of the state, in units of 100 um and 0.1 m/s."""
 
 
 def main():
-    """Measure, print, and write the section where it is requested."""
+    """Measure, print, and write the section if requested."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--markdown", type=Path, help="replace the last section of this page")
     arguments = parser.parse_args()
@@ -93,25 +93,25 @@ def measured(motion):
 
 
 def is_end(state):
-    """Say whether a solver came to the end with a state."""
+    """Return whether a solver reached the end with a finite state."""
     return state is not None and bool(np.all(np.isfinite(state)))
 
 
 @dataclass(frozen=True)
 class Solver:
-    """One solver on one motion."""
+    """One solver for one motion."""
 
     name: str
     end: Callable[[float, Floats, float], Floats | None]
-    """State after a span, by tolerance, start and span [s]; None where it gave up."""
+    """Function from tolerance, start and span [s] to the final state; None if the solver fails."""
     cost: Callable[[float, Floats, float], float | None]
-    """Processor time over simulated time, likewise."""
+    """Function from the same to processor time over simulated time; None if the solver fails."""
     cost_s: float = COST_S
-    """Simulated in a run for costs [s]."""
+    """Simulated time of a run for costs [s]."""
 
 
 def solver_of(name, prepare, cost_s=COST_S):
-    """Make a solver of what prepares a job that gives the end."""
+    """Return a solver; ``prepare`` returns a job, which returns the final state."""
 
     def cost(tolerance, start, span_s):
         job = prepare(tolerance, start, span_s)
@@ -123,7 +123,7 @@ def solver_of(name, prepare, cost_s=COST_S):
 
 
 def least_cost(solver, tolerance, start):
-    """Least processor time over simulated time; None where the solver gave up."""
+    """Return the least processor time over simulated time; None if the solver fails."""
     best, spent = math.inf, 0.0
     for _ in range(REPEATS):
         cost = solver.cost(tolerance, start, solver.cost_s)
@@ -139,7 +139,7 @@ OURS = "vibench"
 
 
 def solvers_of(motion):
-    """Give every solver of a motion."""
+    """Yield every solver for a motion."""
     yield solver_of(OURS, lambda tolerance, start, span_s: ours(motion, tolerance, start, span_s))
     for method in ("DOP853", "LSODA"):
         yield solver_of(f"scipy {method}", lambda *run, m=method: with_scipy(motion, m, *run), SLOW_COST_S)
@@ -158,7 +158,7 @@ def solvers_of(motion):
 
 
 def ours(motion, tolerance, start, span_s):
-    """Run the engine."""
+    """Prepare a run of this engine; return the job."""
     run = FollowedRun(motion.specimen, motion.drive, tolerance, start)
 
     def job():
@@ -169,7 +169,7 @@ def ours(motion, tolerance, start, span_s):
 
 
 def with_scipy(motion, method, tolerance, start, span_s):
-    """Run solve_ivp of scipy."""
+    """Prepare a run of scipy's solve_ivp; return the job."""
     rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
     rates(0.0, start)
 
@@ -192,14 +192,14 @@ _numbalsoda_address = []
 
 
 def plain_function():
-    """Give the address of the plain equations as numbalsoda calls them; compiled once."""
+    """Return the address of the plain equations for numbalsoda; they are compiled once."""
     if not _numbalsoda_address:
         from numba import cfunc  # noqa: PLC0415 - only where the peer is there
         from numbalsoda import lsoda_sig  # noqa: PLC0415
 
         @cfunc(lsoda_sig)
         def rates(t, u, du, q):
-            """Masses, stiffnesses, dampings; amplitude, omega; gap, stiffness, exponent; n, force, p_ref."""
+            """Compute du; q as returned by `constants_of`."""
             x, y, z, vx, vy, vz = u[0], u[1], u[2], u[3], u[4], u[5]
             base, base_rate = q[9] * np.sin(q[10] * t), q[9] * q[10] * np.cos(q[10] * t)
             p = y - z
@@ -220,7 +220,7 @@ def plain_function():
 
 
 def constants_of(motion):
-    """All numbers of the plain equations in the order of `plain_function`."""
+    """Return masses, stiffnesses, dampings, A0, omega, gap, stiffness, exponent, n, force and p_ref."""
     specimen, drive, law = motion.specimen, motion.drive, law_of(motion.specimen)
     power, force, reference = 0.0, 0.0, 1.0
     if isinstance(specimen.contact, PowerLaw):
@@ -234,7 +234,7 @@ def constants_of(motion):
 
 
 def with_numbalsoda(motion, method, tolerance, start, span_s):
-    """Run LSODA in C++, or DOP853 in Fortran, by numbalsoda."""
+    """Prepare a run of LSODA in C++ or DOP853 in Fortran, by numbalsoda; return the job."""
     import numbalsoda  # noqa: PLC0415 - only where the peer is there
 
     solve, address, constants = getattr(numbalsoda, method), plain_function(), constants_of(motion)
@@ -249,7 +249,7 @@ def with_numbalsoda(motion, method, tolerance, start, span_s):
 
 
 def cost_at(works, error):
-    """Cost of a solver at an error, between its measured points in logarithms; None beyond them."""
+    """Return the cost of a solver at an error, interpolated in logarithms; None below the least error."""
     front, best = [], math.inf
     for work in sorted(works, key=lambda each: each.error):
         if work.cost < best:
@@ -262,7 +262,7 @@ def cost_at(works, error):
 
 
 def table_of(curves):
-    """Return what every solver costs at the error of our standard level: one column for each motion."""
+    """Yield a table of the cost of every solver at the error of our standard level, by motion."""
     level = Accuracy.STANDARD
     ours = {
         name: next(work for work in works if work.solver == OURS and work.tolerance == level.tolerance)
@@ -309,7 +309,7 @@ def write_section(page, curves):
 
 
 def draw(path, curves):
-    """Error over cost, one panel for each motion."""
+    """Draw error over cost, one panel for each motion."""
     import matplotlib as mpl  # noqa: PLC0415 - slow to load, and needed only here
 
     mpl.use("Agg")
