@@ -107,6 +107,7 @@ def writes(source):
                 yield call, names
 
 
+@pytest.mark.thorough
 def test_no_file_of_a_user_is_written_under_its_final_name():
     found = [
         f"{path.name}: {call}"

@@ -140,6 +140,7 @@ def ended(library, code, folder, call, when, fault="ENOSPC"):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("code", [EXPORT, STOP, ANNOUNCEMENT])
 def test_a_file_is_reported_as_written_only_if_it_exists(library, tmp_path, code):
     refused = ended(library, code, tmp_path, "rename", "before")
@@ -186,6 +187,7 @@ def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path
     assert {line.split()[1] for line in made.stdout.splitlines()} == {"1"}, made.stdout
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("when", WHEN)
 def test_recordings_are_listed_despite_an_unremovable_catalogue(library, tmp_path, when):
     (tmp_path / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])

@@ -47,6 +47,7 @@ def test_json_contains_fit_intervals_and_undetermined_parameters(vibench_here, f
     assert any("gap stays as the bench says" in each for each in fit["not_told"])
 
 
+@pytest.mark.thorough
 def test_the_fit_is_printed_in_words(vibench_here, folder, tmp_path):
     result = vibench_here(
         "analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder

@@ -34,6 +34,7 @@ def test_the_hidden_motion_is_reported_in_numbers_figures_and_the_report(vibench
     assert len(rows) == pytest.approx(len(true), rel=0.01)
 
 
+@pytest.mark.thorough
 def test_json_contains_bounds_and_undetermined_values(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--json", cwd=tmp_path)
     told = json.loads(done.stdout)["hidden_motion"]["shaken"]
@@ -44,6 +45,7 @@ def test_json_contains_bounds_and_undetermined_values(vibench_here, shaken, tmp_
     assert told["without_contact_model"]["gaps_m"] == pytest.approx([GAP_M, GAP_M], abs=0.5e-6)
 
 
+@pytest.mark.thorough
 def test_an_untrackable_recording_gets_a_sentence_beside_the_report(vibench_here, tmp_path, monkeypatch):
     rigid = world.RIG.specimen.model_copy(update={"contact": "rigid:0.8"})
     monkeypatch.setattr(world, "RIG", world.RIG.model_copy(update={"specimen": rigid}))
@@ -61,6 +63,7 @@ def test_an_untrackable_specimen_is_refused_before_computation(vibench_here, sha
     assert not (tmp_path / "told").exists()
 
 
+@pytest.mark.thorough
 def test_a_stored_hidden_motion_is_exported_with_the_recording(vibench_here, shaken, tmp_path):
     path = tmp_path / "shaken.h5"
     path.write_bytes(shaken.path.read_bytes())

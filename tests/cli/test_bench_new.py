@@ -193,6 +193,7 @@ def test_a_target_that_is_no_folder_is_reported_before_any_question(tmp_path):
     assert "is not a folder" in str(done.exception)
 
 
+@pytest.mark.thorough
 def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
     (tmp_path / "faults.toml").write_text(
         '[[faults]]\nat_s = 0.0\nfault = "turn_amplifier_gain"\ngain_db = 16\n'

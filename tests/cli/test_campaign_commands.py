@@ -93,6 +93,7 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert searching.startswith("3 recordings (2 kept), at most 1:02:03 (h:min:s) of rig time")
 
 
+@pytest.mark.thorough
 def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(vibench_here, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")

@@ -72,6 +72,7 @@ def test_chain_lengths_and_alternating_cells_can_be_studied():
     assert found["options"]["others"][0]["name"] == "heavy"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("frequency", ["220", "200:300"])
 def test_a_lost_run_reports_only_its_ending(frequency, tmp_path):
     options = (

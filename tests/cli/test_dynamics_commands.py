@@ -203,6 +203,7 @@ def test_impossible_specimen_values_are_refused_at_once(arguments, told):
     assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))
 
 
+@pytest.mark.thorough
 def test_branches_reach_a_requested_error_and_report_it(vibench_here, tmp_path):
     asked = ("branches", "--model", "power:5", "--amplitude", 5e-6, "--frequency", "50:60", "--places", 2)
     ran = vibench_here(*asked, "--method", "balance", "--error", "1 %", cwd=tmp_path)

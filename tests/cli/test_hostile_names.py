@@ -92,6 +92,7 @@ def harmful(text):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_command_prints_control_characters_of_a_name(vibench_here, folder, command):
     for arguments in cases(folder)[command]:

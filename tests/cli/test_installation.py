@@ -103,6 +103,7 @@ def test_a_full_disk_is_reported_in_one_sentence(vibench_here, tmp_path):
     assert "Traceback" not in told.stderr
 
 
+@pytest.mark.thorough
 def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vibench_here, tmp_path):
     environment = {"VIBENCH_RIG_TOKEN": "do-not-tell", "VIBENCH_STATE_DIR": str(tmp_path / "state")}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
@@ -116,6 +117,7 @@ def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vib
     assert vibench_here("doctor", cwd=tmp_path).stdout.startswith("vibench:\n  version: ")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", ["file", "file/below"])
 def test_the_doctor_reports_an_unwritable_state_folder_and_predictions_work(vibench_here, tmp_path, state):
     (tmp_path / "file").write_text("a file in the way")
@@ -193,6 +195,7 @@ CORE_ALONE = [
 ]
 
 
+@pytest.mark.thorough
 def test_the_base_installation_supports_commands_without_figures_and_all_help(tmp_path):
     helps = [(*words, "--help") for words in (*((name,) for name in COMMANDS), ("bench", "list"))]
     program = ONE_AFTER_ANOTHER.format(
@@ -217,6 +220,7 @@ def test_the_base_installation_supports_commands_without_figures_and_all_help(tm
             assert f"vibench {' '.join(words[:-1])}" in shown
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("missing", "extra"), [(EXTRAS["bench"], "bench"), (EXTRAS["figures"], "figures"), (None, "bench")]
 )
@@ -228,6 +232,7 @@ def test_the_demo_names_the_missing_extra_before_it_begins(tmp_path, missing, ex
     assert not (tmp_path / "vibench_demo").exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("left_out", "imported"),
     [

@@ -48,6 +48,7 @@ def test_an_estimate_writes_no_file(vibench_here, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
 def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(vibench_here, tmp_path, text):
     asked = plan(tmp_path, text)

@@ -108,6 +108,7 @@ def test_a_wrapped_memory_error_is_reported(vibench_here, tmp_path, monkeypatch,
     assert said in ended.stderr
 
 
+@pytest.mark.thorough
 def test_a_bench_check_accepts_a_missing_folder(vibench, tmp_path):
     ended = vibench("bench", "check", "--out", "later/on", cwd=tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")

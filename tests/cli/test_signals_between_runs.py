@@ -21,6 +21,7 @@ with the_bench(load_rig(Path({rig!r})), "night") as engine:
 """
 
 
+@pytest.mark.thorough
 @sees_locks
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows ends a process at once")
 def test_sigterm_between_measurements_stops_the_campaign(tmp_path):

@@ -75,6 +75,7 @@ def test_the_fast_stop_stops_the_named_program():
         assert [each.what for each in announced_programs(Program)] == ["south"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
@@ -105,6 +106,7 @@ def test_control_characters_in_a_program_name_have_no_effect(is_killed):
     assert rf"a\x1b[2J\u202e\x9b1m, process {hostile.pid}" in (told.stderr if is_killed else told.stdout)
 
 
+@pytest.mark.thorough
 def test_a_suspended_program_is_not_reported_as_silent():
     with driving("north") as north:
         os.kill(north.pid, 19)

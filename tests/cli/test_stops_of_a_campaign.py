@@ -101,6 +101,7 @@ def states(folder):
     return [each.state for each in read_journal(folder / "out" / "c.campaign.sqlite")]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("level", ["ramp", pytest.param("off", marks=pytest.mark.thorough)])
 def test_a_stop_while_the_rig_cools_ends_the_campaign(vibench_here, tmp_path, level):
     with measuring(tmp_path, first_s=0.2, rest_s=LONG_S) as program:
@@ -113,6 +114,7 @@ def test_a_stop_while_the_rig_cools_ends_the_campaign(vibench_here, tmp_path, le
     assert not list((tmp_path / "out").glob("second*"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "level", ["off", *(pytest.param(each, marks=pytest.mark.thorough) for each in ("ramp", "abort"))]
 )

@@ -81,6 +81,7 @@ def test_the_amplitude_of_a_sweep_goes_with_the_power_of_frequency_that_is_given
         assert largest == pytest.approx(5e-6 * (266.0 / middle_hz) ** power, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_exponents_by_ode45_match_its_steps_where_masses_collide():
     case = under("exponents=ode45", duration_s=0.3, window_s=0.1)
     frequency_hz = np.array([30.0, 260.0])

@@ -68,6 +68,7 @@ def test_a_free_impact_keeps_its_energy_under_ode45_and_not_under_long_steps():
     assert mean == pytest.approx(0.90, abs=0.02)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("method", [ode45(1e-6, 1e-9), runge_kutta(5e-5)])
 def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode(method):
     specimen = gong2025(damping_time_s=2e-4, contact="linear")

@@ -92,6 +92,7 @@ def test_a_stream_that_is_dropped_ends_by_itself_and_its_process_does_the_next(p
     assert not job.is_answered
 
 
+@pytest.mark.thorough
 def test_a_stream_that_does_not_end_when_dropped_is_ended(pool):
     heard, answers = [], []
     job = pool.stream(deaf, heard.append, heard.append, heard.append, "")
@@ -102,6 +103,7 @@ def test_a_stream_that_does_not_end_when_dropped_is_ended(pool):
     assert answers != heard
 
 
+@pytest.mark.thorough
 def test_jobs_have_a_time_limit_and_streams_do_not(pool):
     errors, heard = [], []
     pool.ask(time.sleep, errors.append, errors.append, 3600.0)

@@ -123,6 +123,7 @@ def test_any_stiffness_keeps_to_its_accuracy(contact, factor):
         assert distance(finals[2], as_written(specimen, DRIVE, 0.02)) < 1e-6
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 @pytest.mark.parametrize(

@@ -116,6 +116,7 @@ def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, dama
     assert {outcome for outcome, _ in outcomes(again).values()} == {PointOutcome.KEPT}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("damage", [truncated, with_another_sample, replaced_by_a_folder])
 def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, folder, damage):
     damage(folder)
@@ -261,6 +262,7 @@ def said_by(statement):
     return damage
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("table", ["points", "attempts"])
 @pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
 def test_a_journal_whose_tables_state_two_seals_confirms_no_recording(folder, table, seal):
@@ -385,6 +387,7 @@ def refused_by_the_disk(bench, folder, stop):
     assert (folder / "two.h5.part").exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_recording_with_a_failed_ending_is_recovered_beside_its_repetition(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
@@ -402,6 +405,7 @@ def test_a_recording_with_a_failed_ending_is_recovered_beside_its_repetition(ben
     assert list(tmp_path.glob("*.part")) == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_complete_point_with_a_failed_ending_is_not_recorded_twice(bench, tmp_path, has_journal):
     refused_by_the_disk(bench, tmp_path, None)

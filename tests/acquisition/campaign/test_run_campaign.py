@@ -95,6 +95,7 @@ def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(ben
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.thorough
 def test_resuming_keeps_complete_points_and_repeats_the_others(bench, tmp_path):
     with pytest.raises(DataLost):
         run_campaign(

@@ -169,6 +169,7 @@ class TestKeeping:
         assert last_check(other.name) == apart
         assert len(list(state_folder.rglob("*"))) == 1 + 2 * 2, "the last, and the last that passed"
 
+    @pytest.mark.thorough
     def test_a_check_is_compared_with_the_last_passed_check(self, real, tmp_path):
         """A fault that is still there was no fault the second time, and a repaired bench failed."""
         bench, _ = real

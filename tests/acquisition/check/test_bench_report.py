@@ -45,6 +45,7 @@ def test_a_healthy_bench_passes_and_matches_its_configuration(checked, rig, tmp_
     assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("masses_kg", "stiffnesses_n_per_m", "dampings_ns_per_m", "gap_m"),
     [
@@ -96,6 +97,7 @@ def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, nam
     assert report.verdict is Verdict.FAIL
 
 
+@pytest.mark.thorough
 def test_a_laser_drop_out_is_distinguished_from_hum(checked, rig, tmp_path):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 10.0})
     dark = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
@@ -106,6 +108,7 @@ def test_a_laser_drop_out_is_distinguished_from_hum(checked, rig, tmp_path):
     assert "look for hum" in loud.advice
 
 
+@pytest.mark.thorough
 def test_a_reversed_vibrometer_sign_gives_a_warning(checked, rig, tmp_path):
     assert checked(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
     report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))

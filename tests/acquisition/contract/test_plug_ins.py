@@ -156,6 +156,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         assert promise in done.stdout
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -78,6 +78,7 @@ def test_the_base_has_the_spectrum_that_was_requested(recorded, spectrum):
         assert last["kurtosis"] == pytest.approx(np.mean(samples**4) / np.mean(samples**2) ** 2, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_an_unknown_shaker_is_equalised(recorded, rig):
     stiff = 2 * rig.shaker.suspension_stiffness_n_per_m
     with recorded(noise(spectrum=corners((40, 0.005))), suspension_stiffness_n_per_m=stiff) as recording:
@@ -87,6 +88,7 @@ def test_an_unknown_shaker_is_equalised(recorded, rig):
     assert np.mean(np.abs(10 * np.log10(density / 0.005)) < 3.0) > 0.95
 
 
+@pytest.mark.thorough
 def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(recorded):
     limit = 5e-8
     with recorded(noise(response_limits=corners((40, limit)), realisations=6)) as recording:

@@ -132,6 +132,7 @@ class TestTheJob:
             ).physical_per_volt
         np.testing.assert_allclose(newest_samples.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
+    @pytest.mark.thorough
     def test_a_mark_is_stored_with_its_sample(self, client, shipped_rig, tmp_path):
         before = running(client, shipped_rig, tmp_path).samples
         client.mark("the sphere was heard")
@@ -272,6 +273,7 @@ class TestRefusals:
             mine.close()
 
 
+@pytest.mark.thorough
 def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, client, shipped_rig, tmp_path):
     """On a busy computer sixty sweeps took more than the five seconds of any answer; the window gave up."""
     client.open(shipped_rig)

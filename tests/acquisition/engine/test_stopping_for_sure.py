@@ -153,6 +153,7 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
                 EngineClient.attach(process.address).close()
             assert resident_bytes(process.pid) - before < 20e6
 
+    @pytest.mark.thorough
     def test_a_slow_connection_has_one_deadline_for_its_message(self, process):
         at = process.address
         with socket.create_connection((at.host, at.port)) as slow:

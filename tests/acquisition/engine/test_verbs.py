@@ -113,6 +113,7 @@ def looked_after_until(handler, is_over):
         handler.enforce_deadlines()
 
 
+@pytest.mark.thorough
 def test_an_armed_run_has_time_to_be_started(shipped_rig, tmp_path):
     """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
     engine = Engine(Supervision.ATTENDED)

@@ -82,6 +82,7 @@ def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
     assert "Two tones at 0.1 Vpp: Response II up to" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("target", "reason"),
     [

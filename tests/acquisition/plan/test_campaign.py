@@ -79,6 +79,7 @@ MEASUREMENTS = st.builds(
 
 
 class TestRoundTrips:
+    @pytest.mark.thorough
     @given(
         measurements=st.lists(
             MEASUREMENTS, min_size=1, max_size=4, unique_by=lambda measurement: measurement.name.lower()

@@ -85,6 +85,7 @@ def test_streamed_noise_reaches_exactly_the_terminal_range(rig):
     assert volts.rms == pytest.approx(volts.peak / 4.5)
 
 
+@pytest.mark.thorough
 @given(factor=st.floats(0.01, 5))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_loads_grow_with_the_setting(linear_rig, factor):

@@ -170,6 +170,7 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
     DRIVES_ON.confirm_silence(guard)
 
 
+@pytest.mark.thorough
 def test_a_long_ramp_shows_that_it_continues(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:

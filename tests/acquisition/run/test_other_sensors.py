@@ -84,6 +84,7 @@ def amplitude(samples, rate_hz, frequency_hz):
     return 2 * np.sum(samples * taper * turns) / taper.sum()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("role", ["m0_displacement", "m0_acceleration"])
 def test_a_probe_and_an_accelerometer_show_the_motion_that_the_vibrometer_shows(tmp_path, role):
     path = measured(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
@@ -117,6 +118,7 @@ def test_a_force_cell_measures_the_force_on_fixture_and_specimen(tmp_path):
     )
 
 
+@pytest.mark.thorough
 @ON_M0
 def test_the_bench_check_verifies_the_sign_of_a_sensor_on_m0(tmp_path, role):
     with open_bench(rig_with(role, without=("m0_velocity",))) as bench:
@@ -142,6 +144,7 @@ def test_a_plan_beyond_the_range_of_a_sensor_on_m0_is_refused(role):
     assert not check.is_kept
 
 
+@pytest.mark.thorough
 def test_a_dwell_with_accelerometers_gives_responses_of_its_sensors(tmp_path):
     results = [
         analyse_files(

@@ -52,6 +52,7 @@ def excess_cycles(path, excitation):
     return cycles(drive - np.mean(drive)) - excitation.cycles(excitation.duration_s), is_noted
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("ends", "spacing"),
     [((150.0, 310.0), Spacing.LINEAR), ((420.0, 70.0), Spacing.LINEAR), ((90.0, 530.0), Spacing.LOGARITHMIC)],

@@ -327,6 +327,7 @@ def test_an_abort_of_a_slow_generator_meets_its_time(rig, tmp_path):
     assert float(said.removeprefix("abort: ").partition(" ")[0]) < ABORTED_WITHIN_S
 
 
+@pytest.mark.thorough
 def test_an_abort_at_wall_pace_is_recorded_until_its_silence(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})

@@ -122,6 +122,7 @@ def test_the_recording_names_its_output(streamed):
     assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
 
 
+@pytest.mark.thorough
 def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     sweep = SineSweep(
         amplitude_vpp=1.0, start_hz=150, stop_hz=350, duration_s=1.0, step_s=0.0123, settle_s=0.2,

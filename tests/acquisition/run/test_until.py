@@ -51,6 +51,7 @@ def seconds(recording, label):
     ]
 
 
+@pytest.mark.thorough
 def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=120)
     outcome, recording, seen = measured(rig, tmp_path, dwell, Until(response_ii=0.01))
@@ -130,6 +131,7 @@ def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
     assert 5 <= recorded_s < 110
 
 
+@pytest.mark.thorough
 def test_a_stop_ends_a_recording_with_until(rig, tmp_path):
     switch = StopSwitch()
     plan = Measurement(

@@ -84,6 +84,7 @@ def test_transient_chaos_is_classified_by_the_motion_after_it(chaos):
     assert "2100 drive periods, otherwise before" in found.why
 
 
+@pytest.mark.thorough
 def test_a_periodic_motion_that_turns_chaotic_is_chaotic(chaos):
     points = np.vstack((np.full((750, 2), 0.2), chaos[:2250]))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
@@ -116,6 +117,7 @@ def test_a_motion_that_changes_in_the_last_periods_is_undecided(count, lost):
     assert "fewer than 200 drive periods before the end" in found.why
 
 
+@pytest.mark.thorough
 def test_intermittent_chaos_is_one_motion(chaos):
     points = chaos[:1500].copy()
     points[300:450] = points[900:1200] = 0.2
@@ -135,6 +137,7 @@ def test_scatter_close_to_the_noise_gives_no_verdict():
     assert "times their noise" in found.why
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency_hz", "amplitude_m", "kind", "period"),
     [

@@ -110,6 +110,7 @@ def test_linear_noise_is_rejected_no_more_often_than_the_test_states():
     assert rejected <= 5
 
 
+@pytest.mark.thorough
 def test_a_series_with_wrong_surrogate_spectra_is_undecided():
     found = surrogate_test(autoregression(np.random.default_rng(3), 2000) ** 3)
     assert not found.is_valid

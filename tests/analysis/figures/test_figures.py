@@ -77,6 +77,7 @@ def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise
     assert f"{found.laid.difference.median_abs_db:.2g} dB" in caption
 
 
+@pytest.mark.thorough
 def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
     found = result(noise_file())
     png, svg, table, sines = transmission_figure(found.analysis, found.laid).save(tmp_path / "figures")

@@ -101,6 +101,7 @@ def test_a_noise_free_transmission_recovers_the_specimen(true):
         assert fit.value(name).value == pytest.approx(value, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_fit_intervals_have_their_stated_coverage_and_width(true):
     rng = np.random.default_rng(20250101)
     draws = 120

@@ -93,6 +93,7 @@ def test_the_three_modes_match_the_eigenvalues():
         assert one.is_resolved
 
 
+@pytest.mark.thorough
 def test_the_stated_spreads_match_the_scatter():
     rng = np.random.default_rng(1)
     frequency_hz = np.arange(200, 330, 1.0)
@@ -161,6 +162,7 @@ def test_a_mode_narrower_than_a_line_is_not_reported_wider():
     assert np.max(np.abs(errors)) < 3.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("window", ["hann", "blackmanharris", "flattop"])
 def test_bounds_of_streamed_noise_hold_under_every_window(window):
     errors = []
@@ -171,6 +173,7 @@ def test_bounds_of_streamed_noise_hold_under_every_window(window):
     assert np.max(np.abs(errors)) < 3.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("apart_hz", "shares"),
     [(2.0, (1.0, 1.0)), (4.0, (1.0, 0.4)), (2.0, (1.0, -0.7)), (4.0, (1.0, 0.6, 1.0))],
@@ -198,6 +201,7 @@ def test_bounds_of_close_modes_include_a_hidden_mode(shares, seed, draw):
     assert np.max(np.abs(found["errors"])) < 3.5
 
 
+@pytest.mark.thorough
 def test_a_fit_that_does_not_describe_the_lines_gives_its_chi_square():
     lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
     # A seventh of the magnitude on alternate pairs of lines: no sum of three modes does that.

@@ -170,6 +170,7 @@ def test_without_a_contact_model_motion_impacts_and_gaps_are_reported(
     assert np.mean(gaps) == pytest.approx(np.mean(recorded.specimen.gaps_m), abs=0.5e-6)
 
 
+@pytest.mark.thorough
 def test_wrong_gaps_and_m1_are_corrected_from_the_motion(world_recording, described_otherwise):
     recorded = world_recording(260.0, 1.5, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.03, gaps=(0.98, 1.04))
@@ -266,6 +267,7 @@ def test_unconfirmed_parameters_have_no_bounds(world_recording):
     assert len(motion.sentences) < 10
 
 
+@pytest.mark.thorough
 def test_two_gaps_and_a_linear_law_are_tracked(world_recording):
     specimen = replace(
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
@@ -279,6 +281,7 @@ def test_two_gaps_and_a_linear_law_are_tracked(world_recording):
     assert motion.specimen.exponent == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_an_invalid_track_is_reported_and_not_shown(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
@@ -290,6 +293,7 @@ def test_an_invalid_track_is_reported_and_not_shown(world_recording, described_o
     assert "Not followed for" in " ".join(motion.sentences)
 
 
+@pytest.mark.thorough
 def test_a_motion_that_meets_no_stop_determines_no_gap(world_recording):
     recorded = world_recording(260.0, 0.05, seed=44, duration_s=1.2)
     motion = told(recorded)
@@ -325,6 +329,7 @@ def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
     assert np.nanmedian(free.column("gap_m")) == pytest.approx(45e-6, abs=0.5e-6)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("further", "confirms"), [("m2_velocity", True), ("m1_velocity", True), ("m2_acceleration", None)]
 )

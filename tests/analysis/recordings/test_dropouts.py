@@ -74,6 +74,7 @@ def test_a_coarse_channel_and_its_impacts_have_no_dropouts(quantum, noise):
     assert found_dropouts(np.round(velocity / quantum) * quantum, RATE_HZ) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [6, 8])
 def test_a_sweep_with_zero_drop_outs_gives_no_wrong_result(number, tmp_path):
     """Member 6 gave 3.452 +- 0.031 for 3.538."""
@@ -147,6 +148,7 @@ def rig():
     return load_rig("virtual_rig")
 
 
+@pytest.mark.thorough
 def test_bridged_drop_outs_do_not_change_a_dwell(rig, tmp_path):
     """Response I was 91 where it is 1.63, and a warning called that a lower bound."""
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
@@ -239,6 +241,7 @@ def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
             assert recording_facts(recording).dropouts == 0
 
 
+@pytest.mark.thorough
 def test_a_part_is_bridged_like_the_whole(rig, tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measured(rig, plan, tmp_path / "d.h5", 8.0)) as recording:

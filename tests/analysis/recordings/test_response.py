@@ -51,6 +51,7 @@ SENSORS = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.thorough
 @SENSORS
 @pytest.mark.parametrize("level", ["weak", "strong"])
 def test_a_dwell_has_the_same_responses(dwell_file, dwell_motions, tmp_path, level, response, made):
@@ -66,6 +67,7 @@ def test_a_dwell_has_the_same_responses(dwell_file, dwell_motions, tmp_path, lev
     assert found.motion.verdict.kind is expected.motion.verdict.kind
 
 
+@pytest.mark.thorough
 @SENSORS
 def test_noise_has_the_same_resonances(noise_file, noise_motion, tmp_path, response, made):
     base, velocity, parts = noise_motion

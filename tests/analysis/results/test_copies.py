@@ -63,6 +63,7 @@ def test_another_recording_under_the_same_identity_is_named_as_doubtful(dwells, 
     assert "states that it is the recording" in said
 
 
+@pytest.mark.thorough
 def test_a_report_of_a_comparison_counts_a_copy_once(dwells, tmp_path):
     request = FrequencyResponseRequest()
     compared = [compare_recording(each, request, Simulation.LEFT_OUT) for each in recordings_in(dwells)]

@@ -84,6 +84,7 @@ def analysed(tmp_path):
     return played
 
 
+@pytest.mark.thorough
 def test_a_tracked_resonance_is_analysed_and_stated(analysed):
     tracked = ResonanceTracking(
         amplitude_vpp=0.2,

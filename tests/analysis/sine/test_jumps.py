@@ -62,6 +62,7 @@ def test_a_resonance_with_few_intervals_is_no_jump(step_hz, ratio, noise):
     assert jumps(frequency_hz, frequency_hz, resonance * np.exp(scatter)) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("is_described", [True, False])
 @pytest.mark.parametrize("error", [1.0, 1.02])
 @pytest.mark.parametrize(

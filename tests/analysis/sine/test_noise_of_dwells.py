@@ -96,12 +96,14 @@ def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
     assert louder.with_rest_as_noise(is_known_to_repeat=True) is louder
 
 
+@pytest.mark.thorough
 def test_motion_too_large_for_noise_is_kept(tmp_path):
     found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
     assert np.isnan(found.rest_error_i)
     assert found.with_rest_as_noise(is_known_to_repeat=True) is found
 
 
+@pytest.mark.thorough
 def test_chaos_is_not_reported_as_noise(tmp_path):
     found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
     first = budgets_of(found)[1]

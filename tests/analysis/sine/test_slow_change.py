@@ -163,6 +163,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
     assert result.analysis.response.response_i[0] == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_maximum_caused_by_one_short_fault_has_no_bound(dwell):
     """17.9 +- 2.5 was reported where 3 ms without light were read as motion, and 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))

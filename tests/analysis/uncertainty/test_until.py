@@ -29,12 +29,14 @@ def noise_wish(time_s):
     return WIDENING * max(each.after(time_s) for each in found if each.quantity.endswith("frequency"))
 
 
+@pytest.mark.thorough
 def test_the_time_to_a_wish_grows_with_the_square_of_its_sharpness():
     for time_s in (20.0, 80.0, 320.0):
         found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
         assert found_s == pytest.approx(time_s, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_a_recording_is_predicted_to_end_at_a_look_and_at_its_longest_time():
     times_s = [
         expected_recorded_s(plan(NOISE, Until(resonance_hz=noise_wish(time_s))), RIG)
@@ -53,6 +55,7 @@ def test_unpredictable_results_have_no_expected_uncertainty():
     assert expected_recorded_s(plan(QUIET, None), RIG) is None
 
 
+@pytest.mark.thorough
 def test_time_is_distributed_by_need():
     first = plan(NOISE, Until(resonance_hz=noise_wish(50.0)), "first")
     second = plan(NOISE, Until(resonance_hz=noise_wish(100.0)), "second")

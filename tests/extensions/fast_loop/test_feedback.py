@@ -65,6 +65,7 @@ def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
         assert np.abs(row - expected).max() < 4e-3 * np.abs(expected).max()
 
 
+@pytest.mark.thorough
 def test_under_a_table_too_heavy_to_move_the_multipliers_match_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
@@ -136,6 +137,7 @@ def test_the_designed_gains_cost_less_than_none_or_twice_as_much():
         assert cost(replace(best, output=factor * best.output, direct=factor * best.direct)) > least
 
 
+@pytest.mark.thorough
 def test_a_delayed_law_that_destabilises_motions_is_reported():
     late = plant(2e-3)
     hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))

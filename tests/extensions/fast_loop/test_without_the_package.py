@@ -78,6 +78,7 @@ def test_the_package_is_missing_there_and_only_there(run):
     assert "No module named 'vibench_fast_loop'" in run("-c", "import vibench_fast_loop").stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "given", [("branch",), ("quick", "--bench", "virtual_rig_controller")], ids=["plan", "bench"]
 )

@@ -17,6 +17,7 @@ from vibench.sim.periodic.harmonic_balance import LinearStructure
 ONE = np.array([[1.0]])
 
 
+@pytest.mark.thorough
 def test_the_phase_resonance_of_a_duffing_oscillator_runs_along_the_exact_backbone():
     # Free motion of x'' + x + alpha x^3: omega = pi sqrt(1 + alpha a^2) / (2 K(m)).
     damping, alpha = 2e-3, 0.5

@@ -92,6 +92,7 @@ class PiecewiseLinear:
         return entry, found[6] * 1e-3, found[7] * 1e-5
 
 
+@pytest.mark.thorough
 def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
     specimen, amplitude = gong2025(contact="linear_gap"), 20e-6
     found = next(shot_branches(specimen, FrequencyPath((amplitude,)), 128.0, 140.0, FEW))

@@ -275,6 +275,7 @@ def test_options_fixed_by_an_error_target_of_a_map_are_refused(given, said):
         Map(**{"frequency_hz": Range(start=120, stop=140, points=3), "error": 0.01, **given})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("target", [{"error": 0.01}, {"time_s": 3.0}])
 def test_an_estimate_of_a_map_with_a_target_comes_from_a_pilot(target):
     plan = Map(frequency_hz=Range(start=250, stop=270, points=9), amplitude_m=50e-6, **target)

@@ -80,6 +80,7 @@ def test_costs_of_larger_budgets_are_learnt_separately(ledger):
     assert 0.1 < plan_scene(replace(patient, budget_s=3.0)).cost_s < 4.0
 
 
+@pytest.mark.thorough
 def test_a_pilot_corrects_the_planned_cost():
     """The same map over 50 to 600 Hz was planned as 1.8 s, and took 21."""
     calm, chaotic, timed = (

@@ -197,6 +197,7 @@ def test_another_study_is_refused_with_the_differences(small, tmp_path, change, 
     assert path.read_bytes() == before
 
 
+@pytest.mark.thorough
 def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small, tmp_path):
     path = tmp_path / "a.h5"
     with FileStore.created(path, small):

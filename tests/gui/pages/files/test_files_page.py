@@ -431,6 +431,7 @@ def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(opened, 
     page.pictures.setCurrentWidget(page.time_histories)
 
 
+@pytest.mark.thorough
 def test_recordings_can_be_exported_and_annotated(page, folder, tmp_path, wait_for, monkeypatch):
     path = tmp_path / "mine.h5"
     shutil.copyfile(folder / "whole.h5", path)

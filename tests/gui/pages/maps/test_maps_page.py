@@ -40,6 +40,7 @@ def compute_map(page, wait_for, **changes):
     page.refresh()
 
 
+@pytest.mark.thorough
 def test_a_map_is_drawn_and_every_point_has_a_kind(page, wait_for):
     compute_map(page, wait_for)
     assert page.is_done

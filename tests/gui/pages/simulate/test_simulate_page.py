@@ -66,6 +66,7 @@ def test_cancelling_is_immediate_and_keeps_partial_results(page, wait_for):
     assert page.progress.done == page.progress.asked == 6
 
 
+@pytest.mark.thorough
 def test_a_dead_process_is_reported_and_replaced(page, wait_for):
     said = []
     page.context.noticed.connect(said.append)
