@@ -3,8 +3,8 @@
     python benchmarks/live_twin.py                     # a chaotic dwell; its gaps widen by 1 um in the middle
     python benchmarks/live_twin.py --duration 300 --level 2 --widen 0
 
-The first use compiles for half a minute, so run the script twice. The lag is the time from the conversion of
-the newest sample with an estimate of p until a viewer has the estimate. It includes engine and protocol.
+The lag is the time from the conversion of the newest sample with an estimate of p until a viewer has the
+estimate. It includes engine and protocol.
 """
 
 import argparse

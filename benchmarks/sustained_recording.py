@@ -60,7 +60,7 @@ def main() -> None:
             size = (folder / "run.h5").stat().st_size
             samples = recording.samples * len(recording.roles)
     print(f"signal            {signal_s:.1f} s, 4 channels at 51.2 kS/s, {gaps} gaps")
-    print(f"real-time factor  {signal_s / wall_s:.1f} (compilation and finishing the file included)")
+    print(f"real-time factor  {signal_s / wall_s:.1f} (finishing the file included)")
     print(f"processor time    {cpu_s / signal_s * 1e3:.1f} ms per second of signal")
     print(f"file              {size / samples:.2f} bytes per sample")
     print("memory by minute  " + ", ".join(f"{each:.0f}" for each in memory_mb) + " MB")

@@ -1,4 +1,4 @@
-"""What the pages of the window share.
+"""Common parts of the window's pages.
 
 `Page` is their base class; `AppContext` gives each page the bridge, settings, background work and signals to
 the window. `Selection` holds rig, test and campaign while they are edited. `UserActions` carries out commands

@@ -1,4 +1,4 @@
-"""Motions that repeat, stable or not: harmonic balance, shooting, their branches, Floquet multipliers.
+"""Periodic motions, stable or not: harmonic balance, shooting, their branches, Floquet multipliers.
 
 `first_order_states` finds all branches of the paper's analytical solution (Gong et al. 2025, eqs. 4 and 5).
 `balance_branch_within` follows balances of any number of harmonics, `periodic_branch` exact motions

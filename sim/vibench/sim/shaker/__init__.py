@@ -1,4 +1,4 @@
-"""Amplifier, coil and table under a voltage, with the specimen's push, moved step by step.
+"""Amplifier, coil and table under a voltage, simulated in steps with the specimen's force on the table.
 
 The specimen exerts a force on the table, so base and specimen respond to the voltage together.
 A `LoadedShaker` takes an `Amplifier`, a `Shaker`, a specimen and the mean voltage of each step, and
