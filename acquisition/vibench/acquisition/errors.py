@@ -1,4 +1,4 @@
-"""The errors of a measurement: each says what happened, what was done about it, and what to do next."""
+"""Errors of a measurement: each text states what happened, what was done about it, and what to do next."""
 
 from dataclasses import dataclass
 
@@ -69,7 +69,7 @@ class LimitTrip:
     sample: int
     """The first sample above the limit, counted from the first of the run."""
     time_s: float
-    """The same, in seconds of the converter's clock."""
+    """Time of that sample on the converter's clock [s]."""
 
 
 class LimitExceeded(AcquisitionError):

@@ -50,28 +50,27 @@ from ..rig import (
 )
 from .result import CheckResult
 
-# One program at a bench: locks that vanish with the process that holds them, however that ends.
+# Only one program may use a bench. A lock ends with the process that holds it, even if that is killed.
 #
 # Each instrument has a file in the user's own state folder and one in a folder that all users of the
-# computer share. Who holds it is written there for the others to read; what counts is the system's lock on
-# the file. The file stays: if it were removed, two programs could each lock a file of that name.
+# computer share. The holder writes its process and user into the file, but only the system's lock counts.
+# The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Anybody may write into the file, and what it says is shown."""
+"""Text accepted from a lock file: anybody may write into it, and the text is shown in an error."""
 
 
 class BenchLock:
-    """Holds the instruments of a rig for this process. What is virtual or played back needs no lock."""
+    """Locks on the instruments of a rig, held by this process; none for a virtual or played-back rig."""
 
     def __init__(self, descriptors: list[int]) -> None:
         self._descriptors = descriptors
 
     @classmethod
     def of(cls, rig: Rig) -> "BenchLock":
-        """Take the bench, or refuse with who has it.
+        """Lock the instruments of a rig.
 
-        Raises InstrumentBusy when another process holds one of its instruments, or something else lies in a
-        lock's place.
+        Raises InstrumentBusy when another process has locked one of them, or a lock file cannot be locked.
         """
         lock = cls([])
         if rig.virtual is not None or rig.plays_back:
@@ -109,13 +108,13 @@ class BenchLock:
             return
 
     def close(self) -> None:
-        """Give the bench back. Legal at any time."""
+        """Release the locks. Legal at any time."""
         while self._descriptors:
             os.close(self._descriptors.pop())
 
 
 def _instruments(rig: Rig) -> Iterator[str]:
-    """Name what can be held, wherever its configuration lies and however that writes it."""
+    """Yield a name for each instrument that is the same in every configuration of that instrument."""
     for resource in (rig.generator.resource, rig.controller.resource if rig.controller else ""):
         if resource:
             yield _plain(resource)
@@ -123,7 +122,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 
 def _plain(resource: str) -> str:
-    """Write a VISA name without what may be left out, and its numbers as decimal ones."""
+    """Return a VISA name without its optional parts, and with decimal numbers."""
     kind, *others = resource.upper().split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(
@@ -140,16 +139,16 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Load the virtual rig by name: a real bench must not load the simulation, nor depend on it."""
+    """Load the virtual rig by name: a real bench must not load the simulation or depend on it."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
 
 class RigPower:
-    """Holds the instruments of a rig, in a ``with``: a virtual one is switched on and off, a real one locked.
+    """Switches a virtual rig on and off, or locks a real one. Use it in a ``with``.
 
-    A virtual rig lives in rig time: what happens to it, a script of faults for example, goes on while
-    a bench on it is closed and opened again, because it stays the same rig.
+    A virtual rig outlasts a bench on it: its rig time and its script of faults continue while the bench is
+    closed and opened again.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -176,16 +175,16 @@ class RigPower:
 
     @property
     def played_faults(self) -> Sequence[Any]:
-        """What a script has done to the rig so far."""
+        """Faults that a script has injected into the rig so far."""
         return () if self._virtual is None else self._virtual.played_faults
 
     def let_pass(self, duration_s: float) -> None:
-        """Let rig time pass on a virtual rig that is not sampled; on every other it passes by itself."""
+        """Let rig time pass on a virtual rig while nothing is sampled; do nothing on a real rig."""
         if self._virtual is not None:
             self._virtual.let_pass(duration_s)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled: by the clock, or in rig time on a virtual rig at its own pace."""
+        """Wait while nothing is sampled: in rig time on a virtual rig at free pace, otherwise in real time."""
         if self._virtual is not None and self.rig.virtual is not None and self.rig.virtual.pace == "free":
             self._virtual.let_pass(duration_s)
         else:
@@ -204,7 +203,7 @@ class RigPower:
 
 
 class BenchKind(StrEnum):
-    """Whether the numbers of a bench come from the world or from a calculation."""
+    """Whether a bench measures with real instruments."""
 
     REAL = "real"
     SIMULATED = "simulated"
@@ -241,12 +240,12 @@ class Bench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What is recorded, in the order of the rows of a block."""
+        """Recorded channels, in the order of the rows of a block."""
         return channels_of(self.rig)
 
     @property
     def identities(self) -> dict[str, Identity]:
-        """Who answered: ``"generator"``, ``"digitizer"``, and ``"output"``, ``"controller"`` if any."""
+        """Identities of ``"generator"``, ``"digitizer"``, and of ``"output"`` and ``"controller"`` if present."""
         more = {"output": self.output, "controller": self.controller}
         identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
         return identities | {name: each.identity for name, each in more.items() if each is not None}
@@ -257,11 +256,11 @@ class Bench:
         return _kind(self.rig, self.digitizer)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled [s]; a virtual rig at its own pace lets its own time pass."""
+        """Wait while nothing is sampled [s]; a virtual rig at free pace needs no real time for it."""
         self._power.idle(duration_s)
 
     def close(self) -> None:
-        """Silence everything that plays, then close everything. Legal at any time."""
+        """Silence generator and output, then close all instruments. Legal at any time."""
         self._closing.close()
 
     def __enter__(self) -> Self:
@@ -288,16 +287,16 @@ def open_bench(
         How settings made by hand are confirmed; see `knobs`. Absent: at the terminal, and for a
         virtual rig without asking.
     calibration
-        What a calibration that has run out does; a virtual rig's never runs out.
+        Effect of an expired calibration; those of a virtual rig never expire.
     power
-        What holds the rig beyond this bench; absent, it is let go with it.
+        Holder of the rig that outlasts this bench; absent, leaving the bench releases the rig.
 
     Raises
     ------
     ConfigurationError
-        When the file says something that is not allowed.
+        When the file contains something that is not allowed.
     CheckFailed
-        When a calibration has run out, or a knob is not confirmed.
+        When a calibration has expired, or a knob is not confirmed.
     InstrumentBusy
         When another program has this bench open.
     InstrumentError
@@ -324,7 +323,7 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
     controller = _controller(connected, closing)
     generator = generator_driver(connected.generator).open(connected.generator)
     closing.callback(generator.close)
-    closing.callback(generator.stop)  # the last to enter is the first to happen
+    closing.callback(generator.stop)  # callbacks run in reverse order
     if output is not None:
         closing.callback(output.stop)
     usual = confirm_simulated if _kind(rig, digitizer) is BenchKind.SIMULATED else confirm_at_terminal
@@ -351,7 +350,7 @@ def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
 
 
 def _kind(rig: Rig, digitizer: Digitizer) -> BenchKind:
-    """Real, unless all is simulated or a recording is played back: nothing can then be energised."""
+    """Return REAL, unless the rig is virtual or plays a recording back: then nothing can be energised."""
     is_real = rig.virtual is None and not digitizer.identity.origin
     return BenchKind.REAL if is_real else BenchKind.SIMULATED
 
@@ -363,7 +362,7 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         if error is None:
             raise
         error.add_note(f"While leaving the bench: {failure}")
-        # One failure after another: each carries the one before it.
+        # Each failure has the one before it as its context.
         earlier = failure.__context__
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")

@@ -1,4 +1,4 @@
-"""What could be put on a bench: every instrument that can be seen from here, and why others cannot."""
+"""List of the instruments that this computer can find, with remarks on searches that failed."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from .bench import simulated_rig
 
 @dataclass(frozen=True)
 class InstrumentList:
-    """Everything that was found."""
+    """Instruments that a search has found."""
 
     visa_resources: tuple[str, ...]
     """Names for ``generator.resource``; USB numbers may be decimal (1689::851 is an AFG1022)."""
     daq_devices: tuple[FoundDevice, ...]
     remarks: tuple[str, ...]
-    """Why a place could not be searched."""
+    """Reasons why VISA or DAQmx could not be searched."""
 
 
 def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
@@ -45,7 +45,7 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
 
 
 def list_rig_instruments(rig: Rig) -> InstrumentList:
-    """Search where a rig's instruments are; those of a virtual rig are switched on for it."""
+    """Search with a rig's VISA library and DAQmx server; a virtual rig is switched on for the search."""
     if rig.virtual is None:
         return list_instruments(rig.generator.visa_library, rig.daq.server)
     with simulated_rig(rig) as virtual:

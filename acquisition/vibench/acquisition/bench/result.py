@@ -1,4 +1,4 @@
-"""A check of a bench as it is kept: one finding a question, when it was made, and on which configuration."""
+"""Stored result of a bench check: its findings, its time, and the configuration that was checked."""
 
 import hashlib
 import json
@@ -14,11 +14,11 @@ from ..rig import Rig
 
 
 class Verdict(StrEnum):
-    """How a finding is to be taken."""
+    """Verdict on a finding."""
 
     OK = "ok"
     WARN = "warn"
-    """Look at it; a measurement may be worth less."""
+    """Look at the cause; measurements may be less accurate."""
     FAIL = "fail"
     """Do not energise."""
 
@@ -27,7 +27,7 @@ _ORDER = (Verdict.OK, Verdict.WARN, Verdict.FAIL)
 
 
 class Finding(FrozenModel):
-    """One question to the bench and its answer."""
+    """One result of a bench check."""
 
     name: str = Field(min_length=1)
     value: str
@@ -45,13 +45,13 @@ class Finding(FrozenModel):
 
 @dataclass(frozen=True)
 class Bounds:
-    """Up to where a deviation is well, and from where it forbids to energise."""
+    """Limits of a deviation: ok up to ``well``; above ``fail`` the bench must not be energised."""
 
     well: float
     fail: float
 
     def verdict(self, deviation: float) -> Verdict:
-        """Judge a deviation; one that is not a number fails."""
+        """Return the verdict on a deviation; NaN fails."""
         if deviation <= self.well:
             return Verdict.OK
         return Verdict.WARN if deviation <= self.fail else Verdict.FAIL
@@ -66,7 +66,7 @@ def finding_of(
     advice: str,
     uncertainty: float | None = None,
 ) -> Finding:
-    """Make a finding of a number; the advice is dropped when all is well."""
+    """Make a finding from a number; the advice is left out when the verdict is ok."""
     spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
     return Finding(
         name=name,
@@ -81,24 +81,24 @@ def finding_of(
 
 
 class BenchReport(FrozenModel):
-    """Everything that a check of the bench has found."""
+    """All findings of a bench check."""
 
     findings: tuple[Finding, ...]
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all."""
+        """Worst verdict of the findings."""
         return max((finding.verdict for finding in self.findings), key=_ORDER.index, default=Verdict.OK)
 
     def __getitem__(self, name: str) -> Finding:
-        """Return the finding of that name; raises KeyError with the names there are."""
+        """Return the finding of that name; raises KeyError, which lists the existing names."""
         for finding in self.findings:
             if finding.name == name:
                 return finding
         raise KeyError(f"{name!r}: there are {', '.join(finding.name for finding in self.findings)}")
 
     def text(self) -> str:
-        """Lay it out as a table, with the advice under each line that needs it."""
+        """Return the report as a table, with each advice below its line."""
         rows = [(f.verdict.upper(), f.name, f.value, f.expected) for f in self.findings]
         header = ("", "finding", "measured", "expected")
         widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]
@@ -115,13 +115,13 @@ def _line(cells: tuple[str, ...], widths: list[int]) -> str:
 
 
 _PACE = {"pace", "speed", "faults"}
-"""How fast a virtual rig is played, and what is to happen to it, make it no other rig."""
+"""Settings of a virtual rig that do not count as a changed configuration."""
 _HOUR = timedelta(hours=1)
 _DAY = timedelta(days=1)
 
 
 class CheckResult(FrozenModel):
-    """What a check of a bench has found, with all that is needed to tell whether it still holds."""
+    """Findings of a bench check, with the data that show whether it is still valid."""
 
     rig: str
     """Name of the rig."""
@@ -133,7 +133,7 @@ class CheckResult(FrozenModel):
 
     @classmethod
     def of(cls, rig: Rig, report: BenchReport, checked: datetime) -> Self:
-        """Put a report together with its rig and its time."""
+        """Make the result from a report, its rig and its time."""
         return cls(
             rig=rig.name,
             rig_digest=rig_digest(rig),
@@ -144,22 +144,22 @@ class CheckResult(FrozenModel):
 
     @property
     def report(self) -> BenchReport:
-        """What was found."""
+        """The findings as a report."""
         return BenchReport(findings=self.findings)
 
     def age_h(self, now: datetime) -> float:
-        """Hours since."""
+        """Return the age of the check [h]."""
         return (now - self.checked) / _HOUR
 
 
 def rig_digest(rig: Rig) -> str:
-    """Fingerprint of everything that a configuration says of a bench; 64 hexadecimal digits."""
+    """Return a fingerprint of a rig's configuration: 64 hexadecimal digits."""
     content = rig.model_dump(mode="json", exclude={"check_valid_h": True, "virtual": _PACE})
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def ago(age: timedelta) -> str:
-    """Say an age as people do: ``"3 hours"``, ``"2 days"``."""
+    """Return an age as text: ``"3 hours"``, ``"2 days"``."""
     if age < 2 * _HOUR:
         return f"{max(age.total_seconds(), 0.0) / 60:.0f} minutes"
     return f"{age / _HOUR:.0f} hours" if age < 2 * _DAY else f"{age / _DAY:.0f} days"
