@@ -42,9 +42,9 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Return the file of a rig's last check: its name in allowed letters, and a hash of it.
+    """Return the path of a rig's last check: the name in letters and digits, and a hash of the name.
 
-    With ``passed``, the last check that did not fail.
+    With ``passed``, the path of the last check that did not fail.
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
     digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
@@ -75,7 +75,7 @@ def _read(path: Path) -> CheckResult | None:
 
 
 def keep(result: CheckResult) -> Path:
-    """Replace the last result atomically.
+    """Store a result atomically in place of the last one.
 
     Raises RecordingError when the state folder cannot be written.
     """
@@ -200,11 +200,11 @@ def require_fresh(
 ) -> CheckResult | None:
     """Admit a bench by its last check or by a new one, whose result is stored in recordings.
 
-    A virtual rig without a valid check is checked at once; a real one never plays without a request. A
+    A virtual rig without a valid check is checked at once; a real one is never played without a request. A
     recording that is played back needs no check.
 
-    Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass (nothing
-    was played then), or the one made now does not pass; InstrumentError when an instrument fails meanwhile.
+    Raises CheckFailed when the last check is missing, old, failed or of another configuration (nothing was
+    played then), or when the new check fails. Raises InstrumentError when an instrument fails.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def require_fresh(
     folder
         Folder for recordings.
     switch
-        Lets others end a check that is made now.
+        Ends the new check from another thread.
     """
     if bench.rig.plays_back:
         return None

@@ -50,19 +50,19 @@ def bench_report(
     Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
 
     Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, DataLost when the
-    converter leaves samples out, ConfigurationError on a recording that is played back; what is merely wrong
-    is a finding.
+    converter leaves samples out, ConfigurationError when the bench plays a recording back. Everything else
+    that is wrong becomes a finding.
 
     Parameters
     ----------
     bench
         Open, and not sampling.
     folder
-        Where recordings will go.
+        Folder for recordings.
     switch
-        Lets others end the check, within a block of samples.
+        Ends the check from another thread, within a block of samples.
     amplitude_vpp
-        Amplitude of the sine [V]; by default at most 2 % of the amplitude limit, without contact.
+        Amplitude of the sine [V]; by default at most 2 % of the amplitude limit, and too small for contact.
     """
     if bench.rig.plays_back:
         raise ConfigurationError(
@@ -98,7 +98,7 @@ class _BlockReader:
         self._advance: Callable[[], None] = lambda: None
 
     def in_silence(self) -> Samples:
-        """Read all channels while nothing plays, after couplings have settled."""
+        """Read all channels while nothing plays, after the AC couplings have settled."""
         digitizer = self._bench.digitizer
         self._begin()
         try:

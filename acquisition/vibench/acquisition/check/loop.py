@@ -57,7 +57,7 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
 def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> ClockRatio:
     """Return the deviation of a sine from ``frequency_hz`` [ppm].
 
-    A straight line through the phases of twenty stretches; its slope is the offset in frequency.
+    Fits a straight line through the phases of twenty windows; its slope is the offset in frequency.
     """
     length = volts.size // _WINDOWS
     starts = np.arange(_WINDOWS) * length
@@ -76,11 +76,11 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
 DRIVE_DEVIATION = Bounds(0.02, 0.15)
 """Deviation of the measured drive from the setting."""
 GAIN_DB = Bounds(1.0, 3.0)
-"""Deviation of the amplifier's gain from its knob's."""
+"""Deviation of the amplifier's gain from the rig's model."""
 BASE_DB = Bounds(1.5, 3.0)
 """Deviation of the base's acceleration from the rig's model."""
 CLOCK_PPM = Bounds(100.0, 500.0)
-"""Two oscillators of 50 ppm each."""
+"""Deviation of the clock ratio: two oscillators of 50 ppm each."""
 DETECTED = 10.0
 """Least ratio of the sine to its uncertainty for detection."""
 WRONG_LOAD = 2.0
@@ -119,11 +119,11 @@ LASTING: Mapping[str, Lasting] = {
     BASE_ACCELERATION: Lasting.LEVEL,
     **{detection_name(role): Lasting.LEVEL for role in Role},
 }
-"""By the name of the finding."""
+"""Kind of quantity by the name of the finding."""
 
 
 class LoopCheck:
-    """Findings from a small sine from the generator to the inputs."""
+    """Findings from a small sine, played by the generator and read at the inputs."""
 
     def __init__(self, bench: Bench, amplitude_vpp: float, during: Samples, after: Samples) -> None:
         self._rig = bench.rig
@@ -138,7 +138,7 @@ class LoopCheck:
         self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
-        """Return the findings of the existing channels."""
+        """Return the findings on the recorded channels."""
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
@@ -245,7 +245,7 @@ class LoopCheck:
         )
 
     def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
-        """Compare a channel's phase relative to the drive with the model's: 180 degrees mean a wrong sign."""
+        """Compare a channel's phase over the drive with the model's; 180 degrees off mean a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]
