@@ -184,7 +184,7 @@ class RigPower:
             self._virtual.let_pass(duration_s)
 
     def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled: in rig time on a virtual rig at free pace, otherwise in real time."""
+        """Wait while nothing is sampled: in rig time on a virtual rig at free pace, else in real time."""
         if self._virtual is not None and self.rig.virtual is not None and self.rig.virtual.pace == "free":
             self._virtual.let_pass(duration_s)
         else:
@@ -245,7 +245,7 @@ class Bench:
 
     @property
     def identities(self) -> dict[str, Identity]:
-        """Identities of ``"generator"``, ``"digitizer"``, and of ``"output"`` and ``"controller"`` if present."""
+        """Identities of ``"generator"``, ``"digitizer"``, and, if present, ``"output"``, ``"controller"``."""
         more = {"output": self.output, "controller": self.controller}
         identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
         return identities | {name: each.identity for name, each in more.items() if each is not None}

@@ -21,7 +21,7 @@ class InstrumentList:
 
 
 def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
-    """Search VISA and DAQmx; a place that cannot be searched becomes a remark.
+    """Search VISA and DAQmx; the error of a failed search becomes a remark.
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
 """Many measurements, unattended: journal, attempts, reconnecting, notices, and the catalogue of a folder.
 
-Every state of every point is committed to an SQLite journal before and after each step, so that a
-campaign that was killed resumes at its first unfinished point; each attempt is a file of its own
-(``NAME.h5``, ``NAME.2.h5``). A command or a mail can notify people who are away. `estimate_campaign`
-estimates what a campaign takes, `list_recordings` lists the recordings of a folder. It starts and stops
-runs, and knows nothing of the engine's process and its viewers. See docs/campaigns.md and
-docs/decisions/0014-chains-of-points.md.
+The state of every point is committed to an SQLite journal before and after each step: a campaign that was
+killed resumes at its first unfinished point. Each attempt is a separate file (``NAME.h5``, ``NAME.2.h5``). A
+command or a mail can notify people who are away. `estimate_campaign` estimates time and disk space,
+`list_recordings` lists the recordings of a folder. The package starts and stops runs; it does not use the
+engine's process or its clients. See docs/campaigns.md and docs/decisions/0014-chains-of-points.md.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

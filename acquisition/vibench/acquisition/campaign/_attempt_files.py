@@ -27,19 +27,19 @@ class KeptRecording:
 
     path: Path
     state: RecordingState | None
-    """How it ended; None where the file does not say."""
+    """State of the recording; None if the file does not contain it."""
     reason: str
     duration_s: float
     seal: str
     damage: str
-    """A sentence on what is wrong with the file; empty for a sound one, or one without a seal."""
+    """Sentence on what is wrong with the file; empty if it is sound or has no seal."""
     is_of_this_plan: bool
     rig: Mapping[str, Any] = field(default_factory=dict)
     """The configuration of the bench that made it."""
 
     @property
     def is_complete(self) -> bool:
-        """Whether it is sound, and ended as planned."""
+        """Whether the file is sound and its run ended as planned."""
         return self.state is RecordingState.COMPLETE and not self.damage
 
 
@@ -66,7 +66,7 @@ def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> Kept
 
 
 def is_made_by(recording: Recording, measurement: Measurement) -> bool:
-    """Whether a recording was made by this plan, as this version reads it."""
+    """Return whether a recording's plan, as read by this version, equals ``measurement``."""
     try:
         return Measurement.model_validate(recording.plan) == measurement
     except ValidationError:
@@ -89,7 +89,7 @@ def next_attempt(folder: Path, name: str) -> Path:
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Return a complete recording of a point; the last damaged one if there is no sound one, or None.
+    """Return the complete recording of a point; without one, the last damaged recording, or None.
 
     Raises RecordingError when one is complete but was measured with another plan.
     """

@@ -1,4 +1,4 @@
-"""One point of a campaign until it is done or its attempts are used up, with a cooling pause before each."""
+"""Measuring one point until it is recorded or its attempts are used up, with cooling pauses."""
 
 from collections.abc import Callable, Collection
 from functools import partial
@@ -24,7 +24,7 @@ class CoolingPause:
     """Pauses before a recording when another one was made before it in this session.
 
     A stop ends the pause at once; a hold extends it until it is released. The journal does not change: the
-    next point stays queued, so a campaign that is killed here resumes as from between two points.
+    next point stays queued, so a campaign that is killed during the pause resumes with that point.
     """
 
     def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
@@ -86,7 +86,7 @@ class Attempts:
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Make one valid recording of a point; ``tell`` is called after every block.
 
-        Raises AcquisitionError: what the last attempt failed with; it stands in the journal.
+        Raises AcquisitionError, the error of the last attempt, which is also in the journal.
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)
@@ -152,7 +152,7 @@ class Attempts:
         reason_code = reason_code_of(error)
         try:
             self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
-        except RecordingError as second:  # in the same folder: the first error is the cause
+        except RecordingError as second:  # the journal is in the same folder: the first error is the cause
             error.add_note(str(second))
         self._say(
             CampaignEvent(
@@ -167,9 +167,7 @@ class Attempts:
         return not is_stopping and reason_code.value in {each.value for each in self._policy.on}
 
     def _prepare_retry(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        """Wait a little, or reopen the bench after an instrument failed, so that another attempt can
-        succeed.
-        """
+        """Prepare another attempt: reopen the bench after an instrument error, else wait a little."""
         if isinstance(error, InstrumentError):
             if self._reopen is None:
                 raise error
@@ -190,8 +188,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig at free pace needs no real time, so rig time counts there, otherwise real
-                # time.
+                # A virtual rig at free pace idles in rig time only, so the longer of the two times counts.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

@@ -76,7 +76,7 @@ class CatalogueEntry:
     samples_id: str = ""
     """Equal in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
-    """As in `recording.SealState`, as far as a quick check shows; or empty."""
+    """Word of `recording.SealState` after a quick check; empty if unknown."""
 
     @property
     def is_bad(self) -> bool:
@@ -169,7 +169,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Raised whenever an entry changes; an older catalogue is then made again."""
+"""Increased whenever the fields of an entry change: older catalogues are then rebuilt."""
 WAIT_S = 10.0
 """Waiting time for another program that writes the same catalogue."""
 
@@ -183,7 +183,7 @@ class Refresh(StrEnum):
     """Which recordings are read again."""
 
     CHANGED = "changed"
-    """Those that have changed since, and those that are not finished."""
+    """Recordings that have changed since the last list, and unfinished ones."""
     ALL = "all"
 
 
@@ -265,7 +265,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
     """Return a value that changes with any write, and with the seals that journals have for the file.
 
-    No program sets back the file system's time of change.
+    It includes the file system's time of change, which no program sets back.
     """
     seals = "".join(f" {each.seal} {each.attempt_seal}" for each in noted)
     return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}{seals}"
@@ -314,7 +314,7 @@ class VerifiedRecording:
 
     @property
     def is_bad(self) -> bool:
-        """Whether the file, or a result in it, has changed since it was made."""
+        """Whether the verdict on the file, or on a result in it, is one of `BAD`."""
         return self.verdict in BAD or not BAD.isdisjoint(self.results.values())
 
 
@@ -323,9 +323,9 @@ def verify_recordings(
     depth: SealDepth | str = SealDepth.WHOLE,
     key: SealKey | None = None,
 ) -> tuple[VerifiedRecording, ...]:
-    """Compare a recording, or all below a folder, with seals and journals; changes nothing.
+    """Compare a recording, or all below a folder, with their seals and journals; change nothing.
 
-    Raises RecordingError when there is no such place, or the key cannot be read.
+    Raises RecordingError when ``place`` does not exist, or the key cannot be read.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def verify_recordings(
     depth
         ``"quick"`` reads attributes, texts and tables, ``"whole"`` every sample too.
     key
-        Key of their signatures, as `vibench.acquisition.recording.seal_key` reads it.
+        Key that signs the seals, from `vibench.acquisition.recording.seal_key`.
     """
     forget_checks()
     if not place.exists():

@@ -1,8 +1,8 @@
 """A campaign's journal on disk: every point's state, committed before and after each step.
 
 SQLite in WAL mode with full synchronisation: a finished transaction survives a kill and a power cut, and an
-unfinished one leaves no trace. So the journal is always right, or says ``running`` of the one point that was
-under way.
+unfinished one leaves no trace. After a kill the journal is right, except that the point under way is still
+``running``.
 """
 
 import re
@@ -37,7 +37,7 @@ class ReasonCode(StrEnum):
     """The reason of a point's state; the words of `plan.retry.Retryable` are among them."""
 
     NOT_YET = "not_yet"
-    """Its turn has not come."""
+    """Not started yet."""
     RUNNING = "running"
     CARRIED_OUT = "carried_out"
     OVER_RANGE = "over_range"
@@ -50,7 +50,7 @@ class ReasonCode(StrEnum):
     """It was done, but its recording differs from its seal; the file is kept, and the point is measured
     again."""
     STOPPED = "stopped"
-    """Somebody requested a stop; the sentence says who."""
+    """Somebody requested a stop; the reason names who."""
     PROGRAM_ENDED = "program_ended"
     """The program ended without notice: killed, crashed, or without power."""
     DATA_LOST = "data_lost"
@@ -60,7 +60,7 @@ class ReasonCode(StrEnum):
     LIMIT = "limit"
     DISK = "disk"
     PLAN = "plan"
-    """This bench cannot play it."""
+    """This bench cannot play the plan."""
     FAULT = "fault"
     """Anything else that went wrong."""
 
@@ -106,7 +106,7 @@ class ChangedBench(StrEnum):
 
     REFUSE = "refuse"
     ACCEPT = "accept"
-    """Continue, and record both in the journal."""
+    """Continue, and record both benches in the journal."""
 
 
 class PointOutcome(StrEnum):
@@ -114,7 +114,7 @@ class PointOutcome(StrEnum):
 
     RECORDED = "recorded"
     KEPT = "kept"
-    """It was complete before."""
+    """The recording was complete before."""
     STOPPED = "stopped"
     FAILED = "failed"
 
@@ -265,10 +265,10 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def sentences(path: Path) -> Iterator[None]:
-    """Turn errors of the database, and invalid contents, into one sentence."""
+    """Turn errors of the database, and invalid contents, into a RecordingError."""
     try:
         yield
-    except (ValueError, TypeError, LookupError) as error:  # pydantic's; missing columns
+    except (ValueError, TypeError, LookupError) as error:  # invalid contents or missing columns
         raise RecordingError(
             f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
             "another version. Nothing was changed; put back a copy, or move it away and resume"
@@ -318,7 +318,7 @@ class JournalPoint:
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     """Read a journal, also while its campaign runs; changes nothing.
 
-    Raises RecordingError when there is no journal, or it is not one.
+    Raises RecordingError when the file does not exist or is not a journal.
     """
     if not path.is_file():
         raise RecordingError(
@@ -516,7 +516,7 @@ class Journal(ClosedOnLeaving):
                 yield self._connection
                 self._connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # a failing disk ends it by itself
+                if self._connection.in_transaction:  # after a disk error SQLite has rolled back already
                     self._connection.execute("ROLLBACK")
                 raise
 

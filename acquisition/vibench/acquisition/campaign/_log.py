@@ -1,4 +1,4 @@
-"""The log of a campaign, one JSON document a line, and its status in one line for ``tail -f``."""
+"""Log of a campaign as JSON lines, its status lines for ``tail -f``, and notices by command or mail."""
 
 import json
 import shlex
@@ -71,7 +71,7 @@ LOG_SUFFIX = ".log.jsonl"
 
 
 class CampaignLog(ClosedOnLeaving):
-    """Appends events; a line is sent to the disk before the next step.
+    """Appends events; each line is flushed before the next step.
 
     A log that cannot be written (full disk) does not stop the campaign, which needs only the journal.
     """
@@ -111,13 +111,13 @@ STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
 """Interval of lines without other events [s]: a night makes half a megabyte."""
 LEFT_ALONE_S = 1.0
-"""How long writing the last lines may take [s]."""
+"""Longest time for writing the last lines [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
     """Appends a line at every event, and every few seconds while a point runs.
 
-    The player does not wait for it: a folder that hangs would keep the drive on.
+    Writes in another thread, because a folder that hangs would otherwise keep the drive on.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class StatusLine(ClosedOnLeaving):
         self._write(event.text)
 
     def progress(self, stand: CampaignProgress) -> None:
-        """Take the progress after a block; write a line when the last one is old."""
+        """Update the progress after a block; write a line if the last one is older than `LINE_EVERY_S`."""
         run = stand.run
         self._point_s = run.elapsed_s
         self._where = f"{stand.number}/{stand.count} {stand.name}"
@@ -175,7 +175,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _left(self) -> timedelta:
-        """Return the time left at the speed of this session; before that, in rig time."""
+        """Return the time left at the speed of this session; in the first second, in rig time."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
@@ -242,7 +242,7 @@ class MailMessenger:
 
 TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.DAMAGED, CampaignEventKind.ENDED})
 COMMAND_LONGEST_S = 30.0
-"""A command that takes longer is ended [s]."""
+"""Longest duration of a command [s]."""
 
 
 class Messenger(Protocol):
@@ -279,7 +279,7 @@ class CommandMessenger:
         return cls(arguments)
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
-        """Run the command and wait for its end, or end it."""
+        """Run the command; end it after `COMMAND_LONGEST_S`."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,
@@ -297,7 +297,7 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Follows a campaign, and sends faults and its end. A failure here has no effect on the campaign."""
+    """Sends notices of faults, damaged recordings and the end of a campaign. A failed notice has no effect."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener

@@ -34,11 +34,11 @@ PROGRAM_ENDED = "its program ended in the middle of it"
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     """Update a resumed journal from the files in its folder.
 
-    A point with a complete recording is done, whatever the journal says, because its last entry may be
-    missing. A point that was running is otherwise interrupted; the rest of its recording becomes a readable
-    file. A done point is queued again when its recording is missing or differs from its seal; the file is
-    kept, and the next attempt is made beside it. Reading a folder may take minutes: after a stop the rest is
-    left for the next resume, since no further point will be measured.
+    A point with a complete recording is done, even if the journal lacks its last entry. A running point
+    without one is interrupted, and its unfinished recording becomes a readable file. A done point is queued
+    again when its recording is missing or differs from its seal; the file is kept, and the next attempt is
+    made beside it. Reading a folder may take minutes: after a stop, the other points are left for the next
+    resume.
     """
     for point in journal.points():
         if stop.request is not None:
@@ -66,8 +66,8 @@ def found_recordings(
 ) -> dict[str, KeptRecording]:
     """Find the recordings in a folder, for a campaign whose journal is lost or never existed.
 
-    After a stop no more samples are read; the next resume, which has a journal, reads them. Damaged
-    recordings are found too, and those whose seal is in no journal of the folder: the campaign may have been
+    After a stop no more samples are read; the next resume reads them, using its journal. Damaged recordings
+    are returned too, and those whose seal is in no journal of the folder, because the campaign may have been
     renamed. Raises RecordingError when a recording is complete, but was made by another plan.
     """
 
@@ -82,7 +82,7 @@ def found_recordings(
 def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:
     """Recover every unfinished attempt at a point; returns the errors by file name.
 
-    Raises RecordingError when that fails for a complete one, which the next attempt would record again.
+    Raises RecordingError when a complete recording cannot be recovered: it would be measured again.
     """
     errors: dict[str, str] = {}
     for path in attempts:
@@ -139,7 +139,7 @@ class PlannedRecording:
     measurement: Measurement
     path: Path
     is_complete: bool = False
-    """It exists already, made by the same plan."""
+    """Whether a recording of the same plan exists already."""
 
 
 def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
@@ -188,8 +188,8 @@ def open_journal(
     """Begin a journal, or open the campaign's journal and update it.
 
     Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that, or
-    the journal belongs to another plan, and CheckFailed when the bench is another one than the campaign was
-    started on and ``changed`` refuses that.
+    the journal belongs to another plan. Raises CheckFailed when the bench is not the one that the campaign
+    was started on and ``changed`` refuses that.
     """
     path = journal_path(folder, campaign.name)
     identity = BenchIdentity.of(bench)

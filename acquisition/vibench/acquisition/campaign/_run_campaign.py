@@ -1,4 +1,4 @@
-"""A campaign from its first point to its last: one recording each, every step in a journal."""
+"""Running a campaign: one recording for each point, with every step in a journal."""
 
 import shutil
 from collections import deque
@@ -56,7 +56,7 @@ from ._opening import make_folder, open_journal, planned_recordings, require_all
 
 
 class CampaignRunner:
-    """Runs the points of a campaign, and those that results add."""
+    """Runs the points of a campaign, and further points that results request."""
 
     def __init__(
         self,
@@ -128,7 +128,7 @@ class CampaignRunner:
                 self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Pause before a point that is to be measured; a stop ends the pause, and the campaign."""
+        """Pause before a point that is to be measured; return False after a stop."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.pause_before(point.name)
         return self._stop.request is None
@@ -228,7 +228,7 @@ def run_campaign(
     on_progress, on_result, on_event
         Called after every block, after every recording, and at every event.
     switch
-        Lets others hold the running measurement, or end the campaign.
+        Holds the running measurement or ends the campaign, from another thread.
     after
         Called after every point that is done; the measurements it returns are made next, in this session
         or after a resume.
@@ -248,7 +248,7 @@ def run_campaign(
     CheckFailed
         When the bench has changed and ``changed_bench`` refuses that.
     AcquisitionError
-        The error of a failing run, when ``after_failure`` says stop, or an instrument is lost.
+        The error of a failed run, when ``after_failure`` is ``stop`` or an instrument is lost.
     """
     existing = chosen(ExistingRecordings, existing)
     after_failure = chosen(AfterFailure, after_failure)
@@ -283,7 +283,7 @@ def run_campaign(
 
 @contextmanager
 def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
-    """Open the log, which also marks the campaign as running; the mark ends with the process."""
+    """Open and lock the log, so that no other program carries out the campaign meanwhile."""
     with CampaignLog(folder / f"{campaign.name}{LOG_SUFFIX}") as log, ExitStack() as mark:
         try:
             mark.enter_context(sole_use(log.path))
@@ -296,7 +296,7 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Rig time that passes on a virtual rig before its bench is opened again, in which cables are reconnected."""
+"""Rig time [s] before the bench of a virtual rig is opened again: its cables may be reconnected in it."""
 
 
 class ReconnectingBench:
@@ -324,7 +324,7 @@ class ReconnectingBench:
     def reopen(self) -> Bench:
         """Close the bench and open it again; knobs keep their confirmed settings.
 
-        Raises AcquisitionError when an instrument is still not there. The bench is closed then; reopen again.
+        Raises AcquisitionError when an instrument is still missing. The bench is then closed; try again.
         """
         before, self._bench = self._bench, None
         if before is not None:
@@ -421,8 +421,8 @@ def estimate_campaign(
     """Estimate the time and space of a campaign; open no instrument and write nothing.
 
     Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that;
-    ConfigurationError when the rig lacks what a measurement is played with; LimitExceeded when feedback on it
-    does not hold the motions that one asks for.
+    ConfigurationError when the rig lacks a part that a measurement needs; LimitExceeded when feedback on the
+    rig cannot hold a requested motion.
     """
     for each in campaign.measurements:
         require_played(each, rig)
