@@ -1,6 +1,4 @@
-"""Options of the contract tests; an entry point, because ``--pyargs`` loads no conftest in time for
-options.
-"""
+"""Options of the contract tests, in an entry point: with ``--pyargs`` a conftest is loaded too late."""
 
 import pytest
 

@@ -38,7 +38,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     for path in all_shipped("hardware_configs"):
         try:
             rig = load_rig(path)
-        except ConfigurationError:  # of a package that is not installed
+        except ConfigurationError:  # it needs a package that is not installed
             continue
         if rig.virtual is not None and name in named_in(rig)[kind]:
             return rig
@@ -64,7 +64,7 @@ def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | N
 
 
 def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
-    """Return the error that no bench names the instrument."""
+    """Return the error text for an instrument that no bench names."""
     who = "no shipped virtual bench names" if given is None else f"{given} does not name"
     kinds_in_words = " or ".join(each.value for each in kinds)
     return f"{who} {name!r} as one of {kinds_in_words}; give a bench that does with --vibench-bench"
@@ -106,7 +106,7 @@ def refused() -> Iterator[None]:
 
 
 def heard_v(bench: Bench, duration_s: float) -> Samples:
-    """Read for a time, and return the volts at the generator's terminal, without the beginning."""
+    """Wait for settling, then return the volts at the generator's terminal for ``duration_s``."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)

@@ -1,6 +1,4 @@
-"""Requirements of every analogue output: start with the converter, play the written samples, and end at
-zero.
-"""
+"""Requirements of every analogue output: start with the converter, play what is written, end at zero."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
