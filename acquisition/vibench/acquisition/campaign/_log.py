@@ -297,7 +297,7 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Sends notices of faults, damaged recordings and the end of a campaign. A failed notice has no effect."""
+    """Sends notices of faults, damaged recordings and the campaign's end. A failed notice has no effect."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
