@@ -1,4 +1,4 @@
-"""Data between a run and its controller: an action, and its samples."""
+"""Data exchanged between a run and its controller: actions, and the samples of each."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ class ControlAction:
     """The next phase, and notes for its first sample."""
 
     phase: Phase | None
-    """None for notes alone, without samples."""
+    """None if there are only notes: nothing is sampled."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """The samples of a phase, from its first one or the last gap to its end."""
+    """The samples of a phase, from its beginning, or after its last gap, to its end."""
 
     first_sample: int
     volts: Samples
@@ -39,7 +39,7 @@ Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
 """Yields actions and receives the samples of each; returns the result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
-"""Samples for notes alone."""
+"""Samples sent back after an action without a phase."""
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
@@ -77,7 +77,7 @@ class MeasuredLevel:
 
 
 def measured_level(base: Phasors) -> MeasuredLevel:
-    """Average the fundamental over drive periods, shape (periods,), with the scatter of their batches."""
+    """Average the fundamental over drive periods, shape (periods,); batches give its uncertainty."""
     if not len(base):
         return MeasuredLevel(0.0, 0.0)
     mean = complex(np.mean(base))

@@ -30,9 +30,9 @@ def feedback_controller(
 ) -> Controller[None]:
     """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
-    Yields the next phase. The samples of each phase, shape (channels, n) [V], are sent back in. Raises
-    ConfigurationError when the rig lacks a channel that feedback needs, or no package offers the
-    controller; before anything is yielded.
+    Yields the next phase; the samples of each phase, shape (channels, n) [V], are sent back. Raises
+    ConfigurationError, before anything is yielded, when the rig lacks a channel that feedback needs, or no
+    package offers the controller.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ class FeedbackChannels:
     base: int
     response: int
     drive_units_per_volt: float
-    """With the divider."""
+    """Drive [V] per volt at the input, with the divider."""
     base_units_per_volt: float
     """[m/s2 per V]"""
     response_units_per_volt: float
@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return the velocity of m0 over its sensor's signal; 0 at 0 Hz if that is not a velocity."""
+        """Return the velocity of m0 over its sensor's signal; 0 at 0 Hz unless that is a velocity."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
@@ -66,11 +66,10 @@ class FeedbackChannels:
     def transmissibility(
         self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0
     ) -> complex:
-        """Return the displacement of m0 over that of the base, from velocity and acceleration.
+        """Return the displacement of m0 over that of the base; zero if the base does not move.
 
-        For a harmonic of m0 (also half or a third of the drive's frequency): its amplitude over that of the
-        base's fundamental, and its phase less ``harmonic`` times that of the base. Zero if the base does not
-        move.
+        For another ``harmonic`` of m0 (also 1/2 or 1/3), the amplitude is that of the harmonic over that of
+        the base's fundamental, and ``harmonic`` times the base's phase is subtracted from its phase.
         """
         if not np.any(base):
             return 0j
@@ -118,7 +117,7 @@ _REMEMBERED_S = 0.1
 
 
 class BridgedRows:
-    """Passes samples on, with a delay for the possible beginning of a drop-out."""
+    """Bridges drop-outs in a stream of samples; holds samples back while they may begin a drop-out."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
@@ -128,9 +127,7 @@ class BridgedRows:
         """Number of the next sample to be passed on."""
 
     def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
-        """Add samples, shape (3, samples) with the response last; return the first number and those passed
-        on.
-        """
+        """Add samples, shape (3, n), response last; return first number and rows of those passed on."""
         if first_sample != self._first + self._rows.shape[1]:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)
@@ -152,14 +149,12 @@ class BridgedRows:
 
 
 LEAST_ANSWER = 0.05
-"""Share of the linear model's acceleration below which the loop is taken to be open. A specimen on its
-resonance holds a light table back to about a fifth."""
+"""Share of the linear model's acceleration below which the loop is taken to be open. A specimen at
+resonance may reduce the motion of a light table to about a fifth."""
 
 
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
     """Raise LimitExceeded when the base hardly moves, so that the run ramps down.
-
-    Raises LimitExceeded: the run then ramps down.
 
     Parameters
     ----------

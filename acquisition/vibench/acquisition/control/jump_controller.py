@@ -1,6 +1,6 @@
 """Locating a jump: return to the branch before it, then halve the interval.
 
-A motion can be stopped by lowering its drive, which is a way out of a persistent branch.
+To leave a persistent branch, the motion on it is stopped by lowering the drive.
 """
 
 from collections.abc import Sequence
@@ -129,9 +129,7 @@ class JumpLocator:
         return search.bracket, JumpSearchEnd.ELSEWHERE
 
     def _halve(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
-        """Halve the bracket to its end; None when the motion left its branch earlier, which gives a new
-        bracket.
-        """
+        """Halve the bracket; None when the motion left its branch earlier: the bracket is then a new one."""
         seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
@@ -155,7 +153,7 @@ class JumpLocator:
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until its branch is found again, then forward to the branch's end.
 
-        Forward in one fast glide; if that leaves the branch, step by step, to find where.
+        The way forward is one fast glide; if that leaves the branch, a second one in steps shows where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -176,7 +174,7 @@ class JumpLocator:
     def _left(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward; return place and point where the motion has left the branch."""
+        """Go forward; return place and point where the motion has left the branch, or None."""
         for place in steps:
             found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
@@ -197,9 +195,7 @@ class JumpLocator:
         return None
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
-        """Stop the motion at the branch's first frequency: a branch that began from rest is then reached
-        again.
-        """
+        """Stop the motion at the branch's first frequency: a branch that began from rest is reached again."""
         yield from decay_motion(self._settling_controller.loop)
         found = yield from self._settling_controller.settled()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None

@@ -34,7 +34,7 @@ class MeasuredDensities:
     response: Samples
     """[(m/s)2/Hz]"""
     kurtosis: float
-    """Kurtosis of the base's acceleration: 3 of Gaussian noise."""
+    """Kurtosis of the base's acceleration: 3 for Gaussian noise."""
 
 
 class Equaliser:
@@ -119,7 +119,7 @@ class Equaliser:
         return np.asarray(10 * np.log10(np.maximum(heard.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:
-        """Return the density at the lines, averaged over the resolution; whole periods, without leakage."""
+        """Return the density at the lines, averaged over the resolution; whole periods avoid leakage."""
         plan = self._plan
         count = round(self._rate_hz * plan.periods / plan.repetition_hz)
         spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count

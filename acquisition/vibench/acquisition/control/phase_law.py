@@ -16,7 +16,7 @@ _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
 value.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
-"""Typical change of the logarithm of the half-width from one level to the next."""
+"""Trial changes of the logarithm of the half-width from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
 """The same for a super- or subharmonic, whose first half-width is known only roughly."""
 _SURE_RAD = radians(12.0)
@@ -24,7 +24,7 @@ _SURE_RAD = radians(12.0)
 _STEEPER = 0.5
 """Largest relative growth of a backbone's bend from level to level."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms of that drift above which the motion is another one."""
+"""Rms of the unexplained drift above which the motion counts as another one."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class LearntMode:
     super- or subharmonic."""
     half_width_hz: float
     bend_hz: float = 0.0
-    """Change of the resonance while the level grew by e; zero if unknown."""
+    """Change of the resonance for a growth of the level by a factor of e; zero if unknown."""
     steeper_hz: float = 0.0
-    """Additional change expected towards the next level."""
+    """Expected change of ``bend_hz`` towards the next level."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +48,23 @@ class TrackedPlace:
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """None until a level was found: the next one is searched for."""
+    """None until a level has locked: the next level is then searched."""
 
 
 class PhaseLaw:
     """The law of the phase-locked loop (decisions 0064 and 0074).
 
-    In a look of the time L the phase of a motion over its drive drifts by ``2 pi L (r - f) - h e``: f is the
-    frequency, r the resonance, e the phase error in radians, and h = 2 pi L w the decay of the mode, with
-    its half-width w. The frequency moves by g times the resulting r - f, so that the error falls by the
-    share g at every look. If it does not, its own part, ``g w e``, grows. For the n-th harmonic, r and w
-    refer to the drive (the mode's, divided by n), and L is n times as long. For a subharmonic of order n, e
-    is the error of n times its phase, r and w refer to the drive, and a look has n times as many drive
-    periods.
+    During a look of length L, the phase of the motion over the drive drifts by ``2 pi L (r - f) - h e``: f is
+    the frequency, r the resonance, e the phase error in radians, and h = 2 pi L w the decay of the mode, with
+    its half-width w. The frequency is changed by g times the resulting r - f, so that the error falls by the
+    share g at every look. If it falls too slowly, g is raised in the term ``g w e``. For the n-th harmonic,
+    r and w refer to the drive (the mode's, divided by n), and L is n times as long. For a subharmonic of
+    order n, e is the error of n times its phase, r and w refer to the drive, and a look has n times as many
+    drive periods.
 
-    A bent resonance moves while the motion grows to its new level. The level that the motion has reached
-    follows the base with the decay of the mode; r moves with its logarithm, as estimated from earlier
-    levels, and this is added to the frequency in advance.
+    A bent resonance moves while the motion grows to a new level. The level of the motion follows the base
+    with the decay of the mode, and r changes with the logarithm of that level, as estimated from earlier
+    levels. This change is added to the frequency in advance.
     """
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
@@ -75,14 +75,14 @@ class PhaseLaw:
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """Level at which the motion would settle [m/s2]."""
+        """Level of the base at which the present motion would be settled [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []
         """Frequency [Hz], error of the phase [rad] and level [m/s2] of each look."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look; return the phase error [rad] and the remaining change of the motion, a share."""
+        """Add a look; return the phase error [rad] and the remaining relative change of the motion."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -96,9 +96,7 @@ class PhaseLaw:
         return error_rad, max(left, bends)
 
     def next_hz(self, frequency_hz: float, base: float) -> float:
-        """Return the next frequency, within the plan's band; ``base`` is the coming level of the base
-        [m/s2].
-        """
+        """Return the next frequency, in the plan's band; ``base`` is the next level of the base [m/s2]."""
         foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
         widest_hz = self._plan.widest_step_hz
         step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
@@ -138,11 +136,11 @@ class PhaseLaw:
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
 
     def _off_hz(self, frequency_hz: float) -> float:
-        """Return the change of frequency for the phase of the newest looks."""
+        """Return the change of frequency that corrects the phase of the newest looks [Hz]."""
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Before the first look only the level was different.
+        # Before the first look only the level changed: the phase is taken as unchanged.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -162,12 +160,12 @@ _NEAREST = 3
 _STEEPEST_DEG = 85.0
 """Larger errors are replaced by this: the tangent of a right angle is infinite."""
 _BEND = 0.15
-"""Largest relative difference between the slope over that part and the slope at the resonance."""
+"""Largest relative difference between the slope of the straight part and the slope at the resonance."""
 
 
 @dataclass(frozen=True)
 class PhaseError:
-    """Phase minus its target at a frequency [degrees], with its standard uncertainty by chance."""
+    """Phase minus its target at a frequency [degrees], with its random standard uncertainty."""
 
     frequency_hz: float
     error_deg: float
@@ -199,7 +197,7 @@ class PhaseSearch:
     """Largest step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
-    """Whether the phase is that of a linear mode; otherwise its slope is known only close by."""
+    """Whether the phase is that of a linear mode; if not, only the nearest tries give its slope."""
 
     def next_hz(self) -> float:
         """Return the next frequency to try, after at least one."""
@@ -235,7 +233,7 @@ class PhaseSearch:
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
             # All at one frequency, or all beyond a right angle: the crossing is not determined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        # A given phase changes the tangent more, the further out it is.
+        # The same change of phase changes the tangent more, the further out it is.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))

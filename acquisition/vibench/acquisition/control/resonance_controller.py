@@ -22,7 +22,7 @@ from .steadiness import ORDERS, Periods
 _UNKNOWNS = 8
 """Real unknowns of the fit: frequency, damping, and a complex polynomial of degree two."""
 _SURE = 2.0
-"""Standard uncertainties by which a damping differs from zero."""
+"""Smallest ratio of a damping to its standard uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Mode:
 
 
 def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
-    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None where it gives no mode.
+    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None without a mode.
 
-    That is with too few points, a damping within its uncertainty, or a frequency beside all points.
+    There is no mode if points are too few, or the fit has no sure damping or a frequency beside all points.
 
     The polynomial on the right contains the mode's residue, the motion of the base itself and the flanks of
-    other modes; a constant error of all phases only turns it. Levy's linear least squares, weighted once
-    more by the fitted denominator.
+    other modes; a constant error of all phases only rotates it. The method is Levy's linear least squares,
+    reweighted by the fitted denominator.
 
     Parameters
     ----------
@@ -92,14 +92,14 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the correction for the remaining phase."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest remaining change of the motion, over the tolerance of the phase in radians; for a slow motion."""
+"""Largest remaining change of the motion over the phase tolerance [rad]; the second is for slow motions."""
 _LOOKS_LOCKED = 3
 """Looks in a row with phase and level within tolerance that count as locked."""
 _FINEST = 2e-6
-"""Smallest step of a search, relative to the frequency: the sides of a jump are closer together."""
+"""Smallest relative step of a search: with a smaller one, it is between the two sides of a jump."""
 _BATCHES = 8
 _KNOWN = 4.0
-"""Standard errors of a motion above which its phase is defined."""
+"""Ratio of a motion to its standard error above which its phase is defined."""
 _FURTHEST = 1.5
 """Distance of the furthest flank point from the resonance, in half-widths."""
 
@@ -108,7 +108,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     """Lock on to the resonance at every level and record there; continue to the next level from there."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # It may be a hundredth of the whole motion, which then seems settled long before.
+        # The tracked order may be a hundredth of the whole motion, which would seem settled too early.
         loop.judged_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
@@ -175,10 +175,10 @@ def _lock(
 
 
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
-    """Return the factor by which the setting changes first when the level does.
+    """Return the factor of the first change of the setting towards a new level.
 
-    A specimen reduces the motion of a light table only after it has grown: at first the base moves by the
-    whole change of the setting, over that reduction.
+    A specimen reduces the motion of a light table only after its own motion has grown. Until then the base
+    follows the whole change of the setting, so the first change must be smaller.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
     share = min(1.0, bare_vpp / loop.setting.setting_vpp)
@@ -191,7 +191,7 @@ def _search(
 ) -> Controller[TrackedPlace]:
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Its motion settles slowly: unsettled tries would give a wrong slope of the phase.
+        # Such a motion settles slowly: unsettled tries would give a wrong slope of the phase.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     settling_controller = SettlingController(loop, rule, level)
@@ -240,8 +240,8 @@ def _search(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks, so the first width, measured without them, is kept. A superharmonic also
-    # depends on how near contacts are to their first: its width is not a bound.
+    # Contacts bend the flanks, so the first width, measured without contacts, is kept. The width of a
+    # superharmonic also depends on the distance to the first contact: it is not a bound.
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
@@ -297,7 +297,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
         if plan.subharmonic > 1:
             remaining = max(remaining, plan.settling.tolerance)
         return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
-    # The phase of a difference of motions also depends on their ratio, that of a single one does not.
+    # The phase of a difference of two motions also depends on their ratio.
     turned = plan.motion(found.harmonics) - found.transmissibility
     size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
     return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
@@ -323,7 +323,7 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
     ratios = np.array([plan.motion(each) for each in ratios])
     if abs(ratios.mean()) <= _KNOWN * float(np.std(ratios, ddof=1)) / sqrt(_BATCHES):
-        # Noise: the spread of its phases is bounded, which bounds their uncertainty too.
+        # The phases of noise have a bounded spread, which would give too small an uncertainty.
         return PhaseError(found.drive_hz, error_deg, 180.0)
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))

@@ -76,8 +76,8 @@ def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float)
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return the side of a jump to which a response between its ends belongs.
 
-    It belongs before the jump if it is nearer to the response before, and no further from that than the
-    response after; a jump to a third branch counts like one to the second.
+    It belongs before the jump if it is nearer to the response before than to the one after, and no further
+    from it than these two are apart. A jump to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
@@ -152,7 +152,7 @@ class SettledState:
             motion=found.steadiness,
             period=found.period,
             waited_s=round(self.waited_s, 3),
-            # Too few periods for a value: as uncertain as the motion itself.
+            # With too few periods for a value, the scatter is set to the size of the motion.
             scatter=found.scatter if isfinite(found.scatter) else 1.0,
             noise=found.noise if isfinite(found.noise) else 0.0,
             setting_vpp=self.setting_vpp,
@@ -164,7 +164,7 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Waits until the motion at one frequency has settled, as far as it does."""
+    """Waits until the motion at one frequency has settled, or the longest wait is over."""
 
     loop: SineLoop
     rule: Settling
@@ -193,7 +193,7 @@ class SettlingController:
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Return the setting that brings a motion without scatter to its level at another frequency [V]."""
+        """Return the next setting towards the level at ``frequency_hz`` [V]; scatter is ignored."""
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
@@ -221,7 +221,7 @@ class SettlingController:
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         level = self.level
         if self.loop.judged_order is not None:
-            # Its phase depends on the level too, so all compared periods need the same level.
+            # The phase of one order depends on the level, so all compared periods need the same level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
@@ -233,7 +233,7 @@ class SettlingController:
     def found(self, waited_s: float) -> SettledState:
         """Judge the periods since the last change."""
         loop, periods = self.loop, self.loop.periods
-        # A slow motion has only just settled.
+        # A slow motion has only just settled, so only its newest periods count.
         newest = periods.last(
             max(self.rule.periods, periods.count // 2) if loop.judged_order is None else self.rule.periods
         )
@@ -297,7 +297,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
                 level=held,
             )
         )
-        # All pieces since the last change form one mean, because chaos needs a long one.
+        # All pieces since the last change form one mean, because chaos needs a long mean.
         next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
@@ -317,7 +317,7 @@ def record_settled(
 def record_and_judge(
     settling_controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
-    """Record a motion as a segment, long enough to judge it from that."""
+    """Record a motion as a segment that is long enough to judge it."""
     shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _record_held(settling_controller, segment, duration_s)

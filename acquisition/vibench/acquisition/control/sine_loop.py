@@ -38,8 +38,8 @@ class _Answer:
 class GainEstimator:
     """Recent gain of the base, relative to the linear model of the rig.
 
-    In chaos the fundamental of a few periods is mostly chance, so the mean of the track counts. If the gain
-    changes steadily, as over a resonance, a line through the track is extrapolated to the next step.
+    In chaos the fundamental of a few periods is mostly chance, so recent steps (the track) are averaged. If
+    the gain changes steadily, as over a resonance, a line through the track is extrapolated.
     """
 
     def __init__(self, memory_s: float) -> None:
@@ -74,7 +74,7 @@ class GainEstimator:
         return float(abs(np.mean([each.level for each in self._answers])))
 
     def gain_at(self, time_s: float) -> float:
-        """Predict the magnitude of the gain; 1, the model, without measurements."""
+        """Predict the magnitude of the gain; 1, as in the model, without measurements."""
         if not self._answers:
             return 1.0
         gain = np.array([each.gain for each in self._answers])
@@ -101,7 +101,7 @@ class DriveSetting:
 
 
 class SineLoop:
-    """Sets the drive, and evaluates it once a period."""
+    """Sets the drive, and evaluates the motion once a period."""
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self.measurement = measurement
@@ -152,7 +152,7 @@ class SineLoop:
         return self.channels.velocity_over_response(orders_hz)
 
     def listen_to_silence(self) -> Controller[None]:
-        """Record silence: the response then shows noise."""
+        """Record silence, which shows the noise of the response."""
         samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
         # The first half lets the bench check ring out.
@@ -220,7 +220,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up at a frequency: to the level, by the rig's model, or to the plan's setting."""
+    """Ramp up at a frequency to the level, by the rig's model; without level, to the plan's setting."""
     setting_vpp = loop.most_vpp
     if level is not None:
         guess_vpp = _bare_vpp(loop, level, frequency_hz)
@@ -326,7 +326,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # The newest look alone: earlier ones belong to another setting.
+        # Only the newest look counts: earlier ones belong to another setting.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:

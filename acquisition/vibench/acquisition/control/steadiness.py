@@ -1,6 +1,4 @@
-"""Whether a motion sampled once a period has settled: it repeats after k periods, or its statistics are
-steady.
-"""
+"""Tests whether a motion sampled once a period repeats after k periods, or has steady statistics."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -14,8 +12,8 @@ from ..excitation.feedback import Settling
 from ..instruments import Samples
 from ..recording import Steadiness
 
-# The motion once a drive period: its Fourier coefficients over each period of the recorded drive. The
-# generator's clock in the converter's time gives the beginning of each drive period.
+# A sample of the motion is its Fourier coefficients over one period of the recorded drive. The generator's
+# clock in the converter's time gives the beginning of each drive period.
 
 _MEMORY = 40
 """Number of blocks for the frequency; a line through their phases is then accurate enough."""
@@ -81,8 +79,8 @@ ORDERS = 5
 class Periods:
     """One row for each period of the motion, of one or several drive periods.
 
-    Phases count from the drive's upward zero crossing (a sine is real), for several drive periods from any
-    one.
+    Phases are relative to the drive's upward zero crossing (the coefficient of a sine is real), with several
+    drive periods to any one of them.
     """
 
     base: Phasors
@@ -164,7 +162,7 @@ class Stroboscope:
 
 
 def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phasors:
-    """Fourier coefficients over each of the periods that begin at ``starts`` (in samples, not whole).
+    """Fourier coefficients over each of the periods that begin at ``starts`` (in fractional samples).
 
     The integral up to a place between two samples is a cubic through both of its values and slopes,
     so that a period need not be a whole number of samples. ``turns`` are cycles per sample.
@@ -217,7 +215,7 @@ last.
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a series of periods shows about the motion; shares of its rms size."""
+    """Result for a series of periods; values are shares of the motion's rms size."""
 
     steadiness: Steadiness
     period: int
@@ -240,7 +238,7 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
     points
         Fourier coefficients of each drive period, shape (periods, orders).
     noise
-        Rms of them in silence, all orders together; unit of the points.
+        Rms of the coefficients in silence, all orders together; unit of the points.
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)
@@ -264,7 +262,7 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
 
 
 def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
-    """Convert a period to drive periods, when each of the ``points`` is this many long.
+    """Convert the period of a judgement to drive periods; each of the ``points`` spans ``drives`` of them.
 
     A motion that repeats after one drive period has only noise at the orders in between, even if a
     subharmonic is weak. A hum that is also present in silence is noise.
@@ -330,7 +328,7 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
     """Test whether the statistics of blocks are steady: no trend, and no step between the halves."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    # Without the mean, unless a single order is judged.
+    # The first order, or the single one that is judged.
     fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)
