@@ -1,7 +1,7 @@
 """Real instruments: Tektronix AFG1022 and Keysight 33500B over VISA, inputs and outputs behind NI-DAQmx.
 
 Each implements the protocols of `vibench.acquisition.instruments`: every setting is read back, every refusal
-becomes an error with advice, and outputs are switched off whatever happens. No other package here imports
+becomes an error with advice, and outputs are switched off after any error. No other package here imports
 pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but no plans or runs, and cannot distinguish
 a simulated instrument from a real one.
 """

@@ -1,4 +1,4 @@
-"""The Tektronix AFG1022: every setting is read back, and the output is switched off whatever happens."""
+"""The Tektronix AFG1022: every setting is read back, and a failed change switches the output off."""
 
 import re
 import statistics
@@ -21,7 +21,7 @@ _BURST_CHANNEL = 1
 _QUIET_FREQUENCY_HZ = 1000.0
 _STOP_ATTEMPTS = 2
 _LATENCY_TRIALS = 9
-# The AFG1022 reports high impedance as 9.9E+37; any load above the largest finite one (10 kohm) means it.
+# The AFG1022 reports high impedance as 9.9E+37; its largest finite load is 10 kohm.
 _INFINITE_OHM = 1e6
 _SAME_LOAD = 0.01
 
@@ -29,7 +29,7 @@ _SAME_LOAD = 0.01
 class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
-    `open` makes it, with the output off, 1 kHz sine at the smallest amplitude, no offset. Frequency and
+    `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
     amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp``
     are refused (`LimitExceeded`), and no step between two settings is larger than the larger of them.
     """
@@ -73,8 +73,8 @@ class AFG1022X(ScpiInstrument):
     def open(cls, config: GeneratorConfig) -> Self:
         """Find the generator, switch its output off, and bring it into a known state.
 
-        Raises InstrumentLost or InstrumentBusy or InstrumentError when nothing, another program, or another
-        instrument answers; the output is then off, as far as the instrument could be reached.
+        Raises InstrumentLost when nothing answers, InstrumentBusy when another program holds the resource,
+        InstrumentError for another instrument; the output is then off, if it could be reached.
         """
         generator = cls(config)
         leave = generator.disconnect  # another instrument gets no further commands
@@ -143,7 +143,7 @@ class AFG1022X(ScpiInstrument):
             self.panel_vpp = panel_vpp
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: its sweep time is set on the panel only."""
+        """Refuse: the sweep time can be set on the panel only."""
         del amplitude_vpp
         self.model.check_sweep(sweep)
 
@@ -162,7 +162,7 @@ class AFG1022X(ScpiInstrument):
             self.panel_vpp = panel_vpp
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each `trigger`; LimitExceeded on channel 2, which has no bursts."""
+        """Play ``cycles`` periods at each `trigger`; raises LimitExceeded on channel 2."""
         if self.channel != _BURST_CHANNEL:
             raise LimitExceeded(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
         self._arm_burst(cycles)
@@ -286,7 +286,7 @@ class AFG1022X(ScpiInstrument):
 
     def _to_quiet_sine(self) -> None:
         """Set a sine of the smallest amplitude, without modes and offset, from any state."""
-        # *RST is not used: what it does to the output of this model is not documented.
+        # *RST is not used: its effect on the output of this model is not documented.
         self._end_modes()
         self.offset_v = 0.0  # first: it lowers the peak at any amplitude
         self._mute()
@@ -313,7 +313,7 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Set the load that the generator expects; return settings to be confirmed if it cannot be known.
+        """Set the load that the generator expects; return settings to be confirmed if it cannot be read.
 
         Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so it is
         tried. A wrong load is a factor of two at the terminal. Raises SettingRefused when the generator

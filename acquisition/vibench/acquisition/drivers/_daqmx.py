@@ -28,7 +28,7 @@ from ._daqmx_errors import NOT_OFFERED, daqmx_call
 from ._overload import overload_ranges
 
 # Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for this time
-# is gone, even if its connection still exists.
+# counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 60.0
 # A second of four channels at the highest rate is beyond gRPC's default of 4 MB.
 _NO_LIMIT = -1
@@ -194,9 +194,7 @@ def _refusal(channel: Channel, what: str, sent: str, got: str) -> SettingRefused
 
 
 def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
-    """Return what the driver reports about a device named ``"cDAQ1Mod1"``; raises the DAQmx client's
-    errors.
-    """
+    """Return the driver's report on a device, such as ``"cDAQ1Mod1"``; raises errors of the DAQmx client."""
     system = session.system()
     device = system.devices[device_name]
     product, serial = str(device.product_type), f"{device.serial_num:08X}"
@@ -297,7 +295,7 @@ class DaqmxDigitizer:
         with daqmx_call(
             f"reading samples {first_sample} to {first_sample + samples - 1} of {self._config.device}"
         ):
-            self._is_running = False  # until the block is whole
+            self._is_running = False  # until the block is complete
             volts, counts = self._next_samples(samples)
             told = self._overloaded_roles()
             self._is_running = True
@@ -388,9 +386,9 @@ class DaqmxDigitizer:
         piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self.sample_rate_hz))
         for first in range(0, rows.shape[1], piece):
             count = min(piece, rows.shape[1] - first)
-            # The reader needs C order, which a slice of columns has not: only a long read is copied.
+            # The reader needs C order, which a slice of columns does not have: a long read is copied.
             target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
-            # The client leaves what a short reply lacks as it was; no converter has this value.
+            # A short reply leaves this marker in place; no converter returns such a value.
             target[-1, -1] = missing = -np.inf if target.dtype.kind == "f" else np.iinfo(target.dtype).min
             came = read(target, count, count / self.sample_rate_hz + _READ_MARGIN_S)
             if came != count or target[-1, -1] == missing:
@@ -402,7 +400,7 @@ class DaqmxDigitizer:
                 rows[:, first : first + count] = target
 
     def _overloaded_roles(self) -> frozenset[str]:
-        """Return the channels that the device itself flags; read during the run, and not all devices can."""
+        """Return the channels that the device reports as overloaded during the run; not all devices can."""
         if not self._tells_overloads:
             return frozenset()
         stream = self._open_task().in_stream

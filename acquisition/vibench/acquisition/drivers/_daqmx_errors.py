@@ -1,4 +1,4 @@
-"""What each DAQmx error means for a measurement, and what to do about it: one table.
+"""Table of DAQmx errors: the meaning of each for a measurement, and advice.
 
 Numbers and names: ``nidaqmx.error_codes.DAQmxErrors``; meanings: NI-DAQmx help and hardware reference 5.3.
 """
@@ -23,7 +23,7 @@ from ..errors import (
 
 @dataclass(frozen=True)
 class Meaning:
-    """One DAQmx error for the person at the bench."""
+    """Explanation of one DAQmx error for the operator."""
 
     kind: type[AcquisitionError]
     happened: str
@@ -106,7 +106,7 @@ MEANINGS: dict[Code, Meaning] = {
     ),
 }
 
-# A property that this device, or this kind of task, does not have.
+# Errors for a property that this device, or this kind of task, does not have.
 NOT_OFFERED = frozenset({Code.ATTR_NOT_SUPPORTED, Code.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT})
 
 _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED})

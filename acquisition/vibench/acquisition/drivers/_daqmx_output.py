@@ -18,7 +18,7 @@ from ._daqmx import DaqmxDigitizer, daqmx_identity
 from ._daqmx_errors import daqmx_call
 
 _WRITE_TIMEOUT_S = 10.0
-# The output holds the last of these; some devices need more than one.
+# Length of the final zeros: the output holds the last one, and some devices need more than one.
 _ZERO_SAMPLES = 64
 # Two oscillators of one device do not differ; a larger deviation means another rate.
 _SAME_RATE = 1e-6
@@ -58,7 +58,7 @@ class DaqmxOutput:
         SettingRefused
             When the device takes another sample rate than requested.
         InstrumentError
-            As `_daqmx_errors` tells them apart; nothing stays reserved then.
+            As listed in `_daqmx_errors`; nothing stays reserved then.
         """
         output = cls(physical, config, digitizer)
         output._to_zero()
@@ -84,7 +84,7 @@ class DaqmxOutput:
         return int(self._config.ahead_s * self._config.sample_rate_hz)
 
     def write(self, volts: Samples) -> None:
-        """Add samples behind those still to be played; wait for room if there is none.
+        """Add samples behind those still to be played; wait if the buffer is full.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class DaqmxOutput:
             Task(grpc_options=self._digitizer.session.options) as task,
         ):
             self._add_channel(task)
-            # Clocked, because delta-sigma outputs need it.
+            # Delta-sigma outputs need a clock.
             zeros = np.zeros(_ZERO_SAMPLES)
             task.timing.cfg_samp_clk_timing(
                 self._config.sample_rate_hz, sample_mode=AcquisitionType.FINITE, samps_per_chan=zeros.size
@@ -193,9 +193,7 @@ class DaqmxOutput:
 
 
 def _set_idle_output(channel: AOChannel) -> IdleOutput:
-    """Set the idle output to zero volts and return the value read back: many devices hold their last
-    value.
-    """
+    """Set the idle output to zero volts; return the value read back, since many devices hold the last one."""
     # A device that cannot do this refuses the setting, and one that does not know it refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS

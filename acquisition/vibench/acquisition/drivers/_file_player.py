@@ -17,8 +17,8 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` names it. With the plan of the recording, check and segments have the same
-    places; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. Under the plan of the recording, check and segments are at the same
+    samples; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
@@ -30,7 +30,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError where seal, channels, scales or rate do not fit."""
+        """Open the recording; raises ConfigurationError if seal, channels, scales or rate do not fit."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -69,7 +69,7 @@ class FilePlayer:
 
     @property
     def identity(self) -> Identity:
-        """The recording's id; real or simulated stays as recorded."""
+        """Id of the recording, and whether it was measured or simulated."""
         made = self._recording
         reply = f"{made.path.name}, recorded {made.started_utc}, {made.origin.value}"
         return Identity("", "recording", made.recording_id, "", reply, origin=made.origin.value)
@@ -131,7 +131,7 @@ class FilePlayer:
 
     @property
     def waiting_samples(self) -> int:
-        """None: a recording is as fast as its reader."""
+        """Zero: a recording is read at any speed."""
         return 0
 
     def stop(self) -> None:

@@ -26,7 +26,7 @@ class Shape(StrEnum):
 class ArbitraryCodes(NamedTuple):
     """One period in the generator's memory: without DC, over the full range of codes.
 
-    Code 0 is minus, and the model's ``top_code`` plus, half of the panel's peak-to-peak amplitude.
+    Code 0 is minus half of the panel's peak-to-peak amplitude, and the model's ``top_code`` is plus half.
     """
 
     codes: NDArray[np.uint16]
@@ -178,24 +178,24 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Takes the place of a generator on a bench without one; commands are refused, or known from a file.
+    """Placeholder on a bench without generator; it refuses commands, or accepts those of a recording's plan.
 
     The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """
 
     name: str
     silently: str = ""
-    """Why it accepts commands and plays nothing; empty: it accepts none."""
+    """Reason why it accepts commands although it plays nothing; empty if it refuses them."""
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return a description without abilities, or one that accepts everything in the file."""
+        """Return a description without abilities, or one wide enough for a recording's plan."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
 
     def open(self, config: GeneratorConfig) -> Self:
-        """Nothing to open."""
+        """Return a copy with the configured limit; no instrument is opened."""
         return type(self)(self.name, self.silently, config.amplitude_limit_vpp)
 
     @property

@@ -1,7 +1,7 @@
 """The Keysight 33500B: sines, waveforms and bursts like any other generator, and internal sweeps.
 
-Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; nothing was
-compared with an instrument.
+Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; not tested on
+an instrument.
 """
 
 import re
@@ -20,7 +20,7 @@ _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2
 _SPACINGS = {Spacing.LINEAR: "LIN", Spacing.LOGARITHMIC: "LOG"}
 _SAME_MEAN = 1e-4
 LONGEST_HOLD_S = 3600.0
-"""How long the stop frequency is held after a sweep."""
+"""Holding time of the stop frequency after a sweep [s]."""
 
 
 class Keysight33500B(AFG1022X):
@@ -82,7 +82,7 @@ class Keysight33500B(AFG1022X):
             self.burst = "OFF"
 
     def _end_modes(self) -> None:
-        """End sweep, burst and modulation; amplitudes are peak to peak, waveforms held, not smoothed."""
+        """End sweep, burst and modulation; set amplitudes to peak to peak, and the waveform filter off."""
         self.sweep = self.burst = self.am = self.fm = self.pm = self.fsk = self.pwm = "OFF"
         self.amplitude_unit = "VPP"
         self.output_filter = "OFF"
@@ -100,7 +100,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Fill the memory; it reports the number of points and their mean, not the points."""
+        """Fill the memory, and compare number and mean of its points: the points cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

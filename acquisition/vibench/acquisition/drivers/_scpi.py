@@ -1,6 +1,4 @@
-"""SCPI instruments: every complaint is read, every lost connection is reported, every setting is read
-back.
-"""
+"""SCPI instruments: error queues and settings are read back, and lost connections are reported."""
 
 import re
 import threading
@@ -23,7 +21,7 @@ Codes = NDArray[np.uint16]
 
 # An error queue has some tens of entries; more replies than this mean that it is not being emptied.
 _LONGEST_QUEUE = 64
-# A faulty instrument may never stop. SCPI's longest text is an error of 255 letters; 8192 points have 16 kB.
+# A faulty instrument may never stop sending. The longest SCPI text has 255 letters; 8192 points have 16 kB.
 _LONGEST_TEXT = 300
 _LONGEST_REPLY = 1_000_000
 # Long enough for an old reply that is under way, short enough for an emergency stop [ms].
@@ -163,7 +161,7 @@ class ScpiInstrument:
         return self.held[header]
 
     def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
-        """End a mode; a mode that the firmware does not know, with an empty reply, cannot be on."""
+        """End a mode; an empty reply means that the firmware does not have it, so it cannot be on."""
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
@@ -244,7 +242,7 @@ class ScpiInstrument:
 
 @dataclass(frozen=True)
 class Number:
-    """A number, formatted by ``form``; read back within the resolution of the instrument, or refused."""
+    """A number, formatted by ``form``; refused unless it reads back within the instrument's resolution."""
 
     header: str
     """``{c}`` stands for the channel."""
@@ -266,7 +264,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Word:
-    """One of several words, each with all its replies (upper case)."""
+    """A setting with several words; ``answers`` lists the replies for each, in upper case."""
 
     header: str
     answers: Mapping[str, tuple[str, ...]]
@@ -279,7 +277,7 @@ class Word:
         self._expect(owner, word)
 
     def insist(self, owner: ScpiInstrument, word: str) -> None:
-        """Set it and ignore complaints, which may be old: the value read back decides."""
+        """Set the word and ignore complaints, which may be old: the value read back decides."""
         owner.send(f"{self.header.format(c=owner.channel)} {word}")
         self._expect(owner, word)
 

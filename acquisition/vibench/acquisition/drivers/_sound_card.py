@@ -1,7 +1,7 @@
 """A sound card as converter and analogue output, over PortAudio, once calibrated.
 
 A sound card does not report volts and passes no DC: its full scale is measured once and written in
-``daq.options`` (docs/instruments.md, decision 0054); without it nothing opens. Inputs and output are one
+``daq.options`` (docs/instruments.md, decision 0054); otherwise no card opens. Inputs and output are one
 stream, so they begin together except for the card's delay.
 """
 
@@ -28,14 +28,14 @@ from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges
 
 _LATEST_S = 10.0
-"""A card whose samples are later than this counts as dead."""
+"""A card whose samples are later than this counts as lost [s]."""
 _SAME_RATE = 1e-6
 
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
 
 
 def _sounddevice() -> Any:
-    """Load the library; MissingLibrary if it, or the system's PortAudio, is not installed."""
+    """Load the library; raises MissingLibrary if it, or the system's PortAudio, is not installed."""
     need_extra("sound")
     try:
         return import_module("sounddevice")
@@ -192,7 +192,7 @@ class SoundCardDigitizer:
         self._is_running = True
 
     def read(self, samples: int) -> Block:
-        """Wait for the next samples; DataLost when some were overwritten, InstrumentLost when none come."""
+        """Return the next samples; raises DataLost if some were overwritten, InstrumentLost if none come."""
         if not self._is_running or samples < 1:
             raise InstrumentError(
                 f"{samples} samples were requested from {self._device}, which is not sampling; start it"
@@ -254,7 +254,7 @@ class SoundCardOutput:
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: SoundCardDigitizer) -> Self:
-        """Open the output of the stream; ConfigurationError for another rate, or a limit beyond its own."""
+        """Open the output of the stream; raises ConfigurationError for a wrong rate or too high a limit."""
         output = cls(physical, config, digitizer)
         if config.sample_rate_hz != digitizer.sample_rate_hz or config.limit_v > output._full_scale_v:
             raise ConfigurationError(
@@ -266,7 +266,7 @@ class SoundCardOutput:
 
     @property
     def identity(self) -> Identity:
-        """The card's, and the name of its output."""
+        """Identity of the card, with the name of its output."""
         card = self._digitizer.identity
         return Identity(card.maker, card.model, "", card.firmware, f"{self._physical} of {card.reply}")
 
@@ -316,7 +316,7 @@ class SoundCardOutput:
         self._card.drop()
 
     def close(self) -> None:
-        """Zero volts. Legal at any time."""
+        """Play zero volts and accept no more samples. Legal at any time."""
         self._is_open = False
         self.stop()
 

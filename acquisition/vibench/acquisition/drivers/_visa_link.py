@@ -12,7 +12,7 @@ from pyvisa.resources import MessageBasedResource
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
 from ..host.shipped import shipped
 
-# A later reply is a failure. The slowest known one is the read-back of 8192 points.
+# A later reply is a failure. The slowest known reply is the read-back of 8192 points.
 TIMEOUT_S = 3.0
 UDEV_RULES = "hardware_configs/70-vibench.rules"
 USB_DEVICES = Path("/sys/bus/usb/devices")
@@ -56,8 +56,7 @@ def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
     pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
     """
     with warnings.catch_warnings():
-        # When it searches the network, pyvisa-py advises to install more and leaves a socket open; both are
-        # ignored.
+        # When it searches the network, pyvisa-py warns of missing packages and leaves a socket open.
         warnings.simplefilter("ignore", UserWarning)
         warnings.simplefilter("ignore", ResourceWarning)
         return tuple(_manager(visa_library).list_resources("?*"))
