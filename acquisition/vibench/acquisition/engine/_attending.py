@@ -33,9 +33,9 @@ class _Program:
         Thread(target=self._follow, name="follow program", daemon=True).start()
 
     def still_s(self) -> float:
-        """Return for how long the program gave no sign of life, without its wait for a processor [s].
+        """Return how long the program has given no sign of life, without its waits for a processor [s].
 
-        That thread either works or waits while it could run; Linux tells of a wait when it is over, too late.
+        While it can run (state R), only its working time counts: Linux reports a wait only after its end.
         """
         lived_s = self._lived_s  # read before the clock: the next sign of life may come in between
         now_s, worked_s = monotonic(), self._worked_s
@@ -68,7 +68,7 @@ class _Program:
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
             self._lived_s = monotonic()
-        os._exit(0)  # whatever the other thread waits for
+        os._exit(0)  # even while the other thread waits
 
 
 def main() -> None:

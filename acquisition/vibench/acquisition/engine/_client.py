@@ -1,4 +1,4 @@
-"""Engines of this user: where they are announced, requests to them, and the process that attends them."""
+"""Finding the engines of this user, sending requests to them, and the process that attends one."""
 
 import json
 import os
@@ -60,7 +60,7 @@ class Announcement(Program):
 def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
     """Let `announced_engines` find this engine inside the context; ``press`` carries out stops from files.
 
-    Raises AcquisitionError when the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """
     told = Announcement.model_validate({**facts_of_this_process(what), "address": address})
     with announce_program(press, told):
@@ -70,7 +70,7 @@ def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str]
 def announced_engines() -> tuple[Announcement, ...]:
     """Return every engine of this computer whose process is alive, oldest first, whether it answers or not.
 
-    One that refuses is none: where its process is known to live, it is among `programs_without_engine`.
+    One that refuses connections is left out; `programs_without_engine` returns it if its process lives.
     """
     found = []
     for told in announced_programs(Announcement):
@@ -82,9 +82,7 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Return scripts and checks that drive a bench without an engine, and engines that refuse, oldest
-    first.
-    """
+    """Return scripts and checks that drive a bench themselves, and engines that refuse; oldest first."""
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
@@ -109,11 +107,10 @@ def the_engine(pid: int | None) -> Announcement:
 
 
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
-    """Return the programs that a stop addresses: engines, and scripts and checks that drive a bench
-    themselves.
+    """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
-    Those of other containers on this computer are among them; what is left in the state folder reaches
-    them. Raises EngineError when there is none. ``pid`` selects one; None: all of this computer.
+    Programs in other containers of this computer are included, since they read the same state folder.
+    Raises EngineError when there is none. ``pid`` selects one; None: all of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained)
@@ -121,7 +118,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Name the programs of other computers that share the state folder; empty if there are none."""
+    """Return a sentence on the programs of other computers that share the state folder, or nothing."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return (
@@ -160,7 +157,7 @@ def _refuses(address: EngineAddress) -> bool:
 
 
 PATIENCE_S = 5.0
-"""How long an answer may take; the engine answers in milliseconds [s]."""
+"""Longest wait for an answer, which usually takes milliseconds [s]."""
 
 
 class Hello(FrozenModel):
@@ -172,7 +169,7 @@ class Hello(FrozenModel):
 
 
 def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
-    """Connect to a running engine with its token; no answer on the connection may take ``patience_s``."""
+    """Connect to a running engine with its token; ``patience_s`` [s] limits the wait for each answer."""
     hello = Hello(token=address.token, role=role)
     try:
         connection = socket.create_connection((address.host, address.port), patience_s)
@@ -197,7 +194,7 @@ def exchange(
 ) -> tuple[dict[str, Any], bytes]:
     """Send a request and wait for its answer: the parsed text, and the bytes after it.
 
-    ``work_s`` [s] is what the answer may take beyond the patience of the connection.
+    ``work_s`` [s] is added to the longest wait for an answer on this connection.
 
     Raises
     ------
@@ -206,7 +203,7 @@ def exchange(
     EngineGone
         When the connection has ended; it is closed then.
     AcquisitionError
-        What the engine refuses with.
+        When the engine refuses the request: its error.
     """
     usual_s = connection.gettimeout()
     patience_s = (usual_s or PATIENCE_S) + work_s
@@ -239,7 +236,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Raise the engine's error here, if it is one of ours."""
+    """Return the engine's error by the name of its class; an EngineError for an unknown one."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)
@@ -272,7 +269,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         """Connect to a running engine, to watch or to attend its run.
 
         Raises EngineSilent when no answer comes within ``patience_s`` [s], now or later, and EngineGone when
-        nobody listens there.
+        no engine listens there.
         """
         return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 
@@ -328,7 +325,7 @@ class Attendant:
 
     @property
     def pid(self) -> int:
-        """The attendant's process."""
+        """Number of the attendant's process."""
         return self._process.pid
 
     def live(self) -> None:
@@ -339,7 +336,7 @@ class Attendant:
         self._told_s = now_s
         try:
             os.write(self._pipe.fileno(), b".")
-        except BlockingIOError:  # it stands still, and so does the engine's patience
+        except BlockingIOError:  # the pipe is full, because the attendant does not read it
             pass
         except OSError:
             if now_s - self._begun_s > AGAIN_S:
@@ -348,7 +345,7 @@ class Attendant:
 
     def close(self) -> None:
         """Stop attending. Legal at any time."""
-        self._told_s = inf  # whatever `live` says from now on
+        self._told_s = inf  # `live` sends nothing from now on
         self._end()
 
     def _end(self) -> None:

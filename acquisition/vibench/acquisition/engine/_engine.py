@@ -70,7 +70,7 @@ class Engine:
 
     @property
     def rig(self) -> Rig | None:
-        """The configuration of the open bench; None while there is none."""
+        """The configuration of the open bench; None if no bench is open."""
         reconnecting = self._reconnecting
         return None if reconnecting is None else reconnecting.bench.rig
 
@@ -82,7 +82,7 @@ class Engine:
 
     @property
     def stop_sentence(self) -> str:
-        """Who stopped the run, and whether the output is off; empty without a stop."""
+        """Sentence on who stopped the run, and whether the output is off; empty without a stop."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""
@@ -94,7 +94,7 @@ class Engine:
         return () if self._reconnecting is None else self._reconnecting.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
-        """Open the bench of a rig; ``confirm`` as `vibench.acquisition.open_bench` takes it."""
+        """Open the bench of a rig; ``confirm`` as for `vibench.acquisition.open_bench`."""
         try:
             self._reconnecting = ReconnectingBench(rig, confirm)
             self._reconnecting.__enter__()
@@ -109,7 +109,7 @@ class Engine:
     def close(self) -> None:
         """Silence the bench and close it. Legal at any time.
 
-        Raises AcquisitionError, once it is shown, when an instrument fails at that.
+        Raises AcquisitionError, after publishing it, when an instrument fails.
         """
         failure = self._release()
         self.published.enter(EngineState.CLOSED)
@@ -250,7 +250,7 @@ def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
 
 Job = Callable[[], object]
 ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
-"""After a campaign that one of these has stopped, the process ends too."""
+"""Causes of a stop that also ends the process, after the campaign."""
 
 
 class JobQueue:
@@ -269,7 +269,7 @@ class JobQueue:
         self._jobs.put(None)
 
     def run(self) -> None:
-        """Do jobs until told to leave; the bench is then always closed."""
+        """Do jobs until `leave`; always close the bench at the end."""
         try:
             while (job := self._jobs.get()) is not None:
                 self._do(job)
@@ -282,7 +282,7 @@ class JobQueue:
             job()
         except AcquisitionError:
             pass  # the engine has published it
-        except Exception as error:  # noqa: BLE001 - whatever it is: silence, and an engine that can tell of it
+        except Exception as error:  # noqa: BLE001 - any error must silence the bench and be published
             self._engine.fault(error)
         request = self._engine.switch.request
         if request is not None and request.cause in ENDING_CAUSES:

@@ -1,4 +1,4 @@
-"""The state of an engine that viewers see: written by its own thread, read by any other, never waited for."""
+"""State of an engine as viewers see it: the engine's thread writes it, any other reads it without waiting."""
 
 import shutil
 import threading
@@ -124,7 +124,7 @@ class Messages:
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:
-        """Add an error; ours state what happened, what was done, and what to do next."""
+        """Add an error, split into what happened, what was done, and what to do next."""
         match error:
             case AcquisitionError():
                 what, done, next_step = message_parts(str(error))
@@ -263,7 +263,7 @@ class PublishedState:
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Set the result of a recording; those of an earlier session are done already."""
+        """Set the result of a recording; kept ones count with their planned time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:

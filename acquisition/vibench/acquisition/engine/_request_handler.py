@@ -57,7 +57,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
-    # Points of a period or the length of a ramp may be used up without harm; only loads can damage.
+    # Limits on waveform points and ramps may be used up without harm; only loads can damage.
     loads = [named for named in checks if named[1].load is not None]
     tightest, closest = max(loads or checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
@@ -111,7 +111,7 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 STALL_S = 0.2
 """A check of the viewers that is later than this shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""A viewer's patience grows by this many times the lateness of this process: both share the computer."""
+"""The patience with a viewer grows by this times the lateness of this process: they share a computer."""
 TAKEN_OVER_S = 2.0
 """An engine without parent is taken over by a viewer whose last request is more recent than this [s]."""
 FORGETTING = 0.995
@@ -166,7 +166,7 @@ class RequestHandler:
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
-        """Note for how long the window has stood still; the viewer itself has been noted."""
+        """Note for how long the window has stood still; the server has noted the viewer's presence."""
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
@@ -208,7 +208,7 @@ class RequestHandler:
         """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
         Checking the limits of a long campaign takes seconds. A stop in this time has nothing to disarm, so
-        it is checked again before arming.
+        the number of stops is compared before arming.
         """
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
@@ -290,9 +290,7 @@ class RequestHandler:
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if (
-            since_s > STALL_S
-        ):  # the viewer whose requests waited while this process was stalled is not to blame
+        if since_s > STALL_S:  # requests of viewers waited while this process was stalled
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -311,14 +309,14 @@ class RequestHandler:
 
     @property
     def continues_unattended(self) -> bool:
-        """Whether a run continues that was meant to be left alone."""
+        """Whether a run is going on that was started as unattended."""
         return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
 
     @property
     def outlives_its_parent(self) -> bool:
         """Whether work remains after the parent program has ended.
 
-        This is a campaign that was left alone; after it, the engine remains while somebody attends it.
+        The work is a campaign that was left alone; after it, the engine stays while somebody attends it.
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
@@ -363,7 +361,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # otherwise a start has come in between, with its own switch
+        while switch is not self._engine.switch:  # a start in between brings its own switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

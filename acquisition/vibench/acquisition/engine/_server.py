@@ -1,5 +1,4 @@
-"""The engine's server: loopback, a token, and one thread for each connection, which alone waits for its
-viewer.
+"""The engine's server: on loopback, with a token, and a thread for each connection.
 
 `serving` makes an engine visible to other programs, with a watchdog that enforces deadlines while the
 engine's own thread is at work.
@@ -202,7 +201,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""With one more, the viewer with the oldest request is disconnected: a frozen one holds 20 MB."""
+"""With more viewers, the one with the oldest request is disconnected: a frozen one holds 20 MB."""
 REQUEST_S = 10.0
 """How long a request may take, from its first byte to its last [s]."""
 
@@ -245,7 +244,7 @@ class Server:
         if surplus > 0:
             self._make_room()
         try:
-            # Does not wait until it runs, as Thread.start does: without memory that would be for ever.
+            # Thread.start would wait until the thread runs, which never happens without memory.
             start_new_thread(self._serve, (viewer,))
         except RuntimeError:  # the system gives no more threads
             self._leave(viewer)
@@ -258,7 +257,7 @@ class Server:
                 key=lambda each: (each.role is ConnectionRole.ATTENDING, each.asked_s),
             )
         if viewers:
-            # Wakes its thread wherever that waits; closing alone would not.
+            # A shutdown wakes the viewer's thread from any wait; closing alone would not.
             with suppress(OSError):
                 viewers[0].connection.shutdown(socket.SHUT_RDWR)
 
@@ -296,7 +295,7 @@ def address_line(address: EngineAddress) -> str:
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
     """Serve a request handler at ``host``; ``what`` describes the engine to other programs.
 
-    Raises AcquisitionError when the state folder cannot be written: nobody could stop what cannot be found.
+    Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))

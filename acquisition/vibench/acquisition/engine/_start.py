@@ -130,20 +130,20 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
 
 
 PATIENCE_S = 1.0
-"""How long an engine may take to answer; it takes milliseconds [s]."""
+"""Longest wait for an answer, which usually takes milliseconds [s]."""
 
 
 class StopDelivery(StrEnum):
     """How far a stop has reached a program."""
 
     TOLD = "told"
-    """An engine accepted it, and its output was read back as off."""
+    """An engine accepted the stop, and its output was read back as off."""
     TAKEN = "taken"
     """The same for a program that is not an engine."""
     UNHEEDED = "unheeded"
-    """The engine accepted it but has not confirmed that its output is off."""
+    """The engine accepted the stop but has not confirmed that its output is off."""
     KEPT = "kept"
-    """The engine has not accepted it: its process is alive and obeys when it resumes."""
+    """The engine has not accepted the stop; its process is alive, and obeys when it resumes."""
 
 
 def stop_engine(
@@ -151,31 +151,29 @@ def stop_engine(
 ) -> StopDelivery:
     """Stop the drive of an engine or another program, and its campaign.
 
-    The stop is put down in the state folder, where it is obeyed within a twentieth of a second, and later
-    where the process stands still. Returns when the program has confirmed that its output is off, or does
-    not. Where no file can be written or removed, the stop is sent over the engine's connection. A hold is
-    only sent, never written: nobody wants one to begin unexpectedly.
+    The stop is written to a file in the state folder. The program obeys within a twentieth of a second, or
+    when its process resumes. Returns when the program has confirmed that its output is off, or has not done
+    so in time. If no file can be written, or the program does not take it, the stop is sent over the engine's
+    connection. A hold is only sent, never written to a file: it must not begin unexpectedly.
 
     Parameters
     ----------
     engine
-        As it announced itself.
+        Announcement of the program.
     level
-        How hard it stops.
+        How the run is stopped.
     reason
-        What the recording will say.
+        Reason stored in the recording.
 
     Raises
     ------
     EngineGone
-        When the process has ended, or when it could neither be told nor anything be put down.
+        When the process has ended, or the stop could neither be sent nor written.
     EngineError
-        When a hold is asked of a program that is not an engine.
+        When a hold is requested from a program that is not an engine.
     """
     level = chosen(StopLevel, level)
-    reason = reason.encode(
-        errors="replace"
-    ).decode()  # a terminal gives text that cannot be decoded as surrogates
+    reason = reason.encode(errors="replace").decode()  # a terminal's text may contain surrogates
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(

@@ -36,16 +36,16 @@ class EngineState(StrEnum):
 
 
 DRIVING = frozenset({EngineState.RUNNING, EngineState.HELD, EngineState.RAMPING_DOWN})
-"""The drive may be on, for a recording."""
+"""States in which the drive may be on for a recording."""
 SOUNDING = DRIVING | {EngineState.CHECKING}
-"""The drive may be on, also for the small sine of a check."""
+"""States in which the drive may be on, including the small sine of a check."""
 
 
 class Supervision(StrEnum):
     """Whether a run needs a viewer."""
 
     ATTENDED = "attended"
-    """The run is aborted without requests for longer than `patience_s`."""
+    """The run is aborted when no request comes for longer than `patience_s`."""
     UNATTENDED = "unattended"
     """A campaign that is left alone: viewers may come and go."""
 
@@ -68,16 +68,14 @@ HUNG_FACTOR = 4.0
 
 
 def hung_patience_s(granted_s: float) -> float:
-    """Return how long a drive may continue while the window is blocked [s]; ``granted_s``: without
-    reports.
-    """
+    """Return how long a drive may continue with a blocked window; ``granted_s``: without requests [s]."""
     return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
 
 
 def patience_s(longest_s: float, use: float) -> float:
     """Return how long a drive may continue without requests: the closer to a limit, the shorter [s].
 
-    ``use`` is the share of the tightest limit; ``longest_s`` [s] is what was granted far from all of them.
+    ``use`` is the share of the tightest limit; ``longest_s`` [s] is the patience far from all limits.
     """
     return max(VIEWER_PATIENCE_S, min(longest_s, VIEWER_PATIENCE_S / max(use, 1e-9)))
 
@@ -296,7 +294,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return once why it ended by itself; None while it runs or is off."""
+        """Return, once, why the twin ended by itself; None while it runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

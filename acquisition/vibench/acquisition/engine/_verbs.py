@@ -2,7 +2,7 @@
 
 A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the connection;
 its decorator gives the word in the message, the form of the answer, and the engine's states that permit it.
-Client and server use these declarations: a new verb is one more of them, and a method of the same name and
+Client and server use these declarations: a new verb needs such a method, and one with the same name and
 parameters on `RequestHandler`. The engine's token permits all requests.
 """
 
@@ -76,11 +76,11 @@ Model = TypeVar("Model", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Answer(Generic[A]):
-    """How an answer is sent."""
+    """Conversion of an answer to a message and back."""
 
     written: Callable[[A], Message]
     read: Callable[[Any, bytes], A]
-    """From the parsed JSON text and the bytes after it."""
+    """Returns the answer for the parsed JSON text and the bytes after it."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Verb(Generic[A]):
     """One kind of request to an engine."""
 
     word: str
-    """In the message, under ``ask``."""
+    """Value of ``ask`` in the message."""
     method: str
     """Name of the method of request handler and client."""
     request: type[FrozenModel]
@@ -96,7 +96,7 @@ class Verb(Generic[A]):
     states: tuple[EngineState, ...]
     """Permitted states; empty: legal in every state, and never delayed."""
     work_s: float
-    """Time to compute the answer [s]; 0: it is ready."""
+    """Longest time to compute the answer [s]; 0 if it is ready at once."""
 
     def message(self, **arguments: object) -> Message:
         """Return the message of a request."""
@@ -105,7 +105,7 @@ class Verb(Generic[A]):
 
 
 ARMING_S = 300.0
-"""Checking the limits of a hundred sweeps takes seconds, on a busy computer a minute."""
+"""Longest time for arming [s]: the limits of a hundred sweeps take seconds, on a busy computer a minute."""
 VERBS: dict[str, Verb[Any]] = {}
 """Every verb, by its word."""
 
@@ -273,4 +273,4 @@ class EngineVerbs:
 
 _REQUESTS: Any = reduce(or_, (row.request for row in VERBS.values()))
 REQUEST: TypeAdapter[FrozenModel] = TypeAdapter(Annotated[_REQUESTS, Field(discriminator="ask")])
-"""Reads a request from JSON, or refuses it."""
+"""Validates a request in JSON."""

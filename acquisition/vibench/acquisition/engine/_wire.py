@@ -28,7 +28,7 @@ class Bounds:
 
 
 HELLO = Bounds(1_000)
-"""Before the token was shown."""
+"""For messages before the token was shown."""
 REQUESTS = Bounds(32_000_000)
 """A campaign of thousands of measurements; no request carries samples."""
 ANSWERS = Bounds(32_000_000, 64_000_000)
@@ -97,7 +97,7 @@ def send(connection: socket.socket, message: Message) -> None:
 
 
 def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
-    """Wait for one message, up to the connection's timeout; from its first byte on ``within_s``.
+    """Wait for one message: up to the connection's timeout, then ``within_s`` after its first byte.
 
     Raises WireError when the connection ends or the data are not a message, and TimeoutError when no message
     comes in time.
