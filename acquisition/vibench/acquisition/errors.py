@@ -1,4 +1,4 @@
-"""Errors of a measurement: each text states what happened, what was done about it, and what to do next."""
+"""The errors of a measurement: each says what happened, what was done about it, and what to do next."""
 
 from dataclasses import dataclass
 
