@@ -19,7 +19,7 @@ class ConfigurationError(AcquisitionError, ValueError):
 
 
 class MissingLibrary(AcquisitionError, ImportError):
-    """A library is missing that only an extra installs; the text names the extra."""
+    """A library of an optional extra is not installed; the text names the extra."""
 
 
 class InstrumentError(AcquisitionError):
