@@ -114,7 +114,7 @@ class BenchLock:
 
 
 def _instruments(rig: Rig) -> Iterator[str]:
-    """Yield a name for each instrument that is the same in every configuration of that instrument."""
+    """Yield one normalised name for each instrument, so that all its spellings share a lock."""
     for resource in (rig.generator.resource, rig.controller.resource if rig.controller else ""):
         if resource:
             yield _plain(resource)
