@@ -49,11 +49,11 @@ class CatalogueEntry:
     """One recording of a folder. Unknown values are empty, or None."""
 
     path: str
-    """Relative to the folder, with ``/``."""
+    """Path relative to the folder, with ``/``."""
     name: str
     """Name of the measurement."""
     state: str
-    """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
+    """Word of `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
     """``good``, or what to check: ended early, near full scale, samples lost."""
@@ -67,14 +67,14 @@ class CatalogueEntry:
     duration_s: float | None = None
     size_bytes: int = 0
     bench_check: str = ""
-    """Verdict of the bench check before it."""
+    """Verdict of the bench check before the recording."""
     results: str = ""
     """Names of saved results of analyses, separated by commas."""
     operator: str = ""
     notes: str = ""
     recording_id: str = ""
     samples_id: str = ""
-    """Equal in copies; see `vibench.acquisition.recording.Recording`."""
+    """Id of the samples, equal in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
     """Word of `recording.SealState` after a quick check; empty if unknown."""
 
@@ -304,9 +304,9 @@ class VerifiedRecording:
     """Result of verifying one file."""
 
     path: str
-    """Relative to the folder, with ``/``; the name of a single file."""
+    """Path relative to the folder, with ``/``; the name of a single file."""
     verdict: str
-    """As in `recording.SealState`, ``unreadable`` or ``missing``."""
+    """Word of `recording.SealState`, ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]

@@ -45,10 +45,10 @@ class ReasonCode(StrEnum):
     FOUND = "found"
     """A complete recording of the same plan was in the folder."""
     GONE = "gone"
-    """It was done, but its recording is missing."""
+    """The point was done, but its recording is missing."""
     DAMAGED = "damaged"
-    """It was done, but its recording differs from its seal; the file is kept, and the point is measured
-    again."""
+    """The point was done, but its recording differs from its seal. The file is kept, and the point is
+    measured again."""
     STOPPED = "stopped"
     """Somebody requested a stop; the reason names who."""
     PROGRAM_ENDED = "program_ended"
@@ -174,8 +174,7 @@ def ignore_result(point_result: PointResult) -> None:
     """Ignore a result."""
 
 
-# The SQLite file of a journal: its tables, how it is opened, and its errors as sentences. docs/campaigns.md
-# describes the tables.
+# The SQLite file of a journal: its tables (see docs/campaigns.md), connections to it, and its errors.
 
 VERSION = 2
 

@@ -109,7 +109,7 @@ def _ends_a_line(path: Path) -> bool:
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval of lines without other events [s]: a night makes half a megabyte."""
+"""Interval of status lines between events [s]; a night gives half a megabyte."""
 LEFT_ALONE_S = 1.0
 """Longest time for writing the last lines [s]."""
 

@@ -296,7 +296,7 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Rig time [s] before the bench of a virtual rig is opened again: its cables may be reconnected in it."""
+"""Rig time [s] before the bench of a virtual rig is opened again; cables may be reconnected meanwhile."""
 
 
 class ReconnectingBench:
@@ -386,15 +386,15 @@ class CampaignEstimate:
     """Duration and size of a campaign, without existing recordings."""
 
     recordings: int
-    """Still to be made."""
+    """Number of recordings still to be made."""
     kept: int
-    """Complete already."""
+    """Number of recordings that are complete already."""
     duration_s: float
     """Rig time, with bench checks, lead-ins and ramps."""
     rest_s: float
-    """Part of it for pauses between recordings [s]."""
+    """Part of ``duration_s`` for pauses between recordings [s]."""
     lead_in_s: float
-    """Part of it for lead-ins of points in chains [s]."""
+    """Part of ``duration_s`` for lead-ins of points in chains [s]."""
     largest_bytes: int
     """Largest size [bytes] of one growing recording."""
     total_bytes: int
