@@ -27,7 +27,7 @@ from .loop import DRIVE_LEFT, LASTING, Lasting
 
 
 class CheckRule(StrEnum):
-    """Required check of a bench."""
+    """Bench check that is required before measurements."""
 
     FRESH = "fresh"
     """A check passed within the last ``check_valid_h`` hours with the same configuration."""
@@ -171,7 +171,7 @@ def check_bench(
     Parameters
     ----------
     bench
-        Open.
+        The open bench.
     folder
         Folder for recordings, whose disk is checked.
     clock
@@ -209,7 +209,7 @@ def require_fresh(
     Parameters
     ----------
     bench
-        Open, and not sampling.
+        The open bench; it must not be sampling.
     folder
         Folder for recordings.
     switch

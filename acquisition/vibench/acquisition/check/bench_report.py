@@ -56,7 +56,7 @@ def bench_report(
     Parameters
     ----------
     bench
-        Open, and not sampling.
+        The open bench; it must not be sampling.
     folder
         Folder for recordings.
     switch

@@ -20,7 +20,7 @@ _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
 def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
-    """Return the plug-ins that a hardware configuration names, without kinds of measurement."""
+    """Return the instrument plug-ins that a hardware configuration names, by kind."""
     return {each: set[str]() for each in PlugInKind} | {
         PlugInKind.GENERATOR: {rig.generator.driver},
         PlugInKind.DIGITIZER: {rig.daq.driver},
@@ -99,7 +99,7 @@ def bench(rig: Rig) -> Iterator[Bench]:
 
 @contextmanager
 def refused() -> Iterator[None]:
-    """Require an error of an instrument, not any exception."""
+    """Require an AcquisitionError other than BrokenPromise."""
     with pytest.raises(AcquisitionError) as told:
         yield
     assert not isinstance(told.value, BrokenPromise), str(told.value)
