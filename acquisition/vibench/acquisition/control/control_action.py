@@ -72,7 +72,7 @@ class MeasuredLevel:
     uncertainty: float
 
     def held(self, target: float, tolerance: float) -> Held:
-        """Return whether it is within the tolerance of ``target``."""
+        """Return whether the amplitude is within the tolerance of ``target``."""
         return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
 
 

@@ -39,7 +39,7 @@ class Mode:
 def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
     """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None without a mode.
 
-    There is no mode if points are too few, or the fit has no sure damping or a frequency beside all points.
+    There is none with too few points, a damping within its uncertainty, or a frequency outside the points.
 
     The polynomial on the right contains the mode's residue, the motion of the base itself and the flanks of
     other modes; a constant error of all phases only rotates it. The method is Levy's linear least squares,

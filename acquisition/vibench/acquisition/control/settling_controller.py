@@ -114,9 +114,9 @@ class SettledState:
     """Result at one frequency after waiting."""
 
     frequency_hz: float
-    """As commanded [Hz]."""
+    """Commanded frequency [Hz]."""
     drive_hz: float
-    """In the converter's time [Hz]."""
+    """Frequency in the converter's time [Hz]."""
     setting_vpp: float
     waited_s: float
     judgement: Judgement

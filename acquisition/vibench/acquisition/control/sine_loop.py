@@ -21,7 +21,7 @@ from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
 from .steadiness import ORDERS, Periods, Phasors, Stroboscope
 
 _SURE = 4.0
-"""Standard uncertainties above which a trend is followed instead of averaged."""
+"""Number of standard uncertainties above which a trend is extrapolated, not averaged."""
 _FEWEST = 3
 """Smallest number of steps for a trend and its scatter."""
 
@@ -334,7 +334,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Return the response [m], m0 over base, and the base's acceleration [m/s2]: amplitudes, newer half."""
+    """Return amplitudes of the newer periods: response [m], m0 over base, base acceleration [m/s2]."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

@@ -79,8 +79,8 @@ ORDERS = 5
 class Periods:
     """One row for each period of the motion, of one or several drive periods.
 
-    Phases are relative to the drive's upward zero crossing (the coefficient of a sine is real), with several
-    drive periods to any one of them.
+    Phases are relative to an upward zero crossing of the drive, so that the coefficient of a sine is real. If
+    a period has several drive periods, any of their crossings may be the reference.
     """
 
     base: Phasors
@@ -198,7 +198,7 @@ _THIRDS = 3
 _FEWEST_TURNS = 2
 """Repetitions of a long period in each third of the window, needed for a mean."""
 _SURE = 2.0
-"""Standard uncertainties that a value must stay away from its limit."""
+"""Smallest distance of a value from its limit, in standard uncertainties."""
 _CERTAIN = 5.0
 """Standard errors above which a mean is not noise."""
 _BLOCKS = 12
