@@ -262,7 +262,7 @@ class AFG1022X(ScpiInstrument):
                 f"of which {same} agree. Upload again; if it fails again, check the USB cable"
             )
 
-    # Inside
+    # Internal helpers
 
     @property
     def _panel_factor(self) -> float:

@@ -200,7 +200,7 @@ class NoGenerator:
 
     @property
     def identity(self) -> Identity:
-        """No identity."""
+        """Identity that contains only a name."""
         return Identity("", self.name, "", "", f"{self.name}: {self.silently or 'it plays nothing'}")
 
     @property
@@ -214,11 +214,11 @@ class NoGenerator:
         return _NOTHING_VPP, self.amplitude_limit_vpp
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take(f"a sine of {frequency_hz:g} Hz at {amplitude_vpp:g} Vpp")
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
@@ -226,19 +226,19 @@ class NoGenerator:
         raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp was asked of {self.name}; nothing plays")
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take(f"{frequency_hz:g} Hz")
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take(f"{amplitude_vpp:g} Vpp")
 
     def arm_burst(self, cycles: int) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take(f"a burst of {cycles} cycles")
 
     def trigger(self) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take("a trigger")
 
     def end_burst(self) -> None:
@@ -249,7 +249,7 @@ class NoGenerator:
         return 0.0
 
     def start(self) -> None:
-        """Accept it, or refuse."""
+        """Accept the command, or refuse it."""
         self._take("its output")
 
     def stop(self) -> None:

@@ -46,7 +46,7 @@ def _sounddevice() -> Any:
 
 
 class _Card:
-    """One stream of a card: samples in, samples out, on PortAudio's own thread."""
+    """One stream of a card; its callback runs in a thread of PortAudio."""
 
     def __init__(self, rig: Rig, inputs: tuple[int, ...], output: int | None) -> None:
         daq, library, self.rate_hz = rig.daq, _sounddevice(), rig.daq.sample_rate_hz
@@ -179,7 +179,7 @@ class SoundCardDigitizer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """None: PortAudio returns numbers, not counts."""
+        """None for each channel: PortAudio returns numbers, not counts."""
         return (None,) * len(self._channels)
 
     def start(self) -> None:
