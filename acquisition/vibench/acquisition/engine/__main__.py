@@ -71,7 +71,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """End when the parent program, which holds the other end of the input, has gone; finish work first."""
+    """Wait until the parent has closed the input and no work remains, then shut the engine down."""
     # Not through sys.stdin: a buffer on which a thread waits cannot be closed at the end of the process.
     while os.read(sys.stdin.fileno(), 4096):
         pass

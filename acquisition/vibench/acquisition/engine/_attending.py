@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """States of a Linux process that is stopped or dead."""
 LEAST_OWN = 0.25
-"""Smallest part of the time without a sign of life that counts, even if the system ran other programs."""
+"""Share of the time without a sign of life that always counts, even if the system ran other programs."""
 
 
 class _Program:

@@ -1,4 +1,4 @@
-"""The engine: it owns a bench, and publishes what it does with it."""
+"""The engine, which owns a bench and publishes its state."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -35,7 +35,7 @@ from ._verbs import CampaignRequest
 
 
 def bench_facts(bench: Bench) -> BenchFacts:
-    """Return which bench is open."""
+    """Return the description of an open bench for viewers."""
     return BenchFacts(
         rig_name=bench.rig.name,
         is_simulated=bench.rig.virtual is not None,

@@ -142,7 +142,7 @@ class RequestHandler:
     def carry_out(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
         """Carry out a request, if the engine's state permits it."""
         method: Callable[..., Answer] = getattr(self, verb.method)
-        if not verb.states:  # a stop gets through, whatever else is being requested
+        if not verb.states:  # a stop must not wait for other requests
             return method(**arguments)
         with self._asking:
             state = self._engine.published.state
@@ -176,7 +176,7 @@ class RequestHandler:
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the state of the engine, without rows that the viewer has."""
+        """Return the state of the engine, without the rows if the viewer has them."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 

@@ -266,11 +266,11 @@ class TwinProcess:
 
     @property
     def is_on(self) -> bool:
-        """Whether it was started; it may have ended since."""
+        """Whether the twin was started; it may have ended since."""
         return self._process is not None
 
     def turn(self, switch: TwinSwitch) -> None:
-        """Start or end it. Legal in every state."""
+        """Start or end the twin. Legal in every state."""
         match switch:
             case TwinSwitch.ON if self._process is None:
                 self._process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
