@@ -236,7 +236,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Return the engine's error by the name of its class; an EngineError for an unknown one."""
+    """Return the engine's error as the same class, or as an EngineError if that is unknown."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)

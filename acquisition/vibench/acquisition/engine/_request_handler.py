@@ -111,7 +111,7 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 STALL_S = 0.2
 """A check of the viewers that is later than this shows that this process was stalled [s]."""
 LATE_FACTOR = 4.0
-"""The patience with a viewer grows by this times the lateness of this process: they share a computer."""
+"""Factor on the lateness of this process, which is added to the patience: viewers share its computer."""
 TAKEN_OVER_S = 2.0
 """An engine without parent is taken over by a viewer whose last request is more recent than this [s]."""
 FORGETTING = 0.995
