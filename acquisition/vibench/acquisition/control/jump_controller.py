@@ -129,7 +129,7 @@ class JumpLocator:
         return search.bracket, JumpSearchEnd.ELSEWHERE
 
     def _halve(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
-        """Halve the bracket; None when the motion left its branch earlier: the bracket is then a new one."""
+        """Halve the bracket until it is narrow enough; None when the motion left its branch earlier."""
         seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
