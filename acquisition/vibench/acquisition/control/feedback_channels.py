@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return the velocity of m0 over its sensor's signal; at 0 Hz 0, unless the sensor measures velocity."""
+        """Return the velocity of m0 over its sensor's signal; at 0 Hz 0, except for velocity sensors."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
