@@ -56,7 +56,7 @@ class CatalogueEntry:
     """Word of `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``good``, or what to check: ended early, near full scale, samples lost."""
+    """``samples not checked``, or what to check: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""

@@ -456,7 +456,7 @@ class Journal(ClosedOnLeaving):
             )
 
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
-        """Queue a point again whose recording is missing."""
+        """Queue a point again whose recording is missing or damaged."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 

@@ -131,7 +131,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Rig time after the running point."""
+        """Rig time of the points and pauses before the running point [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""

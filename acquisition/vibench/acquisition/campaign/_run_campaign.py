@@ -313,7 +313,7 @@ class ReconnectingBench:
     def bench(self) -> Bench:
         """The open bench."""
         if self._bench is None:
-            raise AcquisitionError("the bench is not open: enter it with 'with KeptBench(...) as kept'")
+            raise AcquisitionError("the bench is not open: use 'with ReconnectingBench(...) as kept'")
         return self._bench
 
     @property

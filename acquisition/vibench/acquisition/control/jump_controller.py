@@ -45,7 +45,7 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""How often the search restarts when the motion leaves its branch earlier than before."""
+"""Most searches; another one begins when the motion leaves its branch earlier than before."""
 
 
 class _Return(Enum):

@@ -80,7 +80,7 @@ class Equaliser:
     def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
         """Update the gains with the densities of a realisation.
 
-        Raises LimitExceeded when a density is past its abort line, or the base hardly answers.
+        Raises LimitExceeded when the base hardly answers.
         """
         heard = MeasuredDensities(
             self._density(drive),

@@ -315,7 +315,7 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # The means of thirds also differ by chance; noise is subtracted as far as it explains that.
+    # The means of thirds also differ by chance; the limit includes the noise.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 

@@ -27,7 +27,7 @@ from ..rig import TOKEN_KEY, Channel, ChannelConfig, DaqConfig, Rig, channels_of
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
 from ._overload import overload_ranges
 
-# Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for this time
+# Longer than any single read (`LONGEST_READ_S` plus its margin): a server that is silent for this time
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 60.0
 # A second of four channels at the highest rate is beyond gRPC's default of 4 MB.

@@ -56,8 +56,8 @@ def bench_facts(bench: Bench) -> BenchFacts:
 class Engine:
     """A bench and the jobs on it; one thread calls the methods and alone uses the instruments.
 
-    Other threads read `published` and use `switch`. A method publishes an error and then raises it. Leave the
-    engine through a ``with``: the bench is then silent and closed.
+    Other threads read `published` and use `switch`. A method publishes an error and then raises it. Call
+    `close` at the end: the bench is then silent and closed.
     """
 
     def __init__(self, supervision: Supervision) -> None:
