@@ -1,5 +1,5 @@
-// The C interface, with plain numbers only. No function throws, allocates, or keeps state between calls, so
-// threads may share tables. Arguments are checked, and refused with a code.
+// The C interface: plain numbers only. No function throws, allocates memory, or keeps state between calls, so
+// threads may share tables. Every function checks its arguments and returns a code if it refuses them.
 #include "batch.hpp"
 #include "chain.hpp"
 #include "cubic.hpp"
@@ -17,8 +17,8 @@ using namespace vibench;
 
 namespace {
 
-constexpr double LATEST = 1e12;  // [s]
-constexpr int64_t MOST_PARTS = 1000000;  // parts of an interval between readings
+constexpr double LATEST = 1e12;  // largest time [s]
+constexpr int64_t MOST_PARTS = 1000000;  // most parts of an interval between two readings
 
 bool is_positive(double x) { return x > 0.0 && is_finite(x); }
 bool is_not_negative(double x) { return x >= 0.0 && is_finite(x); }
@@ -95,7 +95,7 @@ bool is_usable(const Readings &readings) {
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
 
-// Calls `act` with a run of the motion for the stops of the specimen.
+// Builds the `Run` that fits the specimen's law, and returns the result of `act` with it.
 template <class T, class Act>
 Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record &record, const Act &act) {
   auto with = [&](const auto &stops) {
@@ -140,7 +140,7 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
   return outcome;
 }
 
-// One change, or room for six: the same source, compiled twice.
+// Compiled for one change, which is faster, and for up to six.
 Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
                 Record &record) {
   if (tangent.changes == 1) return advance<1>(state, tangent, tables, until, tolerance, record);
@@ -158,7 +158,7 @@ constexpr struct {
     DESCRIBED(Readings),
     // Batches
     DESCRIBED(CollisionMonomials), DESCRIBED(CollisionFit), DESCRIBED(BatchMotion), DESCRIBED(Batch),
-    // Signals, world, hidden motion
+    // Signals, analogue world, hidden-state estimation, chains
     DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
     DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoadedShaker), DESCRIBED(LoopCables),
     DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
@@ -169,7 +169,7 @@ constexpr int64_t STRUCTURE_COUNT = sizeof STRUCTURES / sizeof *STRUCTURES;
 
 }  // namespace
 
-// Text and size of all structures, each after those that it contains.
+// Text and size of each structure. A structure follows the structures that it contains.
 VIBENCH_API const char *vibench_structure(int64_t index) {
   return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].text : nullptr;
 }
@@ -181,7 +181,7 @@ VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
   return sizeof(Tables) + (law == POWERS ? sizeof(PowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_tables(law) bytes; the shapes of collisions and steps must remain valid.
+// Fills `tables`, of vibench_size_of_tables(law) bytes. The scene's shapes must outlive them.
 VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   fill_tables(*tables, *scene);
@@ -209,7 +209,7 @@ VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until
   return advance(*state, *tables, until, tolerance, *record);
 }
 
-// Does the same, and integrates the changes of `tangent` too.
+// Advances `state` like vibench_run, together with the small changes in `tangent`.
 VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state, double until, double tolerance,
                                              Record *record, Tangent *tangent) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr) return REFUSED;
@@ -217,7 +217,7 @@ VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state,
   return advance(*state, *tangent, *tables, until, tolerance, *record);
 }
 
-// Takes readings of the growth of changes, up to reading `last`; returns an `Outcome`.
+// Advances `state` and `tangent`, and stores the growth up to reading `last`; returns an `Outcome`.
 VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, double tolerance, Record *record,
                                           Tangent *tangent, Readings *readings, int64_t last) {
   if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr || readings == nullptr)
@@ -229,7 +229,7 @@ VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, do
   });
 }
 
-// Upper bound of |p| until a stop is touched [m], because free phasors only decay; infinite on a stop.
+// Upper bound of |p| until the next touch [m]: the sum of the phasors' magnitudes. Infinite on a stop.
 VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   if (tables == nullptr || state == nullptr || state->side != 0.0) return INFINITE;
   Clock<double> clock{state->clock_high, state->clock_low, 0.0};
@@ -242,7 +242,7 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
 
 namespace {
 
-constexpr double MOST_PIECES = 1e15;  // pieces of an interval
+constexpr double MOST_PIECES = 1e15;  // most pieces of an interval
 
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
@@ -269,12 +269,12 @@ bool is_usable(const CubicDrive &drive, double interval) {
 
 }  // namespace
 
-// Size of the tables of a `Law` for such a base [bytes].
+// Size of the tables of a `Law` for a base of cubics [bytes].
 VIBENCH_API int64_t vibench_size_of_cubic_tables(int64_t law) {
   return sizeof(CubicTables) + (law == POWERS ? sizeof(CubicPowerTables) : 0);
 }
 
-// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes; the shapes of steps must remain valid.
+// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes. The scene's shapes must outlive them.
 VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   bool has_powers = scene->specimen.law == POWERS;
@@ -282,7 +282,7 @@ VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables 
   return REACHED_END;
 }
 
-// Advances `state` over the intervals of `drive`, and fills `record` without observation; returns an `Outcome`.
+// Advances `state` over the intervals of `drive`, and counts impacts in `record`; returns an `Outcome`.
 VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, CubicDrive *drive, double tolerance,
                                        Record *record) {
   if (tables == nullptr || state == nullptr || drive == nullptr || record == nullptr) return REFUSED;
@@ -297,13 +297,13 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
   return outcome;
 }
 
-// ---- Batches, signals, the world of the virtual rig, hidden motion, and chains: functions of one structure
+// ---- Batches, signals, analogue world, hidden-state estimation, chains: functions of one structure
 
 namespace {
 
-constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // motions of a batch
-constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // drive periods of a motion in a batch
-constexpr int64_t LAST_STEP = int64_t(1) << 60;  // last step of a world
+constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // most motions of a batch
+constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // most drive periods of a motion in a batch
+constexpr int64_t LAST_STEP = int64_t(1) << 60;  // largest number of a step of the analogue world
 constexpr int64_t MOST_SMALL_STEPS = 100000;
 constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
 constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
@@ -493,20 +493,20 @@ int64_t follow_chain(ChainMotion &chain) { return ChainRun(chain).advance(); }
 
 }  // namespace
 
-// Moves the shaker of a closed loop over the rest of a stretch; returns a `LoopEnd`, or REFUSED.
+// Advances shaker and controller over the remaining steps of `loop`; returns a `LoopEnd`, or REFUSED.
 VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
   if (loop == nullptr || loop->shaker == nullptr || !is_usable(*loop) || !is_usable(*loop->shaker)) return REFUSED;
   if (loop->shaker->drive.at != loop->drive.at || loop->shaker->drive.size != loop->drive.size) return REFUSED;
   return close_loop(*loop);
 }
 
-// Size of the memory that a chain needs, in numbers.
+// Size of the memory that a chain needs [doubles].
 VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
   bool is_chain = cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells;
   return is_chain ? chain_memory(cells, kinds) : int64_t(REFUSED);
 }
 
-// Each returns the result of its function, or REFUSED.
+// Defines vibench_NAME, which returns the result of NAME, or REFUSED for unusable arguments.
 #define OF_ONE_STRUCTURE(function, Structure)                                 \
   VIBENCH_API int64_t vibench_##function(Structure *of) {                     \
     return of != nullptr && is_usable(*of) ? function(*of) : int64_t(REFUSED); \

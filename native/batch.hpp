@@ -1,8 +1,8 @@
-// Eight motions of one specimen in parallel in vector registers, without derivatives (decision 0061). A
-// flight is p = Re sum of four rotating terms. All lanes advance on the grid until at most one is still clear
-// of the stops. The others then search their touch, collide by polynomials and depart together, under masks.
-// A lane that has finished takes the next motion. The rules are those of flight.hpp. A motion does not depend
-// on the motions beside it: other lanes never change its numbers or decisions, and only make it wait.
+// Eight motions of one specimen in parallel, one per lane of a vector register (decision 0061). In flight, p
+// is the real part of four rotating terms. Lanes advance by grid steps, as in flight.hpp, until at most one
+// is clear of the stops. For the others the touch, the collision (by polynomials) and the first step after it
+// are then computed under masks. A lane that has finished takes the next motion of the batch. Other lanes can
+// delay a motion, but never change its numbers.
 #pragma once
 #include "collision_fit.hpp"
 #include "motion.hpp"
@@ -11,16 +11,16 @@ namespace vibench {
 
 constexpr int LANES = 8;
 constexpr unsigned ALL_LANES = (1u << LANES) - 1;
-constexpr int DRIVEN = 3, FLYING = 4;     // terms of p: three modes, and the drive as the last
-constexpr int ORDERS = 12;                // terms of a series over a grid step: the next adds 0.25^12 / 12!
-constexpr double FOUR = 4.0;              // grid steps at once far from the stops
+constexpr int DRIVEN = 3, FLYING = 4;     // terms of p: three modes, then the drive
+constexpr int ORDERS = 12;                // terms of a series over a grid step; the next is 0.25^12 / 12!
+constexpr double FOUR = 4.0;              // number of grid steps taken at once far from the stops
 constexpr int SHORT = 6, LONG = 10;       // terms of cosine and sine for angles up to 0.25 and up to 1 [rad]
-constexpr int WAITING = 1;                // lanes that may still advance while the others wait for the next event
-constexpr int TOUCH_CORRECTIONS = 3;      // from a second-order guess; the remainder is checked
+constexpr int WAITING = 1;                // lanes that may still be clear of the stops when a march ends
+constexpr int TOUCH_CORRECTIONS = 3;      // Newton steps to a touch from a second-order guess
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root, from a guess within a few per cent
 constexpr int HIGHEST = 8;                // highest derivative of p at a touch
-constexpr double LONGEST_PART = 0.25;     // longest collision, as a part of a drive period: the limit of LONG terms
-constexpr int64_t MOST_EVENTS = 10000;    // events per drive period, on average: far beyond any motion of a specimen
+constexpr double LONGEST_PART = 0.25;     // longest collision, over the drive period: LONG terms suffice
+constexpr int64_t MOST_EVENTS = 10000;    // most events per drive period, on average; no motion has so many
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
 using Lanes = Vector<LANES>;
@@ -29,7 +29,7 @@ using LanePhasor = Complex<Lanes>;
 struct InverseFactorials {
   double of[2 * LONG];
   constexpr InverseFactorials() : of{} {
-    double factorial = 1.0;  // exact: 19! has 53 bits without its factors of two
+    double factorial = 1.0;  // exact: the odd part of 19! fits into 53 bits
     for (int k = 0; k < 2 * LONG; k++) of[k] = 1.0 / factorial, factorial *= k + 1;
   }
 };
@@ -46,7 +46,7 @@ INLINE LanePhasor select(Mask mask, const LanePhasor &a, const LanePhasor &b) {
   return {select(mask, a.re, b.re), select(mask, a.im, b.im)};
 }
 
-// exp(i angle), by N terms of each series.
+// exp(i angle), by N terms of each of the series of cosine and sine.
 template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   Lanes square = angle * angle, cosine = 0.0, sine = 0.0;
   for (int k = N - 1; k >= 0; k--) {
@@ -57,7 +57,7 @@ template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   return {cosine, sine * angle};
 }
 
-// exp(rate time), for a mode with little decay during `time`.
+// exp(rate time), for a mode that decays little during `time`.
 template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes time) {
   Lanes shrinks = rate.re * time, size = INVERSE_FACTORIALS.of[6];
   for (int k = 5; k >= 0; k--) size = fused(size, shrinks, INVERSE_FACTORIALS.of[k]);
@@ -65,7 +65,7 @@ template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes
   return {size * turned.re, size * turned.im};
 }
 
-// Calls `act` with each lane of a mask.
+// Calls `act` with the number of each lane whose bit is set.
 template <class Act> INLINE void for_each_lane(unsigned lanes, const Act &act) {
   for (; lanes != 0; lanes &= lanes - 1) act(__builtin_ctz(lanes));
 }
@@ -93,27 +93,27 @@ class BatchRun {
   // Per lane: constants of its motion.
   BatchMotion *motion[LANES] = {};
   LanePhasor rate[FLYING] = {};              // [1/s]
-  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // factors of a term per step
+  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // factors of a term for one and four steps
   LanePhasor series[ORDERS][FLYING] = {};    // Taylor coefficients of exp(rate t)
-  Lanes square[FLYING] = {}, cube[FLYING] = {};  // of |rate|
+  Lanes square[FLYING] = {}, cube[FLYING] = {};  // square and cube of |rate|
   LanePhasor kick[DRIVEN] = {};              // change of a term by a unit impulse over the pair's mass
-  LanePhasor drive = {};                     // its term once per drive period
+  LanePhasor drive = {};                     // term of the drive at the start of each drive period
   Lanes period = {}, frequency = {}, grid = {};
-  Phasor shapes[LANES][FLYING][6] = {};      // motion of a unit of each term
+  Phasor shapes[LANES][FLYING][6] = {};      // motion for a term of 1 m
 
   // Per lane: current state.
   LanePhasor term[FLYING] = {};              // p = Re of their sum [m]
-  Lanes left = {};                           // time until the next state is due [s]
+  Lanes left = {};                           // time until the next state is due, once per drive period [s]
   Lanes reach = {}, bound = {}, jerk = {};   // bounds of |p|, |d2p/dt2| and |d3p/dt3| until a stop is touched
   Lanes low = {}, high = {};                 // a step is clear if p is within these limits at both ends
   Lanes low_four = {}, high_four = {};       // limits for four steps
   Lanes touch = {};                          // time until the stop is touched [s]
   DueStates due_states[LANES] = {};
-  int waiting[LANES] = {};                   // number of waiting terms
+  int waiting[LANES] = {};                   // number of due states not yet computed
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
 
-  int64_t taken = 0;  // motions
-  unsigned moving = 0, careful = 0;  // lanes that advance; lanes for which four steps were too many
+  int64_t taken = 0;  // number of motions taken from the batch
+  unsigned moving = 0, careful = 0;  // bits of lanes that advance; of those limited to single steps
 
   // ---- One lane
 
@@ -174,7 +174,7 @@ class BatchRun {
     return ++kept[lane] == motion[lane]->periods;
   }
 
-  // Computes the states of the waiting terms.
+  // Computes the stored due states of a lane from their terms.
   void form_states(int lane) {
     const DueStates &due = due_states[lane];
     double *to = motion[lane]->sections + 6 * (kept[lane] - waiting[lane]);
@@ -215,10 +215,10 @@ class BatchRun {
     Contact<double> contact{};
     double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
     begin_contact(contact, at, side, batch.tolerance, own);
-    contact.w = 0.0;  // removes the rounding error of the touch
+    contact.w = 0.0;  // a touch has no penetration; removes the rounding error
     HertzForce force{own.specimen.contact_stiffness};
     while (contact.side != 0.0) {
-      // The clock is zero when the next state is due, with the drive's phase of the start.
+      // Time zero is when the next state is due, a whole number of drive periods after the start.
       Clock<double> clock{-left[lane], 0.0, 0.0};
       double longest = STRETCH_TURN / own.omega, passed = 0.0;
       bool is_due = left[lane] <= longest;
@@ -249,7 +249,7 @@ class BatchRun {
     }
   }
 
-  // ---- Several lanes; each function leaves the others unchanged
+  // ---- Functions of several lanes, which leave all other lanes unchanged
 
   unsigned keep_due(unsigned due) {
     unsigned over = 0;
@@ -306,7 +306,7 @@ class BatchRun {
     return (of[0].re + of[1].re) + (of[2].re + of[3].re);
   }
 
-  // p and its derivatives, each divided by the factorial of its order.
+  // Computes p and its derivatives, each divided by the factorial of its order.
   INLINE void fill_course(Lanes (&course)[ORDERS]) const {
     course[0] = sum_of_terms(term);
     for (int k = 1; k < ORDERS; k++) {
@@ -319,7 +319,7 @@ class BatchRun {
     for (int k = ORDERS - 2; k >= 0; k--) rate = fused(rate, time, p), p = fused(p, time, course[k]);
   }
 
-  // Finds the first touch of lanes within the next step, as `first_touch` does; returns the lanes with one.
+  // Finds the first touch within the next grid step, like `first_touch`; returns the lanes that touch.
   unsigned look_closely(unsigned lanes) {
     Lanes course[ORDERS];
     fill_course(course);
@@ -354,10 +354,10 @@ class BatchRun {
     return touched;
   }
 
-  // Advances time, and recomputes the drive's term, so that its rounding errors do not accumulate.
+  // Advances time, and recomputes the drive's term so that its rounding errors do not accumulate.
   void pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
-    // Half a turn on, the angle lies within half a turn: use the fourth power of its quarter.
+    // The series needs a small angle: add half a turn, take a quarter, and raise to the fourth power.
     LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
     LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
     LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};
@@ -380,15 +380,15 @@ class BatchRun {
     return (of & ~(0.0 < left)).bits();
   }
 
-  // Computes the collisions of lanes that touch a stop; returns those outside the range of the polynomials.
-  // `last` lanes stop when their next state is due, also within a collision.
+  // Computes the collisions of lanes that touch a stop; returns the lanes outside the polynomials' range.
+  // Lanes in `last` end at their next due state, so a collision that passes it is returned too.
   unsigned collide(unsigned lanes, unsigned last) {
     Lanes approach = 0.0;
     for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, term[j], rate[j]);
     Lanes side = select(Lanes(0.0) < approach, 1.0, -1.0), speed = magnitude(approach);
     Lanes fourth = square_root(square_root(speed)), root = fit.guess[0];
     for (int n = 1; n < 4; n++) root = fused(root, fourth, fit.guess[n]);
-    for (int n = 0; n < ROOT_CORRECTIONS; n++) {  // towards speed^(-1/5)
+    for (int n = 0; n < ROOT_CORRECTIONS; n++) {  // Newton's method for speed^(-1/5)
       Lanes twice = root * root;
       root = root * fused(-0.2 * (speed * twice), twice * root, 1.2);
     }
@@ -407,8 +407,8 @@ class BatchRun {
     return lanes & ~inside.bits();
   }
 
-  // The acceleration at the middle of a collision, its derivatives, and u, in units of the collision. `scale`
-  // is side over speed, which normalises the rate of p to 1.
+  // Computes the polynomials' variables: acceleration at a collision's middle, its derivatives, and u, in
+  // units of the collision. `scale` is side over speed, which normalises the rate of p to 1.
   INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
     for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
     variables[DERIVATIVES] = unit;
@@ -425,7 +425,7 @@ class BatchRun {
     }
   }
 
-  // Advances modes by half a collision, applies its push about the middle, and advances the other half.
+  // Advances the modes by half a collision, adds its impulse, and advances them by the other half.
   INLINE void kick_modes(Mask of, Lanes half, Lanes unit, Lanes push, const Lanes (&values)[POLYNOMIALS]) {
     for (int j = 0; j < DRIVEN; j++) {
       LanePhasor by = grown_by_series<SHORT>(rate[j], half), turn{rate[j].re * unit, rate[j].im * unit};

@@ -2,8 +2,8 @@
 
     python native/build.py [FAMILY ...]
 
-By default for this processor. hatch_build.py calls this during a package build. VIBENCH_CXX names another
-compiler, whose results may differ in the last digits.
+The default is the fastest family of this processor. hatch_build.py calls this during a package build.
+VIBENCH_CXX names another compiler, whose results may differ in the last digits.
 """
 
 import argparse
@@ -22,8 +22,8 @@ ENGINE = ROOT / "sim" / "vibench" / "sim" / "engine"
 LIBRARIES = ENGINE / "libraries"
 FLAGS = (
     *("-std=c++20", "-O3", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-fvisibility=hidden"),
-    "-Wno-psabi",  # wide vectors are passed to inlined functions only: no calling convention matters
-    # Reproducible digits: sums and products are contracted only where the source does so.
+    "-Wno-psabi",  # no calling convention matters: wide vectors are passed only to inlined functions
+    # For reproducible digits, fused multiply-adds are used only where the source asks for them.
     *("-ffp-contract=off", "-fno-math-errno"),
     # No C++ library: it takes a minute to compile, and differs between systems.
     *("-fno-exceptions", "-fno-rtti", "-nostdinc++", "-nostdlib++"),
@@ -62,7 +62,7 @@ def compiler(family: str, system: str) -> list[str]:
 
 
 def compile_engine(family: str, system: str = sys.platform) -> Path:
-    """Compile the library of a family if it is missing, and remove those of other sources."""
+    """Compile the library of a family if it is missing, and delete libraries built from other sources."""
     target = LIBRARIES / f"engine-{family}-{sources_digest()}.{ENDINGS[system]}"
     if not target.is_file():
         LIBRARIES.mkdir(exist_ok=True)

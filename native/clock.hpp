@@ -5,7 +5,7 @@
 
 namespace vibench {
 
-// `slip` holds the derivatives of the time: a changed motion strikes slightly earlier or later.
+// `slip` holds the derivatives of the time, because a slightly changed motion touches earlier or later.
 template <class T> struct Clock {
   double high, low;
   T slip;
@@ -23,7 +23,7 @@ template <class T> INLINE T time_until(const Clock<T> &clock, double instant) {
   return ((instant - clock.high) - clock.low) - clock.slip;
 }
 
-// The rounding error of a product of two doubles.
+// Exact rounding error of a product of two doubles.
 INLINE double product_error(double a, double b, double product) {
   constexpr double SPLITTER = 134217729.0;  // 2^27 + 1 cuts a double into halves whose products are exact
   double a_big = SPLITTER * a, b_big = SPLITTER * b;

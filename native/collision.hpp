@@ -1,27 +1,27 @@
-// A complete Hertz collision: depths at sixteen points and the duration, by Newton's method (decision 0008). With time
-// = duration (1 - cos phi) / 2 the depth is smooth in phi, including the square roots at both ends, and sixteen Gauss
-// points represent it. Normalised by their depth and duration, collisions differ only by the force of the other springs
-// ("press"). Shapes, and their response to a misfit, are tabulated over that press and then corrected.
+// A complete Hertz collision: depths at sixteen points and the duration, by Newton's method (decision 0008).
+// With time = duration (1 - cos phi) / 2 the depth is smooth in phi, also at both ends, so sixteen points
+// represent it. Scaled by depth and duration, collisions differ only by the force of the other springs
+// ("press"). Shapes and their response to a misfit are tabulated over the press; a few corrections follow.
 #pragma once
 #include "flight.hpp"
 
 namespace vibench {
 
 enum { POINTS = 16, SLOW_TERMS = 6, MOST_SHAPE_CORRECTIONS = 8 };
-// Rows of `CollisionShapes::shapes` below the sixteen responses to misfits of depth.
+// Rows of `CollisionShapes::shapes` after the first sixteen, which are responses to misfits of depth.
 enum ShapeRow { TO_DURATION = POINTS, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING };
 enum DurationColumn { DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY };
-constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // presses of the shapes
-constexpr double LONGEST = 3.5;         // duration of the hardest pressed collision, over its depth and speed
-constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration: the limit of the series [rad]
+constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // tabulated presses
+constexpr double LONGEST = 3.5;         // duration at the HARDEST press, in units of depth over speed
+constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration, so that the series suffices [rad]
 constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed: m v^2 / 2 = 2 k d^(5/2) / 5
-constexpr double LEAST_TOLERANCE = 1e-7;  // stricter tolerances need more accuracy than sixteen points have
+constexpr double LEAST_TOLERANCE = 1e-7;  // sixteen points are not accurate enough for stricter tolerances
 constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
-constexpr double LAG = 3e-6;  // the slow springs' effect on the force is recomputed while depths change by more
+constexpr double LAG = 3e-6;  // while depths change by more, the slow terms of the force are recomputed
 
-// In coordinates of the stop: p is positive on either side.
+// Coordinates are mirrored so that p is positive at either stop.
 template <class T> struct Collision {
-  Wide<T, POINTS> depths;  // over `unit`
+  Wide<T, POINTS> depths;  // at the points, divided by `unit`
   Wide<T, POINTS> force;   // at the points [N]
   Wide<T, WIDE> motion;    // when it begins
   Wide<T, WIDE> after;     // when it ends
@@ -40,7 +40,7 @@ template <class T> INLINE Wide<T, POINTS> constants(const double (&of)[POINTS]) 
   return row;
 }
 
-// Terms 1 and up of a Taylor series, at the times `turns` of the points.
+// Sum of a Taylor series without its constant term, at the scaled times `turns` of the points.
 template <class T>
 INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<T, POINTS> &turns) {
   Wide<T, POINTS> sum = at(terms, TERMS - 1) * turns;
@@ -48,7 +48,7 @@ INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<
   return sum;
 }
 
-// The effect of the force at the points on a number of the motion there, by some terms of the series.
+// Effect of the contact force on one number of the motion at the points, by terms `first` to `last` - 1.
 template <class T>
 INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last, int number, const T &duration,
                               const CollisionTables &t) {
@@ -62,7 +62,7 @@ INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last,
   return sum;
 }
 
-// Whether a correction was the last: by the change of the values or, for derivatives, of the derivatives.
+// Whether a correction was small enough to be the last: in the values or, for duals, in the derivatives.
 INLINE bool is_settled(const Vector<POINTS> &change, const Vector<POINTS> &, double close) {
   return total(change * change) <= close * close;
 }
@@ -108,13 +108,13 @@ template <class T> inline bool correct(Collision<T> &c, const T &begun, double c
   return false;
 }
 
-// Predicts depths and duration from the tables, to first order.
+// Predicts depths and duration from the tables, linearised in the press and three smaller parameters.
 inline void foresee(Collision<double> &c, double press, const Tables &tables) {
   const CollisionTables &t = tables.collision;
   c.press = int((press - SOFTEST) / SPACING + 0.5);
   const auto &shape = t.shapes->shapes[c.press];
   const auto &known = t.shapes->durations[c.press];
-  // Each number of the specimen in units of the collision.
+  // All parameters are in units of the collision: unit for depth, pace for time.
   double turn = t.fastest * c.pace, stiff = tables.specimen.contact_stiffness * c.unit * square_root(c.unit);
   double kick = turn * stiff * c.pace / (c.unit * HALF_FORCE);
   double by[4] = {press - (SOFTEST + SPACING * c.press), c.course[3] * turn * turn * turn / c.unit,
@@ -144,15 +144,15 @@ template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
           value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
-// Solves the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false if a few
-// corrections do not suffice: nearly zero speed, springs as fast as the collision, a requested end within it,
-// the reference level. Then the steps of contact.hpp resolve it.
+// Solves the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false if the
+// contact needs the steps of contact.hpp: at nearly zero speed, with springs as fast as the collision, an
+// end of the run within it, or the accuracy `reference`.
 template <class T>
 inline bool find_collision(Collision<T> &c, double gap, double pace, double longest, double tolerance,
                            const Tables &tables) {
   double speed = value_of(at(c.motion, P_RATE)), fastest = tables.collision.fastest;
   if (tolerance < LEAST_TOLERANCE || !(speed > 0.0)) return false;
-  double w = pace * speed;  // the largest
+  double w = pace * speed;  // expected largest w
   double most = smaller(longest, LONGEST_COLLISION / fastest);
   if (!(LONGEST * w * w < speed * most)) return false;
   Collision<double> values;
@@ -175,8 +175,8 @@ inline bool find_collision(Collision<T> &c, double gap, double pace, double long
   }
 }
 
-// Advances a motion that has just touched the stop on `side` to the end of its collision; returns false, and
-// changes nothing, if it is not solved.
+// Advances a motion that has just touched the stop on `side` to the end of its collision. If the collision
+// cannot be solved, returns false and leaves the motion unchanged.
 template <class T>
 inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
                     double tolerance, const Tables &tables) {

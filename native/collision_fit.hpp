@@ -1,14 +1,14 @@
-// A Hertz collision as polynomials for batches, without iteration (decision 0061). Units are depth and time u
-// of a collision of the same speed without other forces. In these units a collision depends on u and on the
-// acceleration of the pair by all other springs. The variables are that acceleration at the middle, its first
-// four derivatives, and u. Duration and moments of the force about the middle are polynomials of them, which
-// `vibench.sim.engine` fits to solved collisions.
+// A Hertz collision as polynomials for batches, without iteration (decision 0061). The units are depth and
+// time u of a collision of the same speed without other forces. In these units a collision depends on u
+// and on the acceleration of p by all other springs. The polynomials' variables are this acceleration at the
+// middle, its first four derivatives, and u. Their values are the duration and the force's moments about the
+// middle. `vibench.sim.engine` fits them to solved collisions.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
-constexpr int DERIVATIVES = 5;              // derivatives of the acceleration, including itself
+constexpr int DERIVATIVES = 5;              // the acceleration and its first four derivatives
 constexpr int VARIABLES = DERIVATIVES + 1;  // plus u
 constexpr int MOMENTS = 5;
 constexpr int POLYNOMIALS = 1 + MOMENTS;    // the duration over u, and the moments
@@ -16,12 +16,12 @@ constexpr double COLLISION_MIDDLE = 1.47;   // middle of a collision, in u
 constexpr int MONOMIALS = 289;
 constexpr int COEFFICIENTS = sizeof(CollisionFit::coefficients) / sizeof(double);
 
-// Decay of the contributions with each power of a variable.
+// Factor by which each power of a variable reduces a monomial's estimated contribution.
 constexpr double ADDS[VARIABLES] = {0.3, 0.08, 0.015, 0.002, 2e-4, 0.03};
-// Monomials with smaller contributions are omitted from each polynomial. Higher moments count less.
+// Monomials with smaller contributions are omitted from a polynomial. Higher moments need less accuracy.
 constexpr double LEAST_ADDED[POLYNOMIALS] = {1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05};
 
-// An earlier monomial times a variable; the first is 1.
+// A monomial, computed as the earlier monomial `before` times one variable; the first monomial is 1.
 struct Monomial {
   int powers[VARIABLES];
   double adds;
@@ -30,11 +30,11 @@ struct Monomial {
 struct Monomials {
   Monomial of[MONOMIALS];    // sorted by contribution, the largest first
   int counts[POLYNOMIALS];   // number of leading monomials in each polynomial
-  int first[POLYNOMIALS];    // place of its first coefficient
+  int first[POLYNOMIALS];    // index of the first coefficient of each polynomial
   int count, coefficients;
 };
 
-// Adds the monomials whose powers of the variables before `variable` are those of `partly`, sorted by contribution.
+// Adds all monomials that extend `partly` by powers of `variable` and later ones, sorted by contribution.
 constexpr void add_monomials(Monomials &to, Monomial partly, int variable) {
   if (variable == VARIABLES) {
     int place = to.count++;
@@ -79,8 +79,8 @@ inline int64_t describe_collisions(const CollisionMonomials &to) {
   return MONOMIALS;
 }
 
-// The polynomials of eight points at once. In the unrolled loop every place is a constant, and sums stay in
-// registers; g++, used only for tests, keeps the loop and the same order of sums.
+// Evaluates the polynomials at eight points at once. The loop is unrolled: every index is a constant, and
+// the sums stay in registers. g++, used only for tests, keeps the loop; the order of sums is the same.
 inline void evaluate(Vector<8> (&values)[POLYNOMIALS], const Vector<8> (&variables)[VARIABLES],
                      const double (&coefficients)[COEFFICIENTS]) {
   constexpr int CHAINS = 4;  // independent sums

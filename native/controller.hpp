@@ -22,7 +22,7 @@ inline double answer_of_law(Controller &c, double base_volts, double m0_volts) {
   return volts;
 }
 
-// Adds a sample to the coefficients. The ends of a block have zero weight (Hann), so it need not end on a sample.
+// Adds a sample to the Fourier coefficients of a block. With Hann weights the block need not end on a sample.
 inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor &turn) {
   double weight = 1.0 - cosine_sine(2.0 * PI * c.turns / c.block).cosine;
   Phasor back{weight, 0.0};
@@ -43,7 +43,7 @@ inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor
   c.is_steady = 1;
 }
 
-// The output for the means of both sensors over the last sample [V]; zero while it is silent.
+// Output for the mean sensor voltages over the last sample [V]; zero while the controller is off.
 inline double answer(Controller &c, double base_volts, double m0_volts) {
   if (!c.is_on) return 0.0;
   c.unheard += 1.0;
@@ -72,7 +72,7 @@ inline double answer(Controller &c, double base_volts, double m0_volts) {
   return volts;
 }
 
-// Whether a block must be stored, or the controller must end or has ended, before the next sample.
+// Whether the host must act before the next sample: to store a block, or because the controller ends.
 inline bool wants_attention(const Controller &c) {
   bool has_ended = c.is_on && c.fade <= 0.0;
   return c.done > 0 || c.unheard > c.most_unheard || c.at_limit > c.most_at_limit || has_ended;

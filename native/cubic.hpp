@@ -1,21 +1,21 @@
-// Motion under a base whose displacement is a cubic polynomial on each of equal intervals: sweeps, recordings, and the
-// table of a shaker (decision 0004). Intervals are divided into pieces short enough for a Taylor series. Within a piece
-// a flight is one matrix product, if a bound on its acceleration excludes a touch; otherwise its series is searched.
+// Motion under a base whose displacement is a cubic on each of equal intervals: a sweep, recording or shaker
+// table (decision 0004). Intervals are divided into pieces short enough for a Taylor series. A flight over a
+// piece is one matrix product if a bound on its acceleration excludes a touch; else its series is searched.
 #pragma once
 #include "run.hpp"
 
 namespace vibench {
 
 constexpr int CUBIC = 4;  // terms of a cubic
-constexpr int MOST_PHASES = 100000;  // flights and contacts in a piece: far beyond any motion, including chatter
+constexpr int MOST_PHASES = 100000;  // most flights and contacts in a piece; even chatter has fewer
 constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for an interval whose length has rounding errors
-constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // in steps of the last level, under a power law
-constexpr int PIECE_ORDER = 16;  // terms of a series that a piece needs under a power law
+constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // length of a piece in steps of the last level
+constexpr int PIECE_ORDER = 16;  // terms of a series over a piece under a power law
 constexpr double TRY_TWICE = 5e-4;  // a misfit below this part of the allowed one doubles the next step
 
 // ---- The base
 
-// k0 U + c0 dU/dt = sum terms_k t^k [N].
+// Base force k0 U + c0 dU/dt = sum terms_k t^k [N].
 template <class T> struct CubicForce {
   T terms[CUBIC];
 };
@@ -26,7 +26,7 @@ INLINE CubicForce<double> base_force(const double *base, const Specimen &s) {
            s.k0 * base[2] + 3.0 * s.c0 * base[3], s.k0 * base[3]}};
 }
 
-// The same force in the time since `by`.
+// The same force as a polynomial in t - `by`.
 template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force, const T &by) {
   const double (&f)[CUBIC] = force.terms;
   return {{f[0] + by * (f[1] + by * (f[2] + by * f[3])), f[1] + by * (2.0 * f[2] + 3.0 * f[3] * by),
@@ -35,7 +35,7 @@ template <class T> INLINE CubicForce<T> shifted(const CubicForce<double> &force,
 
 // ---- Taylor series of a motion
 
-// Gong et al. 2025, eq. 1 without F, with a force `push` on m0: d/dt of (x, y, z, vx, vy, vz).
+// Rates of (x, y, z, vx, vy, vz) by Gong et al. 2025, eq. 1, without F and with the base force `push` on m0.
 template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -46,7 +46,7 @@ template <class T> INLINE void flight_rates(const T *at, const T &push, T *rates
   rates[VZ] = t.inverse2 * (hold - pull);
 }
 
-// The same while m1 rests on a rigid stop and forms one body with m2.
+// The same rates while m1 rests on a rigid stop and forms one body with m2.
 template <class T> INLINE void held_rates(const T *at, const T &push, T *rates, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (at[Z] - at[X]) + s.c2 * (at[VZ] - at[VX]);
@@ -76,9 +76,9 @@ template <class T> struct Course {
 
 // ---- Data of a run
 
-// Effect of the base on a step under a power law, by terms of its force.
+// Effect of each term of the base force on a step under a power law.
 struct BaseNumbers {
-  double places[CUBIC][GAUSS];  // on p at the points
+  double places[CUBIC][GAUSS];  // on p at the Gauss points
   double ends[CUBIC][WIDE];     // on the motion at the end
 };
 
@@ -91,13 +91,13 @@ struct CubicTables : Body {
   double fastest;   // rate of the specimen [1/s]
   int64_t pieces;   // of an interval
   double length;    // of a piece [s]
-  double across[6 + CUBIC][WIDE];  // effect of the motion and the force's terms at its start on the motion at its end
-  double bound_per_root_energy;    // largest |d2p/dt2| over sqrt(2 energy) [m/s^2 / J^0.5]
-  const CubicPowerTables *power;   // after these tables; of a power law
+  double across[6 + CUBIC][WIDE];  // motion at a piece's end per motion and force terms at its start
+  double bound_per_root_energy;    // largest |d2p/dt2| in flight, over sqrt(2 energy) [m/s^2 / J^0.5]
+  const CubicPowerTables *power;   // stored after these tables, for a power law; else null
 };
 
-// Largest |d2p/dt2| in flight over sqrt(2 energy): the norm of its row in the coordinates sqrt(k) e and sqrt(m) v, e
-// the elongations of the springs.
+// Largest |d2p/dt2| in flight, over sqrt(2 energy). In the coordinates sqrt(k) e and sqrt(m) v, with
+// elongations e of the springs, it is the norm of the coefficients of d2p/dt2.
 inline double bound_per_root_energy(const Body &t) {
   const Specimen &s = t.specimen;
   const double parts[] = {s.k1 * t.inverse_pair * t.inverse_pair,
@@ -111,8 +111,8 @@ inline double bound_per_root_energy(const Body &t) {
   return square_root(sum);
 }
 
-// From the same series as the motion: f_k t^k, substituted after s = 0, changes a number by f_k (A^m / m!) c
-// t^(m+k+1) m! k! / (m+k+1)!, where c is the place of the force.
+// By the Taylor series of the motion: a force f_k t^k changes a number by the sum over m of
+// f_k (A^m / m!) c t^(m+k+1) m! k! / (m+k+1)!, where c is the effect of a unit force on the rates.
 inline void fill_base(BaseNumbers &base, double length, const PowerTables &t, const Body &body) {
   base = {};
   double turn = t.fastest * length;
@@ -160,7 +160,7 @@ template <class T, class Stops> class CubicRun {
   CubicRun(Motion<T> &motion, const CubicTables &tables, const Stops &stops, double tolerance, Record &record)
       : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record) {}
 
-  // Advances over an interval, from `begin` to `end` [s] since its start; `base` holds the terms of U.
+  // Advances from `begin` to `end` [s] after the start of an interval; `base` holds the terms of U.
   Outcome advance(const double *base, double begin, double end) {
     bool is_whole = begin == 0.0 && end >= t.interval * ALMOST;
     int64_t pieces = is_whole ? t.pieces : -int64_t(whole_part((begin - end) / t.length));
@@ -173,7 +173,7 @@ template <class T, class Stops> class CubicRun {
     return REACHED_END;
   }
 
-  // Advances from `tau` to `length` [s] since the start of a piece, through every touch and every contact.
+  // Advances through all touches and contacts, from `tau` to `length` [s] after the start of a piece.
   Outcome resolve(const CubicForce<double> &force, double length, bool is_whole, T &tau) {
     if constexpr (is_same<Stops, PowerStops>) return push_on(force, length, is_whole, tau);
     else return move_on(force, length, tau);
@@ -219,8 +219,8 @@ template <class T, class Stops> class CubicRun {
     });
   }
 
-  // Bound of |d2p/dt2| over one piece in flight, from the energy at its start: d/dt sqrt(2E) <= |f| /
-  // sqrt(m0); damping only reduces it.
+  // Bound of |d2p/dt2| over one piece in flight, from the energy E at its start: for a base force f,
+  // d/dt sqrt(2E) <= |f| / sqrt(m0); damping only reduces E.
   template <class F> double acceleration_bound(const CubicForce<F> &force) const {
     const Specimen &s = t.specimen;
     double x = value_of(m.at[X]), y = value_of(m.at[Y]), z = value_of(m.at[Z]), h = t.length;
@@ -316,7 +316,7 @@ template <class T, class Stops> class CubicRun {
     }
   }
 
-  // The stop releases m1 where the acceleration that presses m1 on it becomes zero.
+  // The stop releases m1 when the acceleration that presses m1 onto it becomes zero.
   Outcome stay_held(const CubicForce<double> &force, double length, T &tau) {
     const Specimen &s = t.specimen;
     double side = m.contact.side, gap = gap_at(s, side), left = length - value_of(tau), path[AHEAD];
@@ -338,7 +338,7 @@ template <class T, class Stops> class CubicRun {
     return REACHED_END;
   }
 
-  // Under a power law: the piece as one step, or bisected repeatedly.
+  // Under a power law: a piece is one step, or is halved repeatedly until each step is accurate.
   Outcome push_on(const CubicForce<double> &force, double length, bool is_whole, T &tau) {
     const CubicPowerTables &of = *t.power;
     PowerStep<T> step{t, of, fit_tolerance(tolerance, t.specimen), {}, {}, {}, {}, {}, {}, 0.0, 0.0, 0.0};
@@ -406,7 +406,7 @@ template <class Run> inline Outcome follow(Run &run, const Motion<double> &motio
   return REACHED_END;
 }
 
-// Calls `act` with a run of the motion for the stops of the specimen.
+// Builds the `CubicRun` that fits the specimen's law, and returns the result of `act` with it.
 template <class T, class Act>
 inline Outcome with_cubic_stops(Motion<T> &motion, const CubicTables &t, double tolerance, Record &record,
                                 const Act &act) {

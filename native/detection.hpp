@@ -1,7 +1,7 @@
-// Whether, and when, a flight touches a stop: proved by a bound on the acceleration of p, not sampled (0004).
-// On a stretch p is a Taylor polynomial (exact to rounding) and |d2p/dt2| <= bound. Two rules follow: the
-// stretch is clear if both end gaps exceed bound h^2 / 8; and from the gap g with approach speed v no stop is
-// reached before 2 g / (v + sqrt(v^2 + 2 bound g)).
+// Whether and when a flight touches a stop: proved by a bound on the acceleration of p, not by sampling
+// (decision 0004). On a stretch of length h, p is a Taylor polynomial (exact to rounding), with |d2p/dt2| <=
+// bound. The stretch is clear if the gaps at both ends exceed bound h^2 / 8. From a gap g with approach speed
+// v, no stop is reached before 2 g / (v + sqrt(v^2 + 2 bound g)).
 #pragma once
 #include "tables.hpp"
 
@@ -9,12 +9,12 @@ namespace vibench {
 
 constexpr double NEVER = -1.0;
 constexpr double TOUCH = 1e-12;              // a gap below this part of the stop's distance counts as closed
-constexpr double ROUNDING = 8.0 * EPSILON;   // so does one below this part of the largest term of p
-constexpr double JUST_SHORT = 0.999;         // part of the earliest possible return after leaving a stop
-constexpr double SHORTEST_ADVANCE = 1e-15;   // [s], so that a search always ends
-constexpr int TIGHTER_AFTER = 4;             // advances after which computing a tighter bound pays
-constexpr int PATIENCE = 400;                // a tangency followed for longer has no crossing ...
-constexpr double IMPATIENT = 1e-4;           // ... and is passed in steps of this part of the stretch
+constexpr double ROUNDING = 8.0 * EPSILON;   // so does a gap below this part of the largest term of p
+constexpr double JUST_SHORT = 0.999;         // factor on the earliest return after a departure, for rounding
+constexpr double SHORTEST_ADVANCE = 1e-15;   // least advance [s], so that a search always ends
+constexpr int TIGHTER_AFTER = 4;             // advances after which a tighter bound is worth its cost
+constexpr int PATIENCE = 400;                // advances after which p is assumed only to graze a stop
+constexpr double IMPATIENT = 1e-4;           // least advance from then on, as a part of the stretch
 constexpr int NEWTON_STEPS = 6;              // corrections of a touch; usually two
 
 struct ValueAndRate {
@@ -74,15 +74,15 @@ inline double first_contact(const double *series, double length, const Room &roo
     double advance = smaller(earliest_closing(larger(above, 0.0), rate, bound),
                              earliest_closing(larger(below, 0.0), -rate, bound));
     tau += larger(advance, shortest);
-    // The bounds on p's terms ignore cancellation; the polynomial does not.
+    // The first bound ignores that terms of p cancel; the bound from the polynomial is tighter.
     if (advances == TIGHTER_AFTER) bound = smaller(bound, derivative_bound(series, length, 2) + 1e-300);
     if (advances == PATIENCE) shortest = IMPATIENT * length;
   }
   return NEVER;
 }
 
-// The same on a stretch of at most LONGEST_TURN. Where p provably does not turn, only the stop ahead can be
-// touched, and only once, so Newton's method is safe.
+// The same on a stretch of at most LONGEST_TURN. If p provably has no extreme there, it can only touch the
+// stop ahead, and only once, so Newton's method is safe.
 inline double first_touch(const double *series, double length, const Room &room) {
   double change = room.bound * LONGEST_TURN;  // largest change of d2p/dt2 in this time
   double side = series[1] > 0.0 ? 1.0 : -1.0;
@@ -105,8 +105,8 @@ inline double first_touch(const double *series, double length, const Room &room)
   return first_contact(series, length, room);
 }
 
-// Side of the touched stop: the nearer one, and not that of the velocity, whose sign is rounding error at a
-// grazing touch. Without room between the stops p is rounding error, and the velocity decides.
+// Side of the touched stop: the nearer one, because at a grazing touch the sign of the velocity is rounding
+// error. If p is near the middle, the stops have no room between them, and the velocity decides.
 INLINE double touched_side(double p, double rate, const Specimen &specimen) {
   if (specimen.upper_gap == INFINITE) return -1.0;
   if (specimen.lower_gap == INFINITE) return 1.0;

@@ -42,7 +42,7 @@ constexpr double THIRD_ORDER_ERROR[STAGES] = {
 // clang-format on
 constexpr double BLEND = 0.01;  // weight of the third-order estimate in the error
 
-// One step of length `h` from `from`, whose rates are in stages[0]. `rates(at, out)` computes the rates of a point.
+// One step of length `h` from `from`, whose rates are in stages[0]; `rates(at, out)` computes rates.
 template <class T, int N, class Rates>
 inline void dormand_prince_step(T (&stages)[STAGES][N], const T (&from)[N], const T &h, T (&to)[N], const Rates &rates) {
   T point[N];
@@ -66,8 +66,8 @@ inline void dormand_prince_step(T (&stages)[STAGES][N], const T (&from)[N], cons
   }
 }
 
-// The method's error of some unknowns over the allowed one, for a step of length `h`; infinite for a stage
-// that is not finite, because the fifth-order error over infinity would be zero.
+// Error estimate of a step in some unknowns, over the allowed error. It is infinite if a stage is not finite,
+// because the formula would give zero: the fifth-order error over infinity.
 struct StepError {
   double fifth = 0.0, third = 0.0;
 
@@ -87,7 +87,7 @@ struct StepError {
   }
 };
 
-// Next step length over this one; an error of NaN shortens it.
+// Ratio of the next step length to this one; an error of NaN shortens the step.
 INLINE double step_factor(double error) {
   constexpr double SAFETY = 0.9, SHRINK = 0.2, GROW = 4.0;
   if (!(error < 1e300)) return SHRINK;

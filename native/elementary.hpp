@@ -1,7 +1,7 @@
-// exp, logarithm, sine and cosine, from additions and multiplications in a fixed order: the same digits on
-// every processor. Cody and Waite, Software Manual for the Elementary Functions (1980): x is reduced by a
-// constant in two or three parts, the first of which have so few digits that their products are exact. Errors
-// are below 1.5 units in the last place (native/test_engine.cpp compares with libm).
+// exp, logarithm, sine and cosine from basic operations in a fixed order, for the same digits on every
+// processor. Argument reduction after Cody and Waite, Software Manual for the Elementary Functions (1980):
+// the constant is split into two or three parts, so short that products with the first parts are exact.
+// Errors are below 1.5 units in the last place (native/test_engine.cpp compares with libm).
 #pragma once
 #include "numbers.hpp"
 
@@ -13,12 +13,12 @@ inline double exponential(double x) {
   constexpr double LOG2_HIGH = 6.93147180369123816490e-01, LOG2_LOW = 1.90821492927058770002e-10;
   double twos = nearest(x * 1.44269504088896338700);
   double r = (x - twos * LOG2_HIGH) - twos * LOG2_LOW;  // |r| < 0.35
-  double sum = 1.0 / 6227020800.0;                      // 1 / 13!, where the series is exact to rounding
+  double sum = 1.0 / 6227020800.0;                      // 1 / 13!, the last term above rounding
   constexpr double INVERSE_FACTORIALS[] = {1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880,
                                            1.0 / 40320,     1.0 / 5040,     1.0 / 720,     1.0 / 120,
                                            1.0 / 24,        1.0 / 6,        0.5};
   for (double term : INVERSE_FACTORIALS) sum = sum * r + term;
-  sum = (sum * r + 1.0) * r;  // exp(r) - 1, whose rounding is small beside 1
+  sum = (sum * r + 1.0) * r;  // exp(r) - 1; its rounding error is small beside 1
   double power = __builtin_bit_cast(double, (int64_t(twos) + 1023) << 52);
   return (1.0 + sum) * power;
 }
@@ -27,7 +27,7 @@ struct CosineSine {
   double cosine, sine;
 };
 
-// On |x| <= pi / 4. Coefficients of Sun's fdlibm, whose errors are below 2^-58.
+// cos and sin of x + tail for |x| <= pi / 4. Coefficients from Sun's fdlibm, with errors below 2^-58.
 INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
   double z = x * x;
   double s = -1.66666666666666324348e-01 +
@@ -46,7 +46,7 @@ INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
   return {cosine, sine};
 }
 
-// Of any angle [rad]. Beyond 10^6 rad the product with the first part is rounded, like the angle itself.
+// cos and sin of any angle [rad]. Beyond 10^6 rad the reduction is no longer exact; nor is the angle itself.
 inline CosineSine cosine_sine(double angle) {
   constexpr double PI_2_HIGH = 1.57079632673412561417e+00;  // 33 bits
   constexpr double PI_2_MIDDLE = 6.07710050630396597660e-11;  // the next 33
@@ -66,7 +66,7 @@ inline CosineSine cosine_sine(double angle) {
   }
 }
 
-// ln x for x > 0, right to one unit in the last place; -infinity at zero, NaN below. Coefficients of Sun's fdlibm.
+// ln x to one unit in the last place; -infinity at zero, NaN below. Coefficients from Sun's fdlibm.
 inline double logarithm(double x) {
   constexpr double LN2_HIGH = 6.93147180369123816490e-01, LN2_LOW = 1.90821492927058770002e-10;
   constexpr int64_t ROOT_HALF = 0x3fe6a09e667f3bcd;

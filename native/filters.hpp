@@ -1,5 +1,5 @@
-// Hidden motion from two channels: a Kalman filter for the tracked motion, and a backward smoother. Notation
-// of the equations: docs/hidden-motion.md.
+// Hidden-state estimation from two channels: a Kalman filter and a backward smoother. docs/hidden-motion.md
+// explains the notation of the equations.
 #pragma once
 #include "tracking.hpp"
 
@@ -10,8 +10,8 @@ constexpr int MOST_STATES = TRACKED + MOST_PARAMETERS;
 
 using StateRow = Vector<TRACKED>;
 
-// P -> F P F' + Q for the tracked states, in place. Parameters are constant, so their rows are unchanged. Q
-// is the noise of the step plus that of an unknown force held over it.
+// Replaces the covariance P by F P F' + Q. Parameters are constant, so only rows of tracked states change. Q
+// is the noise of the step, plus the noise of an unknown force that is constant over the step.
 INLINE void spread(double *covariance, const double (&whole)[TRACKED][MOST_STATES], const MotionFilter &f,
                    double force_variance, int size) {
   double product[TRACKED][MOST_STATES], turned[MOST_STATES][TRACKED];
@@ -29,7 +29,7 @@ INLINE void spread(double *covariance, const double (&whole)[TRACKED][MOST_STATE
   }
 }
 
-// Adds the effect of an error of the impulse [N s] between m1 and m2.
+// Adds the variance due to an error of the impulse between m1 and m2 [N s].
 INLINE void add_impulse_error(double *covariance, double error, const TrackedStop &stop, int size) {
   double of_m1 = error * stop.inverse_m1, of_m2 = error * stop.inverse_m2;
   covariance[VY * size + VY] += of_m1 * of_m1;
@@ -38,7 +38,7 @@ INLINE void add_impulse_error(double *covariance, double error, const TrackedSto
   covariance[VZ * size + VY] = covariance[VY * size + VZ];
 }
 
-// Uses one sample: the velocity of m0 is X' + W.
+// Updates the state with one sample; the measured velocity of m0 is X' + W.
 INLINE void correct(double *state, double *covariance, double innovation, double variance, int size) {
   double gain[MOST_STATES];
   for (int i = 0; i < size; i++)
@@ -83,7 +83,7 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
     const double *of_m0 = covariance + VX * size, *of_base = covariance + BASE_VELOCITY * size;
     double variance =
         of_m0[VX] + 2.0 * of_m0[BASE_VELOCITY] + of_base[BASE_VELOCITY] + f.velocity_variance;
-    // In contact, and without a measurement, the motion continues without a sample.
+    // In contact, or where nothing was measured, the sample is not used.
     bool is_used = kind != IN_CONTACT && is_finite(innovation);
     if (const TrackRecord &kept = f.record; kept.states.size > 0) {
       __builtin_memcpy(kept.states.at + k * TRACKED, state, sizeof moved);
@@ -100,9 +100,9 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
   return f.velocity.size;
 }
 
-// Filters sample by sample, each at the end of a step; returns the number of samples until the motion was lost.
+// Filters all samples; returns the number of samples before the motion was lost.
 inline int64_t filter_motion(MotionFilter &f) {
-  // Without parameters all sizes are known at compile time, which halves the time.
+  // Without parameters all sizes are known at compile time, which halves the run time.
   return f.state.size == TRACKED ? filter_samples(f, TRACKED) : filter_samples(f, int(f.state.size));
 }
 
@@ -133,7 +133,7 @@ INLINE StateMatrix transposed(const StateMatrix &a) {
 }
 INLINE double inner_product(const StateRow &x, const StateRow &y) { return total(x * y); }
 
-// Propagates the adjoint of a state, and its matrix M, backwards over the step F: F' adjoint, F' M F.
+// Propagates the adjoint and its matrix M backwards over a step with the Jacobian F: F' adjoint, F' M F.
 INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &step) {
   adjoint = adjoint * step;
   StateMatrix product, turned = transposed(step), whole;
@@ -143,7 +143,7 @@ INLINE void carry_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix
   for (int i = 0; i < TRACKED; i++) matrix.rows[i] = 0.5 * (whole.rows[i] + turned.rows[i]);
 }
 
-// Propagates both backwards over the use of a sample: (I - K H)' M (I - K H) + H' H / S, with H of the velocity of m0.
+// Propagates both backwards over a sample's update: (I - K H)' M (I - K H) + H' H / S; H picks X' + W.
 INLINE void use_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &covariance, double innovation,
                      double variance) {
   if (variance == 0.0) return;
@@ -175,7 +175,7 @@ inline int64_t smooth_motion(const MotionSmoother &s) {
     StateMatrix covariance = StateMatrix::load(s.record.covariances.at + k * SQUARE);
     use_back(adjoint, matrix, covariance, s.record.innovations.at[2 * k], s.record.innovations.at[2 * k + 1]);
     (StateRow::load(s.record.states.at + k * TRACKED) - adjoint * covariance).store(s.states.at + k * TRACKED);
-    // Of p = y - z and of its rate: P - P M P.
+    // Variances of p = y - z and of its rate, from P - P M P.
     const int pairs[2][2] = {{Y, Z}, {VY, VZ}};
     for (int n = 0; n < 2; n++) {
       auto [first, second] = pairs[n];

@@ -1,13 +1,13 @@
-// Flight under a harmonic drive: exact, as a sum of rotating phasors, up to the first touch (decision 0004).
-// Every displacement is Re sum a_j V_j exp(l_j t): the modes of eq. 1 without F, plus the drive as one more
-// term. The search for a touch computes only p, sixteen grid steps at once (decision 0027).
+// Flight under a harmonic drive up to the first touch: exact, as a sum of rotating phasors (decision 0004).
+// Every displacement is Re sum a_j V_j exp(l_j t), over the modes of eq. 1 without F and the drive as the
+// last term. The search for a touch computes only p, sixteen grid steps at once (decision 0027).
 #pragma once
 #include "clock.hpp"
 #include "detection.hpp"
 
 namespace vibench {
 
-constexpr int RUN_OF_STEPS = 512;  // between two new exponentials: keeps the products' rounding below 1e-13
+constexpr int RUN_OF_STEPS = 512;  // steps by products before new exponentials: rounding stays below 1e-13
 constexpr double LARGEST_BOUND = 1e150;  // beyond it squares overflow, and touches cannot be detected
 
 // The drive's phasor at clock time plus `later`.
@@ -26,7 +26,7 @@ template <class T> INLINE Complex<T> drive_phasor(const Clock<T> &clock, const T
   }
 }
 
-// The phasors of the linear motion that starts from `motion` now.
+// Computes the phasors of the linear motion that starts from `motion`.
 template <class T>
 inline void start_flight(Complex<T> *phasors, const T *motion, const Complex<T> &drive, const LinearTables &t) {
   T free[6];  // deviation of the motion from the steady one
@@ -61,7 +61,7 @@ template <class T> INLINE void copy_values(Phasor *values, const Complex<T> *pha
   for (int j = 0; j <= t.modes; j++) values[j] = {value_of(phasors[j].re), value_of(phasors[j].im)};
 }
 
-// One displacement as N phasors, and its bounds from now on: the free ones can only decay.
+// One displacement as N phasors, with bounds that hold from now on, because free phasors only decay.
 template <int N> struct PhasorSum {
   const LinearTables &tables;
   Phasor terms[N];
@@ -91,7 +91,7 @@ template <int N> struct PhasorSum {
     for (int j = 0; j < N; j++)
       terms[j] = terms[j] * Phasor{tables.ahead[j][REAL][steps - 1], tables.ahead[j][IMAG][steps - 1]};
   }
-  // Advances step by step while low < sum < high; returns the number of steps.
+  // Advances by grid steps while low < sum < high; returns the number of steps.
   INLINE int march(int steps, double low, double high) {
     int made = 0;
     while (made < steps) {
@@ -104,7 +104,7 @@ template <int N> struct PhasorSum {
   }
 };
 
-// Number of whole grid steps in a time, at most up to the next newly computed exponentials.
+// Number of whole grid steps in a time, at most `most`.
 INLINE int whole_steps(double time, double grid, int most) { return int(smaller(double(most), time / grid)); }
 
 enum class FlightEnd { CLEAR, TOUCHES, LOST };
@@ -147,9 +147,9 @@ inline Flight flight_of(const Phasor *phasors, const Clock<double> &clock, doubl
   return {FlightEnd::CLEAR, longest};
 }
 
-// Duration of a flight: to the first touch, or `longest` [s]. `phasors` are those at clock time.
+// Flight from `phasors` at clock time to the first touch, or for `longest` seconds.
 inline Flight fly(const Phasor *phasors, const Clock<double> &clock, double longest, const Tables &tables) {
-  // Usually three pairs of modes plus the drive; beyond critical damping a pair becomes two real modes.
+  // Usually there are three modes, one per conjugate pair; beyond critical damping a pair becomes two modes.
   if (tables.flight.modes == 3) return flight_of<4>(phasors, clock, longest, tables);
   return flight_of<PHASORS>(phasors, clock, longest, tables);
 }

@@ -1,19 +1,19 @@
-// m1 resting on a rigid stop, or in contact with a stop that is a spring: a linear motion, exact until the stop would
-// have to pull; impact on a rigid stop; lift-off. A rigid stop leaves two bodies of three; a spring gives a stiffer
-// specimen with another rest position. Lift-off is the zero of the acceleration that presses m1 on the stop, or of the
-// indentation. It is found like a touch, with that quantity in place of the gap.
+// m1 resting on a rigid stop or in contact with a spring stop, impact on a rigid stop, and lift-off. On a
+// rigid stop m1 and m2 move as one body; a spring stop gives a stiffer specimen with another rest position.
+// Both motions are linear, and exact until the stop would have to pull. Lift-off is the zero of the
+// acceleration that presses m1 on the stop, or of the indentation; it is found like the zero of a gap.
 #pragma once
 #include "flight.hpp"
 
 namespace vibench {
 
-constexpr double RESOLVED = 4.0;       // hops lower than this number of closed gaps cannot be distinguished from rest
-constexpr double LARGEST_PART = 1e-3;  // largest closed gap, as a part of the room between the stops
-constexpr double SHORTEST_PART = 1e-3;  // a departure takes at least this part of a grid step: so little that m1
-                                        // gets no farther than rounding into the stop, so much that a run goes on
-constexpr double NEARLY = 0.99;         // part of the least time to the other stop: the rest is rounding
+constexpr double RESOLVED = 4.0;       // a hop lower than this number of closed gaps counts as rest
+constexpr double LARGEST_PART = 1e-3;  // largest closed gap, as a part of the distance between the stops
+constexpr double SHORTEST_PART = 1e-3;  // least departure, as a part of a grid step: long enough to progress,
+                                        // too short for m1 to enter the stop by more than rounding
+constexpr double NEARLY = 0.99;         // factor on the least time to the other stop, a margin for rounding
 
-// Distance from a stop at which m1 counts as touching it [m]; `reach` is the size of the summands of p.
+// Largest distance at which m1 counts as touching a stop [m]; `reach` is the size of the summands of p.
 INLINE double closed_gap(double reach, const Specimen &s) {
   return TOUCH * smaller(s.lower_gap, s.upper_gap) + ROUNDING * reach;
 }
@@ -22,12 +22,12 @@ INLINE double closed_gap(const Phasor *phasors, const Tables &t) {
   for (int j = 0; j <= t.flight.modes; j++) reach += magnitude(phasors[j] * t.flight.path[j]);
   return closed_gap(reach, t.specimen);
 }
-// Whether m1 between its stops can be distinguished from m1 on one of them, which rounding of p may prevent.
+// Whether p is exact enough to distinguish m1 between the stops from m1 on a stop.
 INLINE bool is_resolved(double closed, const Specimen &s) {
   return closed < LARGEST_PART * (s.lower_gap + s.upper_gap);
 }
 
-// Acceleration that presses m1 on the stop at its side, d2|p|/dt2 without the stop's force [m/s^2].
+// Acceleration that presses m1 on the stop at `side`: d2|p|/dt2 without the stop's force [m/s^2].
 template <class T> INLINE T press_on(double side, const T *motion, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (motion[Z] - motion[X]) + s.c2 * (motion[VZ] - motion[VX]);
@@ -35,7 +35,7 @@ template <class T> INLINE T press_on(double side, const T *motion, const Body &t
   return side * pull / s.m2 - inner / t.pair;
 }
 
-// Places m1 exactly on a stop, with `rate` = d|p|/dt [m/s]; centre and momentum of the pair are kept.
+// Places m1 exactly on a stop with d|p|/dt = `rate` [m/s]; keeps centre and momentum of m1 and m2.
 template <class T> inline void place_on_stop(T *motion, double side, const T &rate, const Body &t) {
   double gap = side * gap_at(t.specimen, side), share = t.pair / t.specimen.m2;
   T before = motion[Y] - motion[Z], relative = motion[VY] - motion[VZ];
@@ -45,10 +45,10 @@ template <class T> inline void place_on_stop(T *motion, double side, const T &ra
   motion[VY] = motion[VZ] + side * rate;
 }
 
-// Whether m1, which is on a stop or leaves it, comes to rest there, because the remaining impacts are too small to
-// follow. Pressed with the acceleration a, m1 hops, each hop `restitution` times as long as the one before: chatter,
-// infinitely many impacts in the time 2 v / (a (1 - restitution)). Omitted are hops indistinguishable from rest, and
-// those whose speeds add up to less than the tolerance times the speed of a fall through the gap.
+// Brings m1 to rest on a stop if the remaining impacts are too small to follow; returns whether it did.
+// Pressed with the acceleration a, m1 chatters: each hop is `restitution` times as long as the one before, so
+// infinitely many impacts take 2 v / (a (1 - restitution)). Hops are omitted if they cannot be distinguished
+// from rest, or if their speeds add up to less than the tolerance times the speed of a fall through the gap.
 template <class T>
 inline bool hold_if_pressed(T *motion, double side, double closed, double tolerance, const Body &t) {
   double rate = value_of(motion[VY] - motion[VZ]), press = value_of(press_on(side, motion, t));
@@ -60,8 +60,8 @@ inline bool hold_if_pressed(T *motion, double side, double closed, double tolera
 }
 
 // Impact on a rigid stop: displacements are kept, and the speed of approach is multiplied by `restitution`
-// (Newton). Returns whether m1 comes to rest. The touch was detected slightly before the gap closed; the
-// speed is that at closure, so that a million impacts do not accumulate an error.
+// (Newton). Returns whether m1 comes to rest. The touch is detected slightly before the gap closes; the speed
+// is corrected to that at closure, so that a million impacts do not accumulate an error.
 template <class T> inline bool rebound(T *motion, double side, double closed, double tolerance, const Body &t) {
   T approach = side * (motion[VY] - motion[VZ]);
   double hair = gap_at(t.specimen, side) - side * value_of(motion[Y] - motion[Z]);
@@ -71,8 +71,8 @@ template <class T> inline bool rebound(T *motion, double side, double closed, do
   return hold_if_pressed(motion, side, closed, tolerance, t);
 }
 
-// How long m1 stays on a stop: until lift-off (TOUCHES, as for a touch of a flight), or `longest` [s].
-// `level` is the stop's force at rest.
+// Finds how long m1 stays on a stop: until lift-off (reported as TOUCHES), or for `longest` seconds. `level`
+// is the stop's force at rest.
 inline Flight hold(double side, double level, const Phasor *phasors, const Clock<double> &clock, double longest,
                    const Tables &tables) {
   const LinearTables &t = tables.held;
@@ -101,19 +101,19 @@ inline Flight hold(double side, double level, const Phasor *phasors, const Clock
   return {FlightEnd::CLEAR, longest};
 }
 
-// Returns a lower bound on how long a flight that starts on a rigid stop moves away from it [s]; 0 if it does not start
-// on one. A search cannot distinguish leaving from touching there: the gap grows from zero, and its first digits are
-// rounding errors. But it provably grows while d2|p|/dt2 <= a + j t + b t^2 / 2 <= 0, with a and j the first
-// derivatives there and b a bound of the fourth derivative of p, and until m1 could have reached the other stop.
+// Returns a lower bound on how long a flight that starts on a rigid stop moves away from it [s]; 0 if it does
+// not start on one. A search cannot distinguish leaving from touching there, because the gap grows from zero,
+// within rounding. But it provably grows while d2|p|/dt2 <= a + j t + b t^2 / 2 <= 0 and the other stop is
+// out of reach. Here a, j are d2|p|/dt2, d3|p|/dt3 at the start, and b bounds the fourth derivative.
 inline double time_to_lift_off(const double *series, double length, double closed, const Specimen &s) {
   double side = s.upper_gap - series[0] <= closed ? 1.0 : s.lower_gap + series[0] <= closed ? -1.0 : 0.0;
   double rate = side * series[1], bend = side * 2.0 * series[2], jerk = side * 6.0 * series[3];
   double low = RESOLVED * closed, size = magnitude(rate);
-  // A speed that cannot move m1 out of the closed gap, against the acceleration or the jerk alone, counts as zero.
+  // A speed counts as zero if acceleration or jerk alone stops m1 within the closed gap.
   bool by_bend = rate * rate <= 2.0 * magnitude(bend) * low;
   bool by_jerk = 8.0 * size * size * size <= 9.0 * magnitude(jerk) * low * low;
   if (side == 0.0 || !(by_bend || by_jerk)) return 0.0;
-  // Still pressed on the stop, by more than rounding: m1 would move this far before it turns.
+  // m1 is still pressed on the stop: it would move into the stop by more than rounding before it turns.
   if (bend > 0.0 && !(jerk < 0.0 && 2.0 * bend * bend * bend <= 3.0 * closed * jerk * jerk)) return 0.0;
   double bound = derivative_bound(series, length, 4), under_root = jerk * jerk - 2.0 * bend * bound;
   double sure = under_root > 0.0 ? 0.5 * (square_root(under_root) - jerk) / larger(bound, 1e-300) : 0.0;

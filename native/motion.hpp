@@ -4,9 +4,9 @@
 
 namespace vibench {
 
-// Memory of a run under a power law.
+// State that a run under a power law keeps between steps.
 struct PowerMemory {
-  double level;     // one more than the level of the next step; 0 before the first
+  double level;     // level of the next step, plus one; 0 before the first step
   double sizes[3];  // recent sizes of p, x, z [m]
 };
 
@@ -15,7 +15,7 @@ template <class T> struct Motion {
   Clock<T> clock;
   Contact<T> contact;
   PowerMemory powers;
-  double growth[6];  // logarithm of a factor that was removed from each derivative
+  double growth[6];  // logarithm of the factor removed from each derivative
 };
 
 inline Motion<double> motion_of(const State &state) {
@@ -49,8 +49,8 @@ template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &
   return values;
 }
 
-// Moves a very large or small factor from the derivatives into its logarithm, so that products with physical
-// numbers stay finite. Returns whether anything changed.
+// Normalises very large or small derivatives and keeps the logarithm of the factor in `growth`, so that
+// products with physical numbers stay finite. Returns whether anything changed.
 template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
   bool is_changed = false;
@@ -66,16 +66,16 @@ template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
   return is_changed;
 }
 
-constexpr int64_t MOST_STEPS = 2000000000;  // steps of flight in a run
-constexpr int64_t RESOLVED_STEP = 50;       // steps of flight equivalent to a contact step in time
+constexpr int64_t MOST_STEPS = 2000000000;  // most grid steps of flight in a run
+constexpr int64_t RESOLVED_STEP = 50;       // grid steps that take as long to compute as a contact step
 
-// Grid steps that a flight counts as; the maximum if its length or its grid is not finite.
+// Number of grid steps of a flight; MOST_STEPS if its length or its grid is not finite.
 INLINE int64_t steps_of(double length, double grid) {
   double steps = length / grid;
   return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
 }
 
-// Counts an impact, and stores its time if requested; false when no more are allowed.
+// Counts an impact, and stores its time if requested; returns false when no more are allowed.
 INLINE bool keep_impact(Record &record, double time) {
   if (record.impacts == record.impact_room) return false;
   if (record.impact_times != nullptr) record.impact_times[record.impacts] = time;
@@ -83,7 +83,7 @@ INLINE bool keep_impact(Record &record, double time) {
   return true;
 }
 
-// Stores the samples within the next `length` seconds: `place_sample(later, sample)` computes one.
+// Stores the samples of the next `length` seconds. `place_sample(later, sample)` computes one sample.
 template <class PlaceSample>
 inline void keep_samples(Record &record, const Clock<double> &clock, double length, const PlaceSample &place_sample) {
   while (record.samples_kept < record.sample_room) {

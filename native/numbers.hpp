@@ -1,5 +1,5 @@
-// Elementary functions of numbers. Without C++ library and libm, results do not depend on the system, and the library
-// loads on every Linux with glibc 2.17 (decision 0077).
+// Basic functions of numbers. They use neither the C++ library nor libm, so results do not depend on the
+// system, and the library loads on every Linux with glibc 2.17 or later (decision 0077).
 #pragma once
 #include <stddef.h>
 #include <stdint.h>

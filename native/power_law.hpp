@@ -1,30 +1,30 @@
-// Motion under a power law, whose force acts at every p, in long steps (decision 0026). In a step the force F is a
-// polynomial through its values at eight Gauss points; everything else is linear in the motion at the start and in F
-// (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). The force determines p at
-// the points and p the force; repeated substitution converges like the series of a cosine.
+// Motion under a power law, whose force acts at every p, in long steps (decision 0026). In a step the force F
+// is a polynomial through its values at eight Gauss points; the motion is linear in F and the motion at start
+// (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2nd ed. 2006, section II.1.3). F determines p
+// at the points, and p determines F: repeated substitution converges like the series of a cosine.
 #pragma once
 #include "observe.hpp"
 
 namespace vibench {
 
 constexpr int GAUSS = 8;             // points in a step
-constexpr int ORDER = 32;            // terms of the series: the next is 1e-20 of the largest in the longest step
-constexpr int LEVELS = 40;           // step lengths, each shorter than the one before by the root of two
+constexpr int ORDER = 32;            // terms of the series; the next is at most 1e-20 of the largest
+constexpr int LEVELS = 40;           // number of step lengths, usually with the ratio sqrt(2)
 constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its points, its end
 constexpr double LONGEST_POWER_TURN = 3.0;  // longest step, as the fastest rate times its length [rad]
 constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest
-constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance: as motion that it
-                             // would make, over the size of the motion. The end itself errs by far less
-constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // substitution ends when the motion changes by this part
-                                                             // of the tolerance, or of itself
+constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance: the
+                             // motion that it would cause, over the size of the motion. The error is less
+constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // substitution ends at a relative change of this
+                                                             // part of the tolerance, or of this value
 constexpr int MOST_SUBSTITUTIONS = 30;
 constexpr double TRY_LONGER = 0.015;  // a misfit below this part of the allowed one lengthens the next step
-constexpr double FAR_TOO_LONG = 20.0;  // a misfit beyond this multiple halves the step at once
-constexpr double WALL_TURN = 5.0;  // largest rotation of the stiffest spring in a step [rad]
-constexpr double FADING = 0.98;    // share of its past size that a motion keeps from step to step
+constexpr double FAR_TOO_LONG = 20.0;  // a misfit beyond this multiple of the allowed one halves the step
+constexpr double WALL_TURN = 5.0;  // longest step, as the rate of the stiffest spring times its length [rad]
+constexpr double FADING = 0.98;    // factor per step by which the recorded size of a motion decays
 constexpr double SMALLEST_PART = 1e-3;  // a displacement counts as at least this part of the largest one
 constexpr double NOTHING_MOVES = 1e-150;
-constexpr double FINEST_FIT = 1e-10;  // of undamped motions: with a steep wall a finer fit is lost in rounding
+constexpr double FINEST_FIT = 1e-10;  // least tolerance; with a steep wall a finer fit is below rounding
 
 INLINE double fit_tolerance(double tolerance, const Specimen &s) {
   return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
@@ -35,11 +35,11 @@ INLINE double fit_tolerance(double tolerance, const Specimen &s) {
 struct PowerForce {
   double inverse_reference;  // [1/m]
   int terms;
-  int halves[MOST_POWERS];   // half the difference of an exponent from the one before, the first from 1
+  int halves[MOST_POWERS];   // half the difference of successive exponents, starting from 1
   double forces[MOST_POWERS];  // of each term at the reference [N]
-  int highest;               // exponent
+  int highest;               // highest exponent
 
-  // Of an exponent of one or more.
+  // `base` to the power of `exponent`, which is at least 1.
   template <class T> static INLINE T whole_power(T base, int exponent) {
     while (!(exponent & 1)) base = base * base, exponent >>= 1;
     T result = base;
@@ -82,26 +82,26 @@ INLINE PowerForce power_force(const PowerTerms &law) {
   return force;
 }
 
-// ---- Coefficients of a step of some length
+// ---- Coefficients of a step of given length
 
-// A number of the motion at the points: contributions of the motion at the start and of F at the points.
+// One number of the motion at the points, per number of the motion at the start and per F at each point.
 struct AtPoints {
   double free[WIDE][GAUSS], gain[GAUSS][GAUSS];
 };
 struct StepNumbers {
   double length;                      // [s]
-  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // contributions to the motion from start to end
+  double move[WIDE][WIDE], feed[GAUSS][WIDE];  // change of the motion per motion at start, and per F
   AtPoints p, x, p_rate, x_rate;      // the last three for observation
   double cosine[GAUSS], sine[GAUSS];  // rotation of the drive at the points
 };
 
-// Taylor series of exp(A t) for the eight numbers of a motion: it needs no modes, and stays accurate in short steps.
+// Taylor series of exp(A t) for the eight numbers of a motion; accurate in short steps, and needs no modes.
 struct PowerTables {
   const PowerShapes *shapes;
   PowerForce force;
   double fastest;  // [1/s]
   double powers[ORDER][WIDE][WIDE], struck[ORDER][WIDE];
-  double heights[ORDER][GAUSS];  // points^m
+  double heights[ORDER][GAUSS];  // powers of the points: points^m
   StepNumbers levels[LEVELS];
 };
 
@@ -142,7 +142,7 @@ inline void fill_observed(StepNumbers &numbers, double omega, const PowerTables 
   }
 }
 
-// Steps from `longest` [s] on, each level `ratio` of the one before.
+// Fills the levels: the first has steps of `longest` [s], and each further one `ratio` times the one before.
 inline void fill_power_steps(PowerTables &t, const PowerShapes *shapes, const PowerTerms &law, const Specimen &specimen,
                              const Drive &drive, double fastest, double longest, double ratio) {
   t.shapes = shapes;
@@ -172,12 +172,12 @@ template <class T> struct PowerStep {
   const Body &t;
   const PowerTables &of;
   double tolerance;
-  Wide<T, WIDE> motion, ahead;  // at its start and its end
+  Wide<T, WIDE> motion, ahead;  // motion at the step's start and at its end
   Wide<T, GAUSS> force, place;  // F and p at the points
   Vector<GAUSS> course;         // course of F in the last step, in powers of (s - 1)
   double sizes[3];              // recent sizes of p, x, z [m]
   double push, push_ahead;      // F at the start and the end [N]
-  double last_length = 0.0;     // of the last step [s]; 0 without one
+  double last_length = 0.0;     // length of the last step [s]; 0 before the first
   double fading = FADING;
 
   // The motion without F: p at the points, and the whole motion at the end.
@@ -190,7 +190,7 @@ template <class T> struct PowerStep {
     return {times(numbers.p.free, begin), begin + times(numbers.move, begin)};
   }
 
-  // Conversion from and to a motion without the drive's phasor.
+  // Conversion from and to `Motion`, which does not contain the drive's phasor.
   void begin_at(const Motion<T> &m) {
     const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
                              m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};
@@ -203,7 +203,7 @@ template <class T> struct PowerStep {
     m.at[VX] = at(motion, X_RATE), m.at[VZ] = at(motion, Z_RATE), m.at[VY] = m.at[VZ] + at(motion, P_RATE);
   }
 
-  // Tries a step and fills `ahead`; returns its misfit over the allowed one.
+  // Tries a step and fills `ahead`; returns its misfit divided by the allowed misfit.
   double attempt(const StepNumbers &numbers, const Unforced &free) {
     Vector<WIDE> begin = value_of(motion);
     double weight = numbers.length * numbers.length * t.inverse_pair;
@@ -219,8 +219,8 @@ template <class T> struct PowerStep {
     return weight * larger(magnitude(before), magnitude(after)) / (FIT * tolerance * largest_unseen(begin, now));
   }
 
-  // The derivative of the step just tried: with the law's slopes D a change of p at the points solves (1 -
-  // gain D) dp = free du, and the rest follows from D dp as the motion does from F.
+  // Computes the derivatives of the step just tried. With the law's slopes D a change of p at the points
+  // solves (1 - gain D) dp = free du; the change of the motion follows from D dp as the motion from F.
   void differentiate(const StepNumbers &numbers) {
     if constexpr (is_dual<T>) {
       constexpr int M = int(sizeof motion.slope / sizeof motion.slope[0]);
@@ -254,7 +254,7 @@ template <class T> struct PowerStep {
     motion = ahead;
   }
 
-  // The first level from `level` on whose step resolves every wall; LEVELS if there is none.
+  // Returns the first level, from `level` on, with steps short enough for the wall; LEVELS if there is none.
   int level_that_sees(int level) const {
     Vector<WIDE> now = value_of(motion);
     double p = now[P], outward = larger(p >= 0.0 ? now[P_RATE] : -now[P_RATE], 0.0);
@@ -291,7 +291,7 @@ template <class T> struct PowerStep {
     return false;
   }
 
-  // Reference size of errors: that of the smallest of the three displacements, up to the step's end.
+  // Reference size for errors: the smallest of the recent sizes of p, x and z, up to the step's end.
   double largest_unseen(const Vector<WIDE> &begin, const Vector<WIDE> &end) const {
     double p = larger(sizes[0], larger(magnitude(begin[P]), magnitude(end[P])));
     double x = larger(sizes[1], larger(magnitude(begin[AT_X]), magnitude(end[AT_X])));
@@ -327,8 +327,8 @@ INLINE int level_after(int level, double misfit) {
 
 // ---- Observation of a step
 
-// One displacement at ten instants of a step with its rates: the polynomial of degree 19 through them is
-// exact to rounding. Barycentric sums: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
+// One displacement and its rate at ten instants of a step. The polynomial of degree 19 with these values is
+// exact to rounding. Barycentric formulas: Berrut and Trefethen, SIAM Rev. 46 (2004) 501.
 struct StepCourse {
   double value[INSTANTS], rate[INSTANTS];
   double length;
@@ -357,7 +357,7 @@ struct StepCourse {
     return sum / (norm * norm);
   }
   double peak(double best) const {
-    constexpr int SECANTS_IN_STEP = 6;  // the remaining error changes no peak
+    constexpr int SECANTS_IN_STEP = 6;  // the error of a peak is then negligible
     for (double each : value) best = larger(best, magnitude(each));
     for (int i = 0; i + 1 < INSTANTS; i++) {
       double low = shapes.instants[i], high = shapes.instants[i + 1], rate_low = rate[i], rate_high = rate[i + 1];
@@ -456,7 +456,7 @@ template <class T> class PowerRun {
     else step.motion.set(COSINE, now.re), step.motion.set(SINE, now.im);
   }
 
-  // The derivatives are kept in range like those of a motion between stops.
+  // Keeps the derivatives in range, which `Run` does for the other laws.
   void rescale(PowerStep<T> &step) {
     step.write_to(m);
     if (!keep_in_range(m)) return;
@@ -486,7 +486,7 @@ template <class T> class PowerRun {
     observer.impulse = observer.impulse + push * Phasor{first[COSINE], -first[SINE]};
   }
 
-  // A sample is the end of a shorter step from the same start; the force is known except for one refinement.
+  // Computes a sample as the end of a shorter step. Its force is interpolated from the step and refined once.
   void place_within(const PowerStep<T> &step, double length, double later, double *sample) const {
     StepNumbers part;
     fill_step(part, later, of);

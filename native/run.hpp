@@ -1,14 +1,14 @@
-// A run: flight, contact, flight, ... up to a time. One source for a motion and for its derivatives.
+// A run: flight, contact, flight, ... up to a given time. The same source serves motions with derivatives.
 #pragma once
 #include "held.hpp"
 #include "power_law.hpp"
 
 namespace vibench {
 
-// ---- Stops: their behaviour is selected by type.
+// ---- Types of stops, which select the code of a contact at compile time
 
 struct WithoutStops {};
-// Stops with a contact force while m1 indents them; a Hertz collision is first solved as a whole.
+// Stops with a contact force. With `whole_collisions` a collision is solved as a whole if possible.
 template <class Force> struct YieldingStops {
   Force force;
   static constexpr bool whole_collisions = false;
@@ -16,11 +16,11 @@ template <class Force> struct YieldingStops {
 struct HertzStops : YieldingStops<HertzForce> {
   static constexpr bool whole_collisions = true;
 };
-struct SpringStops {};  // exact, with modes of their own
-struct HardStops {};    // Newton's restitution, and sticking
+struct SpringStops {};  // linear springs: solved exactly by the modes of the specimen in contact
+struct HardStops {};    // rigid: Newton's restitution, or m1 at rest on the stop
 
-// How much later a changed motion touches. All corrections at switching points (saltation, Mueller 1995) follow from it
-// by differentiation. At a grazing touch no derivative exists, so the rate is limited from below.
+// How much later a changed motion touches. All corrections at switching points (saltation, Mueller 1995)
+// follow by differentiation. At a grazing touch no derivative exists, so the rate is limited from below.
 template <class T> inline T later_touch(const T *motion) {
   T p = motion[Y] - motion[Z];
   double rate = value_of(motion[VY] - motion[VZ]);
@@ -66,7 +66,7 @@ template <class T, class Stops> class Run {
       Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
       if (outcome != REACHED_END) return outcome;
       if constexpr (is_dual<T>)
-        if (keep_in_range(m)) is_drive_known = false;  // its derivatives still contain the factor
+        if (keep_in_range(m)) is_drive_known = false;  // derivatives of `drive` still contain the factor
     }
   }
 
@@ -151,7 +151,7 @@ template <class T, class Stops> class Run {
       m.contact.side = rebound(m.at, side, closed_gap(values, t), tolerance, t) ? side : 0.0;
       observer.see_impact(value_of(m.at[VY] - m.at[VZ]) - rate, values[t.flight.modes]);
     } else {
-      // Removes the rounding error of the touch: w begins at zero.
+      // A touch has no penetration; this removes its rounding error.
       begin_contact(m.contact, m.at, side, tolerance, t);
       m.contact.w = constant<T>(0.0);
     }
@@ -221,7 +221,7 @@ template <class T, class Stops> class Run {
       }
     BaseForce base(clock_value(), smaller(0.5 * value_of(longest), 0.5 * STRETCH_TURN / t.omega), t);
     bool is_last = value_of(longest) <= 2.0 * base.middle;
-    // Clock times have no derivatives; the start of this stretch does.
+    // Only the start of this stretch depends on the changes; clock times have no derivatives.
     T begin = m.clock.slip, tau = begin;
     T limit = constant<T>(is_last ? value_of(longest) : 2.0 * base.middle);
     auto seen = [&](const auto &steps, const T &h) {
@@ -244,7 +244,7 @@ template <class T, class Stops> class Run {
 
   // ---- Samples
 
-  // Samples of a contact come from a second run from its beginning, which ends at each of them.
+  // Computes the samples of a contact by a second run from its beginning, which stops at each sample.
   void sample_contact(Motion<double> &shadow, double length, const BaseForce &base) {
     double reached = 0.0;
     keep_samples(record, clock_value(), length, [&](double later, double *sample) {

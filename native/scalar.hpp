@@ -1,6 +1,6 @@
-// Number types of a motion: `double`, or `Dual<double, M>`, a number with M of its derivatives. One source gives the
-// motion and its tangent, so exponents, Floquet multipliers and Newton's matrices need no separate code. `Wide<T, N>`
-// holds N numbers of T, so that both types fill the processor's registers. `Complex<T>` is a phasor.
+// Number types of a motion: `double`, or `Dual<double, M>`, a number with M derivatives. The same source
+// computes a motion and its tangent, so exponents, Floquet multipliers and Newton matrices need no separate
+// code. `Wide<T, N>` holds N numbers of type T in vector registers. `Complex<T>` is a phasor.
 #pragma once
 #include "elementary.hpp"
 #include "vector.hpp"
@@ -95,7 +95,7 @@ template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
   return root;
 }
 
-// The value alone, on which all decisions (a touch, a step, the end of an iteration) depend.
+// Value without derivatives. All decisions (a touch, a step, the end of an iteration) use values only.
 template <Plain A> INLINE A value_of(const A &x) { return x; }
 template <class A, int M> INLINE A value_of(const Dual<A, M> &x) { return x.value; }
 
@@ -148,8 +148,8 @@ template <int M, int N> INLINE Dual<Vector<N>, M> gathered(const Dual<double, M>
   return all;
 }
 
-// Sum over k of x_k table[k]: K rows of N numbers, from the left. Even and odd rows are summed separately:
-// two short chains of dependent sums take half the time of one.
+// Sum over k of x_k table[k], for K rows of N numbers. Even and odd rows are summed separately: two short
+// chains of dependent sums take half the time of one.
 template <int N, int K> INLINE Vector<N> times(const double (*table)[N], const Vector<K> &x) {
   Vector<N> even = x[0] * Vector<N>::load(table[0]), odd = x[1] * Vector<N>::load(table[1]);
   for (int k = 2; k < K; k += 2) {
@@ -189,7 +189,7 @@ INLINE Phasor quotient(const Phasor &x, const Phasor &y) {
   return (1.0 / (y.re * y.re + y.im * y.im)) * (x * conjugate(y));
 }
 INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im * x.im); }
-// Re(x y): the contribution of phasor y to a motion of unit shape x.
+// Re(x y).
 template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }
 
 // exp(i angle), and exp(rate time); derivatives by the chain rule.

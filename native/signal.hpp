@@ -7,8 +7,8 @@ namespace vibench {
 constexpr int INTERPOLATION_TAPS = 64;
 constexpr int INTERPOLATION_REACH = INTERPOLATION_TAPS / 2;  // samples to either side
 
-// Weighted sums of N ranges that begin `stride` apart: each weight is loaded once for all. A sum depends on
-// the order of its values, not on N. `count` is a multiple of eight.
+// Weighted sums of N ranges that begin `stride` apart, so that each weight is loaded once. The result of a
+// range does not depend on N. `count` is a multiple of eight.
 template <int N>
 INLINE void inner_products(double (&sums)[N], const double *weights, const double *values, int64_t stride,
                            int64_t count) {
@@ -26,7 +26,7 @@ INLINE double inner_product(const double *weights, const double *values, int64_t
   return sums[0];
 }
 
-// Weights of the taps `fraction` of a sample after a sample: Lagrange's cubic through the four phases around it.
+// Weights of the taps at `fraction` of a sample after a sample, by Lagrange's cubic between the table's rows.
 inline void interpolation_weights(double *weights, const Numbers &table, double fraction) {
   int64_t phases = table.size / INTERPOLATION_TAPS - 3;
   double place = fraction * double(phases);
@@ -64,14 +64,14 @@ inline int64_t interpolate(const Interpolation &of) {
   return 0;
 }
 
-// Refused when a sample needs unavailable means.
+// Computes the samples; returns REFUSED if a sample needs means that are not available.
 inline int64_t decimate(const Decimation &of) {
   constexpr int TOGETHER = 4;
   int64_t rows = of.table.size / of.reach, count = of.samples.size, last = of.means.size - of.reach;
   for (int64_t k = 0; k < count; k++) {
-    // Counted from sample 0, so that block sizes do not matter.
+    // Time is counted from sample 0, so that block sizes do not matter.
     double steps = (double(of.first + k) + 1.0) * of.ratio, at = steps + of.begin;
-    // If one row of weights serves every sample, it includes the fraction of a step.
+    // A table of one row is made for the constant fraction of a step, so only whole steps remain.
     double whole = rows == 1 ? steps + whole_part(of.begin) : whole_part(at);
     double start = whole + double(of.origin), place = (at - whole) * double(rows - 1);
     if (!(start >= 0.0 && start <= double(last))) return REFUSED;

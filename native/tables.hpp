@@ -1,17 +1,17 @@
-// Data of one scene for a run: computed once from the specimen, its linear motion and the drive.
+// Data for the runs of one scene, computed once from the specimen, its linear motion and the drive.
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
-constexpr int MODES = 6;          // most modes of a motion: three pairs, or real ones beyond critical damping
+constexpr int MODES = 6;          // most modes of a motion: all real; usually there are three conjugate pairs
 constexpr int PHASORS = MODES + 1;  // plus the drive
 constexpr int AHEAD = 16;         // grid steps per evaluation, and terms of a Taylor series
-constexpr double LONGEST_TURN = 0.25;  // a grid step, as the fastest rate times its length [rad]
+constexpr double LONGEST_TURN = 0.25;  // fastest rate times the length of a grid step [rad]
 
 enum { REAL, IMAG };
 
-// A sum of rotating and decaying phasors. The drive is the last term, at place `modes`.
+// A sum of rotating and decaying phasors. The drive is the last term, at index `modes`.
 struct LinearTables {
   int modes;
   double grid;               // grid step [s]
@@ -19,7 +19,7 @@ struct LinearTables {
   double squares[PHASORS];   // |l_j|^2
   Phasor shapes[PHASORS][6];
   Phasor path[PHASORS];      // contribution of a unit phasor to p
-  Phasor across[PHASORS];    // and to x
+  Phasor across[PHASORS];    // contribution of a unit phasor to x
   Phasor rows[MODES][6];
   double ahead[PHASORS][2][AHEAD];   // exp(l_j grid n), n = 1 ... 16
   double series[PHASORS][2][AHEAD];  // Taylor coefficients of exp(l_j t)
@@ -27,20 +27,20 @@ struct LinearTables {
 
 // Numbers of a motion in a collision: p, x, z, their rates, and the drive's phasor.
 enum { P, AT_X, AT_Z, P_RATE, X_RATE, Z_RATE, COSINE, SINE, WIDE };
-constexpr int TERMS = 8;  // of a Taylor series over a collision
+constexpr int TERMS = 8;  // terms of a Taylor series over a collision
 
 // The motion without the contact force as a Taylor series of its matrix exponential, in units of 1 / fastest.
 struct CollisionTables {
   double fastest;                   // largest rate of modes and drive [1/s]
   double powers[TERMS][WIDE][WIDE];  // [m][j][i]: contribution of number j to number i, (A / fastest)^m / m!
-  double struck[TERMS][WIDE];        // the same for a unit of contact force
+  double struck[TERMS][WIDE];        // contribution of a unit of contact force, likewise
   double onto_p[WIDE][TERMS];        // contribution of number j to the m-th term of p
-  double onto_x[WIDE][TERMS];        // and of x
+  double onto_x[WIDE][TERMS];        // contribution of number j to the m-th term of x
   const CollisionShapes *shapes;
 };
 
-// (i omega - A)^-1 of eq. 1 as s' = A s + b f, where f is the restoring force on p: contributions of the
-// integrals of s' and f against the drive to those of x and p.
+// Rows x and p of (i omega - A)^-1, for eq. 1 as s' = A s + b f with the stops' force f. They turn Fourier
+// integrals of s' and f into those of x and p.
 struct LineTables {
   Phasor across[6], path[6];
   Phasor struck_x, struck_p;  // [m s / (N s)]
@@ -64,7 +64,7 @@ struct Tables : Body {
   Phasor pulls[PHASORS];
   double let_go, rests;
   CollisionTables collision;
-  const PowerTables *power;  // after these tables; of a power law
+  const PowerTables *power;  // stored after these tables, for a power law; else null
 };
 
 INLINE double gap_at(const Specimen &specimen, double side) {
@@ -117,7 +117,7 @@ inline void fill_equations(double (&A)[WIDE][WIDE], double (&b)[WIDE], const Spe
   b[P_RATE] = -inverse_pair, b[Z_RATE] = 1.0 / s.m2;
 }
 
-// The Taylor series of exp(A t), in units of 1 / fastest, and of the effect of a unit of force.
+// Computes the Taylor series of exp(A t) and of the effect of a unit force, with t in units of 1 / fastest.
 template <int N>
 inline void fill_series(double (&powers)[N][WIDE][WIDE], double (&struck)[N][WIDE], double fastest,
                         const Specimen &specimen, const Drive &drive) {
@@ -149,7 +149,7 @@ inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const 
     for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
 }
 
-// From the modes: half of each and half of its conjugate, a real one with itself.
+// Sums over the modes, half of each plus half of its conjugate; this is also correct for real modes.
 inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Specimen &s) {
   lines = {};
   Phasor drive = t.rates[t.modes], half{0.5, 0.0};

@@ -1,12 +1,12 @@
-// Small changes of a motion that are integrated with it, and their growth: exponents and multipliers. Between
-// readings a motion of duals integrates them exactly; at a reading they are made orthonormal in a metric, and
-// the logarithms of the removed factors are stored (Benettin et al., Meccanica 15 (1980) 9 and 21).
+// Growth of small changes of a motion, for exponents and multipliers. Between readings the changes are
+// integrated exactly, as dual numbers. At a reading they are made orthonormal in a metric, and the logarithms
+// of the removed factors are stored (Benettin et al., Meccanica 15 (1980) 9 and 21).
 #pragma once
 #include "run.hpp"
 
 namespace vibench {
 
-// ---- Between rows of changes and duals
+// ---- Conversion between rows of changes and dual numbers
 
 // The changes of a contact's w and r follow from the displacements: |p| = gap + w^2.
 template <int M> inline Motion<Dual<double, M>> with_changes(const Motion<double> &plain, const Tangent &tangent) {
@@ -36,11 +36,11 @@ template <int M> inline void keep_changes(Tangent &tangent, const Motion<Dual<do
   }
 }
 
-// ---- The QR step of exponents: modified Gram and Schmidt, twice (twice is enough: Giraud, Langou and Rozloznik,
-// Comput. Math. Appl. 50 (2005) 1069).
+// ---- QR step of the exponents: modified Gram-Schmidt in two passes, which suffice (Giraud, Langou and
+// Rozloznik, Comput. Math. Appl. 50 (2005) 1069).
 
 constexpr int ORTHOGONAL_PASSES = 2;
-constexpr double DIRECTION_LOST = 1e-11;  // a row with at most this part left has no direction
+constexpr double DIRECTION_LOST = 1e-11;  // a row of which at most this part remains has no direction
 
 using Metric = double[6][6];
 
@@ -54,7 +54,7 @@ inline double inner(const double (&a)[6], const double (&b)[6], const Metric &me
   return sum;
 }
 
-// Removes from row `i` its part along the rows before; returns the remaining length.
+// Removes from row `i` its components along the earlier rows; returns the remaining length.
 inline double left_of(double (&rows)[6][6], int i, const Metric &metric) {
   for (int pass = 0; pass < ORTHOGONAL_PASSES; pass++)
     for (int j = 0; j < i; j++) {
@@ -64,8 +64,8 @@ inline double left_of(double (&rows)[6][6], int i, const Metric &metric) {
   return square_root(inner(rows[i], rows[i], metric));
 }
 
-// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. A row that is a combination of
-// those before it (an impact without rebound gives two such) adds minus infinity, and continues along an axis.
+// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. A row that is a linear
+// combination of earlier rows (an impact without rebound gives two) gets minus infinity and becomes an axis.
 inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric, double *logarithms) {
   for (int i = 0; i < count; i++) {
     double whole = square_root(inner(rows[i], rows[i], metric)), length = left_of(rows, i, metric);
@@ -74,7 +74,7 @@ inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric
       for (int axis = 0; axis < 6; axis++) {
         for (int k = 0; k < 6; k++) rows[i][k] = k == axis ? 1.0 / square_root(metric[axis][axis]) : 0.0;
         length = left_of(rows, i, metric);
-        if (length * length * 6.0 > 0.5) break;  // at least one of the axes leaves enough
+        if (length * length * 6.0 > 0.5) break;  // true for at least one axis
       }
     } else {
       logarithms[i] += logarithm(length);
@@ -85,7 +85,7 @@ inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric
 
 // ---- Readings
 
-// Advances to the time of every remaining reading up to `last`; `advance(until)` advances motion and changes.
+// Takes all remaining readings up to `last`; `advance(until)` advances motion and changes.
 template <class Advance>
 inline Outcome take_readings(const State &state, const Record &record, Tangent &tangent, Readings &readings,
                              int64_t last, const Advance &advance) {

@@ -1,8 +1,8 @@
-// Tests of the engine as a C++ program, which the sanitizers of g++ can watch:
+// Tests of the engine as a C++ program, which can run under the sanitizers of g++:
 //
 //     g++ -std=c++20 -O1 -g -fsanitize=address,undefined native/test_engine.cpp -o test_engine && ./test_engine FILE ...
 //
-// Each file holds the bytes of a Scene, its CollisionShapes and its PowerShapes; tests/sim/engine/test_native_program.py makes them.
+// tests/sim/engine/test_native_program.py writes a FILE: the bytes of Scene, CollisionShapes, PowerShapes.
 #include "api.cpp"
 
 #include <cmath>
@@ -19,7 +19,7 @@ void expect(bool holds, const char *what, double found) {
   failures++;
 }
 
-// Uniform in [low, high): a linear congruential generator, the same everywhere.
+// Uniform in [low, high), from a linear congruential generator: the same numbers on every system.
 double draw(double low, double high) {
   static uint64_t state = 1;
   state = state * 6364136223846793005u + 1442695040888963407u;
@@ -64,7 +64,7 @@ void test_products_keep_what_they_round_off() {
   }
 }
 
-// Parabolas with an exactly known peak, on either side, with bounds that are too large.
+// Uses parabolas with an exactly known peak on either side, and bounds larger than necessary.
 void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   for (int n = 0; n < 20000; n++) {
@@ -96,12 +96,12 @@ void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
   expect(std::fabs(far - 0.15 * GAP) < 1e-15, "the far stop is watched", far);
 }
 
-// Newton's method is used where p provably has no extreme. It must agree with the full search.
+// first_touch uses Newton's method where p provably has no extreme. It must agree with the full search.
 void test_a_touch_is_the_one_that_the_careful_search_finds() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   const double lowest_gaps[] = {GAP, 0.3 * GAP, INFINITE};
   for (int n = 0; n < 20000; n++) {
-    // Rotating terms like those of a flight: a derivative is at most the fastest rate times the one before.
+    // Rotating terms like those of a flight: a derivative is at most the fastest rate times the last one.
     double series[AHEAD] = {}, bound = 0.0, reach = GAP, lowest = lowest_gaps[n % 3], length = draw(0.05, 1) * LENGTH;
     for (int term = 0; term < 3; term++) {
       double rate = LONGEST_TURN / LENGTH * draw(0.05, 1), size = 2 * GAP * draw(0, 1), phase = draw(0, 2 * PI);
@@ -117,7 +117,7 @@ void test_a_touch_is_the_one_that_the_careful_search_finds() {
     Room room{lowest, GAP, bound, reach};
     double careful = first_contact(series, length, room), quick = first_touch(series, length, room);
     if (careful == NEVER || quick == NEVER) {
-      // One may find at the very end what the other leaves to the next stretch.
+      // At the very end of a stretch one search may find a touch that the other leaves to the next stretch.
       expect(careful == quick || std::fmax(careful, quick) > length * (1 - 1e-9), "both find a touch", careful - quick);
       continue;
     }
@@ -229,7 +229,7 @@ void test_an_impact_keeps_momentum_and_places_and_turns_the_approach(const Body 
 
 Motion<double> at_rest() { return {}; }
 
-// A run of `until` seconds, forwards or backwards, from a given motion.
+// A run of `until` seconds from a given motion.
 struct HarmonicRun {
   const Tables &tables;
   double until;
@@ -265,7 +265,7 @@ struct RunOnCubics {
   }
 };
 
-// The derivatives of the flow, from duals, against central differences of two neighbouring runs.
+// Compares derivatives by dual numbers with central differences of two neighbouring runs.
 template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, double tolerance) {
   const double scale[6] = {1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1};
   constexpr double STEP = 1e-6;
@@ -291,8 +291,7 @@ template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, doub
   }
 }
 
-// With a fit that covers no collision every contact is integrated by steps, like those of a run at a strict
-// tolerance.
+// The fit covers no collision, so every contact is integrated by steps, as in a run at a strict tolerance.
 void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
   constexpr int64_t COUNT = 11, PERIODS = 9;
   constexpr double TOLERANCE = 9e-8;  // at this tolerance no collision is solved as a whole

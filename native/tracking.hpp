@@ -1,24 +1,24 @@
-// One step of a tracked motion: exact without stops; with them, impulses and free motion alternate
-// (docs/hidden-motion.md).
+// One step of the motion in hidden-state estimation: exact in flight; near a stop, impulses of the contact
+// force and free motion alternate in substeps (docs/hidden-motion.md).
 #pragma once
 #include "structures.hpp"
 
 namespace vibench {
 
-constexpr int TRACKED = 8;  // states
-constexpr int BASE_VELOCITY = 6;  // W; X, Y, Z, VX, VY, VZ come before it, relative to the base; B behind it
+constexpr int TRACKED = 8;  // number of states without parameters
+constexpr int BASE_VELOCITY = 6;  // index of W, after X, Y, Z, VX, VY, VZ relative to the base and before B
 constexpr double HERTZ_EXPONENT = 1.5;
-constexpr double WATCHED_REACH = 2e-7;  // a flight that passes a stop within this distance uses small steps [m]
+constexpr double WATCHED_REACH = 2e-7;  // a step that comes this close to a stop is divided into substeps [m]
 
-enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // no stop; one, but free at the end; in contact at the end
+enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // far from stops; near one, free at the end; in contact there
 
-// State, recorded acceleration and its increase over the step -> state at the end.
+// Matrix from the state, the recorded acceleration and its increase over a step to the state at the end.
 typedef double StepFlow[TRACKED][TRACKED + 2];
 
-// State with its derivatives with respect to the state at the beginning.
+// A number of the state with its derivatives with respect to the state at the start of the step.
 using StateAndJacobian = Dual<double, TRACKED>;
 
-// d to a power, for d > 0; special cases of Hertz's stops and springs save nine tenths of the time.
+// d to a power, for d > 0. The special cases for Hertz and spring stops take a tenth of the time.
 INLINE double power(double d, double exponent) {
   if (exponent == HERTZ_EXPONENT) return d * square_root(d);
   return exponent == 1.0 ? d : exponential(exponent * logarithm(d));
@@ -31,7 +31,7 @@ template <int M> INLINE Dual<double, M> power(const Dual<double, M> &d, double e
   return raised;
 }
 
-// Applies the stops' force for a time without motion; returns the impulse on m1 [N s].
+// Adds the impulse of the present stop force over `time` to the velocities; returns the impulse on m1 [N s].
 template <class T> INLINE double kick(T *state, const TrackedStop &stop, double time) {
   T p = state[Y] - state[Z], rate = state[VY] - state[VZ];
   double side = value_of(p) > stop.upper_gap ? 1.0 : value_of(p) < -stop.lower_gap ? -1.0 : 0.0;
@@ -44,7 +44,7 @@ template <class T> INLINE double kick(T *state, const TrackedStop &stop, double 
   return value_of(impulse);
 }
 
-// Advances without stops, exactly, with a linearly increasing acceleration [m/s^2].
+// Advances exactly, without stops; the base acceleration is `base` and increases linearly by `rise` [m/s^2].
 template <class T> INLINE void flow_on(T *state, const StepFlow &flow, double base, double rise) {
   T moved[TRACKED];
   for (int i = 0; i < TRACKED; i++) {
@@ -61,7 +61,7 @@ struct StepModel {
   int64_t small_steps;
 };
 
-// Part `n` of a step in substeps; returns the impulse on m1 [N s].
+// Advances over substep `n` of a step; returns the impulse on m1 [N s].
 template <class T> INLINE double small_step(T *state, const StepModel &m, double base, double rise, int64_t n) {
   double parts = double(m.small_steps), half = 0.5 * (m.step / parts);
   double impulse = kick(state, m.stop, half);
@@ -69,7 +69,7 @@ template <class T> INLINE double small_step(T *state, const StepModel &m, double
   return impulse + kick(state, m.stop, half);
 }
 
-// Whether a flight, a cubic between its ends, comes near a stop.
+// Whether a flight comes near a stop, by the values at its ends and the middle of the cubic between them.
 inline bool reaches_stop(const double *before, const double *after, const StepModel &m) {
   double p0 = before[Y] - before[Z], p1 = after[Y] - after[Z];
   double bend = 0.125 * m.step * ((before[VY] - before[VZ]) - (after[VY] - after[VZ]));
@@ -78,7 +78,7 @@ inline bool reaches_stop(const double *before, const double *after, const StepMo
   return high + WATCHED_REACH > m.stop.upper_gap || -low + WATCHED_REACH > m.stop.lower_gap;
 }
 
-// Advances a state by one sample; adds up the impulse on m1. T may include derivatives.
+// Advances a state by one sample, and computes the impulse on m1. T may include derivatives.
 template <class T>
 inline StepKind step_on(double *state, const StepModel &m, double base, double rise, double &impulse,
                         double (&jacobian)[TRACKED][TRACKED]) {
@@ -119,7 +119,7 @@ struct TrackedContact {
 };
 constexpr int CONTACT_COLUMNS = sizeof(TrackedContact) / sizeof(double);
 
-// Simulates every contact from the smoothed flight before it to its end; returns the number of contacts.
+// Simulates each contact from the last smoothed state in flight before it; returns the number of contacts.
 inline int64_t follow_contacts(const ContactSearch &of) {
   const auto &flow = *reinterpret_cast<const StepFlow *>(of.small_flow.at);
   const auto &stop = *reinterpret_cast<const TrackedStop *>(of.stop.at);

@@ -1,11 +1,11 @@
-// N doubles in parallel, which the compiler keeps in as many registers as necessary. Every operation is
-// IEEE's, uncontracted and in a fixed order, so that results do not depend on the width of the registers.
+// N doubles in parallel, in as many registers as necessary. Operations follow IEEE 754 in a fixed order,
+// without fused multiply-adds except `fused`, so results do not depend on the width of the registers.
 #pragma once
 #include "numbers.hpp"
 
 namespace vibench {
 
-// Spelled out for each N: g++ ignores the attribute where the size depends on a template's argument.
+// Written out for each N, because g++ ignores the attribute if the size depends on a template argument.
 template <int N> struct LanesTrait;
 template <> struct LanesTrait<8> {
   typedef double Lanes __attribute__((vector_size(64)));
@@ -40,7 +40,7 @@ template <int N> struct Vector {
 // One boolean for each of eight lanes.
 struct Mask {
 #if defined(__clang__)
-  typedef bool Flags __attribute__((ext_vector_type(8)));  // in a mask register if available
+  typedef bool Flags __attribute__((ext_vector_type(8)));  // kept in a mask register if there is one
   static INLINE Mask of(unsigned bits) { return {__builtin_bit_cast(Flags, uint8_t(bits))}; }
   INLINE unsigned bits() const { return __builtin_bit_cast(uint8_t, flags); }
 #else
@@ -83,7 +83,7 @@ INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
 
 INLINE Vector<8> magnitude(Vector<8> x) { return select(x < 0.0, -x, x); }
 
-// a b + c, rounded once if the processor can: on all except the x86-64 baseline, whose digits differ.
+// a b + c, rounded once. The x86-64 baseline has no such instruction, so its last digits differ.
 INLINE Vector<8> fused(Vector<8> a, Vector<8> b, Vector<8> c) {
 #if !defined(__FMA__) && !defined(__aarch64__)
   return a * b + c;
@@ -113,7 +113,7 @@ template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
 #endif
 }
 
-// The eight lanes from one before `to`, which follows `from`; and those from one after `from`.
+// Eight successive lanes of `from` followed by `to`: from the last of `from` on; below, from its second on.
 INLINE Vector<8> lanes_before(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 7, 8, 9, 10, 11, 12, 13, 14));
 }

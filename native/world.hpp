@@ -6,7 +6,7 @@
 
 namespace vibench {
 
-// Output volts of the steps from `begin` to before `stop`.
+// Computes the output voltage of a sensor for the steps `begin` to `stop` - 1.
 inline void show(const Sensor &sensor, int64_t begin, int64_t stop) {
   double *volts = sensor.volts.at, most = sensor.full_scale_voltage, scale = most / sensor.full_scale;
   run_filter(sensor.filter, sensor.motion.at + begin, volts + begin, stop - begin);
@@ -22,7 +22,7 @@ inline int64_t show(const Sensor &sensor) {
   return 0;
 }
 
-// Plays from `begin` up to the controller's next sample: adds its delayed volts to the drive. Returns `stop`.
+// Adds the controller's delayed volts to the drive, from `begin` to its next sample; returns `stop`.
 inline int64_t play_loop(LoopCables &loop) {
   int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
   double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
@@ -40,8 +40,8 @@ inline int64_t play_loop(LoopCables &loop) {
   return loop.stop;
 }
 
-// Passes the sensor volts of the played steps to the controller; the next steps follow. Returns 1 when the
-// controller needs attention before its next sample.
+// Adds the sensor volts of the played steps to the controller's sums, and makes the next steps current.
+// Returns 1 if the host must act before the controller's next sample.
 inline int64_t hear_loop(LoopCables &loop) {
   if (loop.stop < loop.begin || loop.stop > loop.drive.size) return REFUSED;
   show(loop.base, loop.begin, loop.stop);
@@ -57,7 +57,7 @@ inline int64_t hear_loop(LoopCables &loop) {
 
 enum class LoopEnd : int64_t { COMPLETE, NEEDS_ATTENTION, MOTION_LOST };
 
-// From sample to sample until the stretch ends, the motion fails, or the controller needs attention.
+// Advances sample by sample until the steps end, the motion fails, or the host must act.
 inline int64_t close_loop(LoopCables &loop) {
   return with_shaker(*loop.shaker, [&](const auto &move) {
     while (loop.begin < loop.drive.size) {
