@@ -1,10 +1,10 @@
 """The simulated laboratory: function generator, USB cable, DAQ service, and the analogue world between them.
 
-Unmodified pyvisa finds an AFG1022, unmodified nidaqmx a converter behind a gRPC port; the samples it
-reads are what the generator's output does to amplifier, shaker, specimen, vibrometer and converter, in
-rig time. Faults happen on demand or by a script (docs/campaigns.md). It takes the configuration, errors and
-disk troubles from `vibench.acquisition`, physics from `vibench.sim`; it knows no driver, plan or run, and
-only a bench and ``vibench serve-rig`` switch it on. Levels and time: docs/decisions/0006-virtual-rig.md.
+Unmodified pyvisa finds an AFG1022, and unmodified nidaqmx finds a converter behind a gRPC port. The samples
+are simulated in rig time, from the generator's output through amplifier, shaker, specimen, vibrometer and
+converter. Faults occur on demand or by a script (docs/campaigns.md). Configuration, errors and disk faults
+come from `vibench.acquisition`, physics from `vibench.sim`; no driver, plan or run is imported. Only a bench
+and ``vibench serve-rig`` start the rig. Levels and time: docs/decisions/0006-virtual-rig.md.
 
 ::
 

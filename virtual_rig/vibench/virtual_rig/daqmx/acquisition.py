@@ -43,7 +43,7 @@ class Timing:
     """Samples to acquire; for a continuous task, the smallest buffer size."""
     clock_source: str = ""
     trigger_source: str = ""
-    """Empty: the task begins at its start."""
+    """Empty: no trigger; sampling begins when the task is started."""
     reference: ReferenceTrigger | None = None
 
     @property
@@ -64,7 +64,7 @@ class Timing:
 
 
 class Overflow(Enum):
-    """What happens to samples when the buffer is full."""
+    """Handling of new samples when the buffer is full."""
 
     GROW = auto()
     LOSE = auto()
@@ -168,12 +168,12 @@ class Acquisition:
 
     @property
     def awaits_trigger(self) -> bool:
-        """Whether only the newest samples are stored until the reference trigger."""
+        """Whether the reference trigger has not come yet; until then only the newest samples are kept."""
         return self._reference is not None and self._is_open and self.total == math.inf
 
     @property
     def enough_before_s(self) -> float:
-        """Rig time from which the reference trigger is accepted; infinite when that has passed [s]."""
+        """Rig time from which the reference trigger is accepted; infinite if it is accepted already [s]."""
         assert self._reference is not None
         kept = self._reference.pretrigger
         return self.began_s + kept / self.rate_hz if self.acquired < kept else math.inf

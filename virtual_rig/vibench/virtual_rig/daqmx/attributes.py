@@ -33,7 +33,7 @@ from .rig import QUESTION_S
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
-"""Major, minor, update. From 24.5 on the client queries the number of samples for "all"."""
+"""Major, minor and update number. From 24.5 on, nidaqmx asks the driver how many samples "all" means."""
 _IDLE = {Idle.ZERO: AOIdleOutputBehavior.ZERO_VOLTS, Idle.HOLD: AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE}
 
 
@@ -196,7 +196,7 @@ READ: Attributes = {
     "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
     "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
-    "0x31E8": Attribute(default_samples),  # unnamed in the protocol: number of samples for "all"
+    "0x31E8": Attribute(default_samples),  # has no name in the protocol: how many samples "all" means
     "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }
@@ -261,7 +261,7 @@ GROUPS = {
         "Channel", _channels, lambda channel: OUTPUT if isinstance(channel, OutputChannel) else INPUT
     ),
 }
-"""The groups by the names of their calls in the protocol."""
+"""Groups, keyed by their part of the call names in the protocol."""
 SET_AT_REST = ("Timing", "Trig", "Buffer", "Chan")
 """Groups that cannot be set while the task runs."""
 

@@ -36,7 +36,7 @@ from .tasks import Task
 
 
 class DaqmxSystem:
-    """State of the driver; used with the rig's lock held."""
+    """State of the driver; callers hold the rig's lock."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -123,7 +123,7 @@ def _with_devices(names: Iterable[str]) -> Iterable[str]:
 Fields = Mapping[str, object]
 """The fields of a response; status 0 is omitted."""
 Call = Callable[[DaqmxSystem, Any], Fields]
-"""Takes system and request; returns the fields of the response."""
+"""Function of system and request that returns the fields of the response."""
 
 NOTHING: Fields = {}
 
@@ -278,21 +278,21 @@ CALLS: Mapping[str, Call] = {
     "UnregisterEveryNSamplesEvent": _does(task_of),
     "GetErrorString": lambda _, request: {"error_string": sentence(request.error_code)},
 }
-"""The calls by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
+"""Calls, keyed by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
 # fmt: on
 
 
 Listener = Iterator[Any]
 Stream = Acquisition | Generation
 _BY_OTHERS = math.inf
-"""Rig time of an event that depends on other calls."""
+"""Rig time of an event that only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    A listener waits for rig time like a reader. On demand, the listener advances time, and continues when the
-    announced samples have been read.
+    A listener waits for rig time like a reader. With time on demand it advances time, and continues
+    when the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
@@ -312,7 +312,7 @@ def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerCon
 
 
 def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.ServicerContext) -> Listener:
-    """Run in a separate thread, holding the rig's lock only while checking."""
+    """Yield the responses, in a separate thread that holds the rig's lock only while it checks."""
     subscription = _Subscription(system, task, context)
     while stream := subscription.await_run():
         count = response.n_samples
@@ -344,16 +344,16 @@ class _Subscription:
         self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, math.inf)
 
     def await_run(self) -> Stream | None:
-        """Wait for the next run; None when the client or the task is gone."""
+        """Wait for the next run; return None if the client or the task is gone."""
         with self._rig.changed:
             self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._followed))
             self._followed = None if self._has_gone else self._task.stream
             return self._followed
 
     def await_count(self, stream: Stream, count: int, announced: int) -> bool:
-        """Wait until ``count`` samples have passed; False when this run ends before.
+        """Wait until ``count`` samples are transferred; return False if the run ends first.
 
-        A buffer without loss also waits until the announced samples have been read.
+        If the buffer never loses samples, first wait until the announced samples have been read.
         """
         with self._rig.changed:
             if self._rig.pace.overflow is Overflow.GROW:
@@ -368,4 +368,4 @@ class _Subscription:
 
 
 EVENTS = {"RegisterEveryNSamplesEvent": every_n_samples}
-"""The calls with a stream of responses, by their names in the protocol."""
+"""Calls with a stream of responses, keyed by their names in the protocol."""

@@ -143,9 +143,9 @@ def _expand_one(part: str) -> Iterable[str]:
 
 
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of virtual channels: the physical names or the given one, numbered for several.
+    """Return the names of virtual channels: the physical names if none is given, else the given ones.
 
-    A list or range with one name per channel is used unchanged.
+    ``given`` is a list or range with one name per channel, or one name to which numbers are added.
     """
     if not given:
         return physical

@@ -73,7 +73,7 @@ def _is_used_up(task: Task) -> bool:
 
 
 def default_samples(task: Task) -> int:
-    """Return the number of samples for "all": all of a finite task, the unread ones of a continuous task."""
+    """Return how many samples "all" means: all of a finite task, the unread ones of a continuous task."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -82,7 +82,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Return the number of unread samples per channel; on demand, time advances if there are none."""
+    """Return the number of unread samples per channel; if there are none, time on demand advances."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -97,7 +97,7 @@ def newest(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples; on demand, only repeated queries without a read advance time."""
+    """Return the number of unread samples; time on demand advances if none was read since the last query."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -334,7 +334,7 @@ def _read_what_fits(task: Task, request: Any) -> Reading:
 
 
 def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
-    """Return the values by channel or by scan; channel rows have the spacing of the caller's array."""
+    """Return the values by channel or by scan; rows of channels are spaced as in the caller's array."""
     if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
         return values.T
     channels, samples = values.shape
@@ -347,7 +347,7 @@ def _lay_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
 
 
 def _whole(reading: Reading) -> Reading:
-    """Return a complete reading, or raise its status for a caller that cannot use a part."""
+    """Return a complete reading; raise the status of an incomplete one, which the caller cannot use."""
     if reading.status:
         raise DaqmxRefusal(reading.status, samples_read=reading.samples)
     return reading

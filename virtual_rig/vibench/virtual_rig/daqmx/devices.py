@@ -31,7 +31,7 @@ class AnyRate:
     maximum_hz: float
 
     def next_up(self, rate_hz: float) -> float:
-        """Return the rate itself."""
+        """Return the rate unchanged, because any rate is possible."""
         return rate_hz
 
 
@@ -133,12 +133,12 @@ class Device:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """``"Dev1/ai0"`` and so on."""
+        """Names of the inputs, such as ``"Dev1/ai0"``."""
         return tuple(f"{self.name}/ai{n}" for n in range(self.inputs.count)) if self.inputs else ()
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """``"Dev1/ao0"`` and so on."""
+        """Names of the outputs, such as ``"Dev1/ao0"``."""
         return tuple(f"{self.name}/ao{n}" for n in range(self.outputs.count)) if self.outputs else ()
 
     @property

@@ -53,7 +53,7 @@ def unsupported_value(property_name: str, requested: object, allowed: str) -> Da
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """A rule that makes calls with a name fail with a code."""
+    """A rule by which all calls of one name fail with a code."""
 
     rpc: str
     """Name of the call, such as ``"ReadAnalogF64"``."""
@@ -87,7 +87,7 @@ class Faults:
         self._rules = tuple(other for other in self._rules if other is not rule)
 
     def take_restart(self) -> bool:
-        """Return once whether the server has restarted, without its tasks."""
+        """Return whether the server has restarted since the last call, and so has lost its tasks."""
         is_due, self._restart_is_due = self._restart_is_due, False
         return is_due
 

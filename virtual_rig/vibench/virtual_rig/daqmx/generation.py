@@ -12,7 +12,7 @@ from .devices import AnalogOutputs, Idle
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
+"""Time by which samples are passed to the world in advance [s]: avoids gaps, yet plays new data soon."""
 
 _ROUNDING_SAMPLES = 1e-5
 
@@ -21,7 +21,7 @@ class OutputBuffer:
     """Samples written by a program and not yet used by the device, shape (channels, size) [V]."""
 
     def __init__(self, channels: int, size: int = 0) -> None:
-        """``size`` 0 adapts to the samples written before the start."""
+        """Create a buffer; with ``size`` 0 it grows with the samples written before the start."""
         self.is_sized = size > 0
         self.written = 0
         self._ring = np.zeros((channels, size))
@@ -118,7 +118,7 @@ class Generation:
 
     @property
     def used(self) -> float:
-        """Infinite, because a listener waits for no reader."""
+        """Infinity, because a listener to a generation does not wait for any reader."""
         return math.inf
 
     def listener_due_s(self, count: int) -> float:  # noqa: ARG002 - see below
@@ -126,7 +126,7 @@ class Generation:
         return math.inf
 
     def prepare(self, until_s: float) -> None:
-        """Pass on the samples up to rig time ``until_s``, plus a lead."""
+        """Pass the samples up to rig time ``until_s``, plus a lead, to the world."""
         if not self._is_open:
             return
         wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)
@@ -165,7 +165,7 @@ class Generation:
             self._rest()
 
     def close(self) -> None:
-        """End the generation now and clear the queue."""
+        """End the generation now, and discard the samples not yet played."""
         if self._is_open:
             self._rest()
 

@@ -22,7 +22,7 @@ QUESTION_S = 0.1
 Without it, a program that polls the number of samples would never end."""
 
 FAILED_CALL_S = 0.5
-"""Rig time before a failed call on demand is repeated, when nothing else advances time [s].
+"""Rig time added each time that a call fails again, with time on demand [s].
 
 Without it, a temporary fault would never end for a program that retries."""
 
@@ -108,7 +108,7 @@ class Rig:
         self.changed.notify_all()
 
     def end(self, stream: Acquisition | Generation) -> None:
-        """Exclude an ended stream."""
+        """Close a stream, and exclude it from the advance of time."""
         stream.close()
         self._acquisitions = [other for other in self._acquisitions if other is not stream]
         self._generations = [other for other in self._generations if other is not stream]
@@ -137,7 +137,7 @@ class Rig:
         self._armed.setdefault(terminal.lower(), []).append(begin)
 
     def disarm(self, begin: Callable[[], None]) -> None:
-        """Remove a waiting function."""
+        """Cancel a function that waits for an edge."""
         self._armed = {
             terminal: [other for other in waiting if other != begin]
             for terminal, waiting in self._armed.items()
@@ -164,7 +164,7 @@ class OnDemandPace:
     overflow = Overflow.GROW
 
     def open(self, rig: "Rig") -> None:
-        """Do nothing, because time advances on request."""
+        """Do nothing, because time advances only on request."""
 
     def close(self) -> None:
         """Do nothing."""
@@ -183,7 +183,7 @@ class OnDemandPace:
         return _wait(rig, is_there, deadline_s)
 
     def pass_time(self, rig: "Rig", duration_s: float) -> None:
-        """Advance by a time, for a call that would otherwise be repeated without an end."""
+        """Advance by ``duration_s``, so that a program that polls does not wait for ever."""
         rig.advance_to(rig.now_s + duration_s)
 
 

@@ -33,7 +33,7 @@ def token_for(address: str) -> str | None:
 
 
 class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Rejects calls without the token."""
+    """Interceptor that rejects calls without the token."""
 
     def __init__(self, token: str) -> None:
         self._token = token
@@ -74,7 +74,7 @@ Metadata = tuple[tuple[str, str], ...]
 
 
 class DaqServer:
-    """Serves the simulated DAQmx system; leaving it deletes every task and ends every thread.
+    """Server of the simulated DAQmx system; leaving it deletes every task and ends every thread.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class DaqServer:
         _require_address(address)
         self.faults = Faults()
         self._refused: set[str] = set()
-        """Calls that failed at their last attempt."""
+        """Names of calls whose last attempt failed."""
         self._pace = pace or OnDemandPace()
         self._rig = Rig(world, self._pace, catalogue or Catalogue())
         self._system = DaqmxSystem(self._rig)

@@ -72,7 +72,7 @@ class TdmsLog:
 _BREATH_S = 1e-4
 _OWN_CLOCKS = ("", "onboardclock")
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
-"""Highest rate and samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
+"""Buffer size in samples per channel, up to each rate (NI-DAQmx Help, "How is buffer size determined?")."""
 
 
 class TaskState(IntEnum):
@@ -121,13 +121,13 @@ class Task:
 
     @property
     def side(self) -> AnalogInputs | AnalogOutputs:
-        """Capabilities of the device on the side of this task."""
+        """Capabilities of the device's inputs or outputs, whichever the task uses."""
         self.require_channels()
         return self.inputs[0].inputs if self.inputs else self.outputs[0].outputs
 
     @property
     def stream(self) -> Acquisition | Generation | None:
-        """The running stream after its trigger."""
+        """The running acquisition or generation; None before its trigger."""
         return self.acquisition or self.generation
 
     @property
@@ -170,7 +170,7 @@ class Task:
 
     @property
     def is_on_chassis(self) -> bool:
-        """Whether the timing engine is chosen at reservation."""
+        """Whether the task uses a chassis, which assigns a timing engine only at reservation."""
         return any(device.chassis for device in self.devices)
 
     @property
@@ -189,7 +189,7 @@ class Task:
 
     @property
     def _awaited_terminal(self) -> str:
-        """Terminal whose edge starts the task; empty: its own start.
+        """Terminal whose edge starts the task; empty if it begins without a trigger.
 
         The sample clock of another task starts with that task, so it is treated like its start trigger.
         """
@@ -242,7 +242,7 @@ class Task:
     # --- states --------------------------------------------------------------------------
 
     def control(self, action: TaskMode) -> None:
-        """Change to the state of an action."""
+        """Carry out an action that changes the state."""
         match action:
             case TaskMode.TASK_START:
                 self.start()
@@ -303,7 +303,7 @@ class Task:
         if self._awaited_terminal:
             self.rig.arm(self._awaited_terminal, self._begin)
             return
-        # Without a task, the rig is updated rarely. Not in _begin: tasks of one trigger start at one time.
+        # Bring rig time up to date, but not in _begin: tasks with a common trigger must start together.
         self.rig.pace.pass_time(self.rig, 0.0)
         try:
             self._begin()
@@ -347,7 +347,7 @@ class Task:
             self._await_reference_edge()
 
     def await_reference(self, deadline_s: float) -> bool:
-        """Wait for a reference trigger until a wall-clock time; return whether it is settled."""
+        """Wait for a reference trigger up to the deadline; return whether none is awaited any more."""
         acquisition = self.acquisition
         if acquisition is None:
             return True

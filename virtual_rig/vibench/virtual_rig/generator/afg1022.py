@@ -104,8 +104,7 @@ class AFG1022(ScpiInstrument):
         -------
         NDArray
             Shape (count,) [V], with the load of ``Terminal``. Commands act at the rig time of their arrival,
-            or at the
-            end of the part already rendered if that is later.
+            or at the end of the part already rendered if that is later.
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)
@@ -126,7 +125,7 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Lock or unlock the other channel's frequency to this one's."""
+        """Make the other channel follow this channel's frequency, or stop following it."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)
@@ -226,7 +225,7 @@ def _shape_name(parameter: bytes) -> str:
 
 
 def _write_shape(generator: AFG1022, channel: int, parameters: Parameters) -> None:
-    """Select a shape, and lower the frequency to its limit."""
+    """Select a shape, and lower the frequency to the limit of this shape if necessary."""
     settings, name = generator.settings(channel), _shape_name(only(parameters))
     frequency_hz = min(settings.frequency_hz, highest_frequency_hz(name))
     generator.configure(channel, replace(settings, shape=name, frequency_hz=frequency_hz))

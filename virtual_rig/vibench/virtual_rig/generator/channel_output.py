@@ -55,7 +55,7 @@ class RunMode(StrEnum):
 
 
 MODULATIONS = tuple(RunMode)[3:]
-"""May be left on at the panel, and can be switched off remotely; their effect is not simulated."""
+"""Modulations may be on from the panel, and SCPI can switch them off; their effect is not simulated."""
 
 
 SINE, SQUARE, RAMP, PULSE, NOISE, DC = "SIN", "SQU", "RAMP", "PULS", "PRN", "DC"
@@ -78,14 +78,14 @@ def standard_shape(word: str) -> str | None:
 
 
 class BurstMode(Enum):
-    """Start of a burst; the gate input is open."""
+    """How a burst is started; nothing is connected to the gate input."""
 
     TRIGGERED = "TRIGgered"
     GATED = "GATed"
 
 
 class Trigger(Enum):
-    """Start of a sweep, for generators with a choice."""
+    """How a sweep is started, for generators that offer a choice."""
 
     IMMEDIATE = "IMMediate"
     BUS = "BUS"
@@ -101,9 +101,9 @@ class ChannelSettings:
     shape: str = SINE
     frequency_hz: float = 1e6
     amplitude_vpp: float = 2.0
-    """Open circuit: 1 Vpp into 50 ohm."""
+    """Amplitude in open circuit; this is 1 Vpp into 50 ohm."""
     offset_v: float = 0.0
-    """Open circuit."""
+    """Offset in open circuit [V]."""
     phase_deg: int = 0
     duty_percent: float = 50.0
     mode: RunMode = RunMode.CONTINUOUS
@@ -131,7 +131,7 @@ class ChannelSettings:
     def checked(self) -> "ChannelSettings":
         """Return the settings if they are consistent.
 
-        Raises ScpiError -221 for a peak beyond the output stage, and for noise in another mode.
+        Raises ScpiError -221 for a peak beyond the output stage, and for noise that is not continuous.
         """
         is_moded_noise = self.mode is not RunMode.CONTINUOUS and self.shape == NOISE
         peak_v = abs(self.offset_v) + self.amplitude_vpp / 2
@@ -166,7 +166,7 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 
 
 class ChannelOutput:
-    """Plays the settings, each from the rig time of its change."""
+    """Output that plays the settings; a change acts at its rig time."""
 
     def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False
@@ -185,8 +185,8 @@ class ChannelOutput:
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
         """Apply new settings at a rig time.
 
-        The phase is continuous unless the start phase was changed. Noise is accepted, and the shape before it
-        continues; the built-in DC shape stays at zero for any offset (AFG1062, drivers).
+        The phase is continuous unless the start phase was changed. If noise is selected, the previous shape
+        continues. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
         at_s, own_s = self._when(now_s)
         latest = self._timeline.latest
@@ -205,7 +205,7 @@ class ChannelOutput:
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
         """Start a waiting burst or sweep; without one, or during a burst, do nothing.
 
-        A gated burst needs the gate input, which is open.
+        A gated burst never starts, because nothing is connected to the gate input.
         """
         at_s, own_s = self._when(now_s)
         latest = self._timeline.latest
@@ -242,7 +242,7 @@ class ChannelOutput:
         return self._course(settings, (running.phase(own_s) + turn) % 1.0, own_s)
 
     def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
-        """Return the phase course of the mode, with a given phase [cycles] at a time."""
+        """Return the phase course of the mode, with the phase ``phase`` [cycles] at ``own_s``."""
         if settings.mode is RunMode.SWEEP:
             return self._swept(settings, phase, own_s, math.inf)
         return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)

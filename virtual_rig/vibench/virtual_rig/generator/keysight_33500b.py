@@ -27,7 +27,7 @@ from .phase_course import Spacing
 from .scpi_instrument import Command, Parameters, Quirks, choice, none, number, only, switch
 
 TOP_CODE = 65_534
-"""Codes -32767 to 32767, with an offset to start at zero."""
+"""Codes -32767 to 32767, shifted to start at zero."""
 _MIDDLE = 32_767
 POINTS = (8, 1_048_576)
 HIGHEST_RATE_HZ = 250e6
@@ -72,7 +72,7 @@ class _Settings(ChannelSettings):
 
 
 class Keysight33500B(AFG1022):
-    """The generator; see `AFG1022`. Its waveforms have names, its sweeps a time, a hold and a trigger."""
+    """The generator; see `AFG1022`. Waveforms have names; sweeps have a duration, hold time and trigger."""
 
     maker, model, firmware = "Agilent Technologies", "33522B", "4.00-1.19-2.00-52-00"
 
@@ -149,7 +149,7 @@ def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
 
 
 def _attribute(node: str, of: Callable[[scpi.Codes], float]) -> Command:
-    """Return the query of a number of a stored waveform."""
+    """Return the query for a number that describes a stored waveform."""
 
     def ask(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
         return scpi.as_number(of(own.waveforms[_stored(own, parameters)]))

@@ -24,7 +24,7 @@ NO_TIMES: Samples = np.empty(0)
 
 @dataclass(frozen=True)
 class SteadyPhase:
-    """A constant frequency."""
+    """Phase at a constant frequency."""
 
     frequency_uhz: int
     offset: float
@@ -47,11 +47,11 @@ class SteadyPhase:
         return _fraction(self.offset + exact * MICROHERTZ + within)
 
     def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start and span between consecutive edges."""
+        """Return the phase at the start of each interval between edges, and its increase [cycles]."""
         return self._fractions(edges_s[:-1]), self.frequency_uhz * MICROHERTZ * np.diff(edges_s)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
-        """Return none: the phase is straight."""
+        """Return no times, because the phase is linear in time."""
         return NO_TIMES
 
 
@@ -64,7 +64,7 @@ class Spacing(Enum):
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """One triggered sweep: start frequency before it, then stop frequency for a time, then start again."""
+    """One triggered sweep: start frequency before it, then a hold at the stop frequency, then start again."""
 
     start_hz: float
     stop_hz: float
@@ -102,12 +102,12 @@ class SweptPhase:
         return np.asarray(self.start_hz * np.expm1(growth * time_s) / growth)
 
     def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start and span between consecutive edges."""
+        """Return the phase at the start of each interval between edges, and its increase [cycles]."""
         cycles = self._cycles(edges_s)
         return _fraction(cycles[:-1]), np.diff(cycles)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return start, end and return of the sweep, and points between them as required by the curvature."""
+        """Return start, end and return of the sweep, and times between them where the phase is curved."""
         end_of_sweep_s = self.begin_s + self.sweep_s
         corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
         corners = corners[(corners > begin_s) & (corners < end_s)]

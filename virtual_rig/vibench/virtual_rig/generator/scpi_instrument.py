@@ -1,4 +1,4 @@
-"""An instrument with a table of SCPI commands: messages in, replies out, errors in its queue."""
+"""An instrument with a table of SCPI commands: executes messages, returns replies, and queues errors."""
 
 import math
 import socketserver
@@ -49,7 +49,7 @@ def number(
 ) -> Command:
     """Return the command of a numeric ``field``, in ``units``, rounded to ``decimals``.
 
-    ``scale`` is the displayed value over the field's. ``INFINITE`` sets ``largest``, if given.
+    ``scale`` is the ratio of displayed value to field. ``INFINITE`` selects ``largest``, if given.
     """
 
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
@@ -179,7 +179,7 @@ class Quirks:
     out_of_range_becomes_default: bool = True
     """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
     panel_load_ohm: float | None = None
-    """Load that only the front panel can set, without ``OUTP:IMP`` (one driver's report); None: remote."""
+    """Load set at the front panel if there is no ``OUTP:IMP`` (one driver's report); None if there is."""
 
 
 @dataclass(frozen=True)
@@ -191,14 +191,13 @@ class Reply:
 
 
 class ScpiInstrument:
-    """Executes messages one after another; calls are thread-safe.
+    """An instrument that executes messages one after another; calls are thread-safe.
 
     Parameters
     ----------
     clock
-        Rig time of a command's arrival [s]. It is called outside the instrument's lock, and may take a lock
-        that is
-        held while the output is rendered.
+        Returns the rig time of a command's arrival [s]. It is called outside the instrument's lock, as it may
+        take a lock that is held while the output is rendered.
     identity
         Reply to ``*IDN?``.
     commands
@@ -237,12 +236,12 @@ class ScpiInstrument:
             return Reply(data, delay_s)
 
     def report(self, code: scpi.ErrorCode) -> None:
-        """Queue an error of the interface: an unread reply, or a read without a query."""
+        """Queue an error of the interface, such as an unread reply or a read without a query."""
         with self.lock:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; beyond the host's timeout, the following read receives it."""
+        """Delay the next reply; if the host's read times out, its following read receives this reply."""
         with self.lock:
             self._next_delay_s = delay_s
 
@@ -252,7 +251,7 @@ class ScpiInstrument:
             self._next_is_corrupted = True
 
     def identity(self) -> bytes:
-        """Return the identity; empty at the first query after ``*CLS`` with that quirk."""
+        """Return the identity; with the quirk, it is empty at the first query after ``*CLS``."""
         is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
         return b"" if is_empty else self._identity.encode("ascii")
 
@@ -265,7 +264,7 @@ class ScpiInstrument:
         """Restore the defaults."""
 
     def trigger(self) -> None:
-        """Trigger what waits for the bus."""
+        """Start whatever waits for a bus trigger."""
 
     def _answers(self, message: bytes) -> list[bytes]:
         """Execute all units of a message in order and return the replies."""
@@ -287,7 +286,7 @@ class ScpiInstrument:
                 self.status.report(error.code)
                 continue
             room -= sum(map(len, found))
-            if found and room < 0:  # no reader takes them meanwhile (IEEE 488.2, 6.3.1.7)
+            if found and room < 0:  # nobody can read replies before the message ends (IEEE 488.2, 6.3.1.7)
                 answers.clear()
                 self.status.report(scpi.ErrorCode.QUERY_DEADLOCKED)
         return answers
@@ -344,8 +343,8 @@ COMMON_COMMANDS = (
 )
 
 
-# The generator on a raw TCP socket, for programs without Python: lines in, lines out. The real AFG1022 has no
-# network port. Open it with ``TCPIP0::127.0.0.1::<port>::SOCKET`` and newline as termination character.
+# The generator on a raw TCP socket, for programs without Python: one line per message and reply. The real
+# AFG1022 has no network port. Open ``TCPIP0::127.0.0.1::<port>::SOCKET``; messages end with a newline.
 
 LOOPBACK = "127.0.0.1"
 _RECEIVE_BYTES = 65536
@@ -416,9 +415,7 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
         def handle(self) -> None:
             """Serve until the client disconnects or exceeds the message length."""
             pending = b""
-            while (
-                len(pending) < scpi.LONGEST_MESSAGE
-            ):  # a client that sends no end of message is disconnected
+            while len(pending) < scpi.LONGEST_MESSAGE:  # disconnect a client that never ends its message
                 try:
                     received = self.request.recv(_RECEIVE_BYTES)
                 except ConnectionError:

@@ -40,14 +40,14 @@ class ErrorCode(IntEnum):
 
     @property
     def text(self) -> str:
-        """Text of SYST:ERR? for the number."""
+        """Text that SYST:ERR? returns with the number."""
         words = self.name.replace("_", " ").capitalize()
         kind, _, problem = words.partition(" ")
         return f"{kind} {problem.upper()}" if kind == "Query" else words
 
 
 class ScpiError(Exception):
-    """A refused command, with the number for the error queue."""
+    """Refusal of a command, with the number for the error queue."""
 
     def __init__(self, code: ErrorCode) -> None:
         super().__init__(f'{int(code)},"{code.text}"')
@@ -58,7 +58,7 @@ BYTE = 255
 
 
 _OPERATION_COMPLETE, _POWER_ON = 1, 128
-"""Bits of the standard event status register (IEEE 488.2-1992, 11.5.1); that of an error is in `Status`."""
+"""Bits of the standard event status register (IEEE 488.2-1992, 11.5.1); `Status` has the error bits."""
 
 
 class Status:
@@ -102,7 +102,7 @@ _NODE = re.compile(r"(?P<short>\*?[A-Z]+)(?P<rest>[a-z]*)(?P<suffix>#?)")
 def header_pattern(header: str) -> re.Pattern[str]:
     """Return the pattern of a header in the notation of manuals; its group ``suffix`` is the number.
 
-    Capitals are the short form, brackets optional, # a number that may be missing.
+    Capitals are the short form, brackets enclose optional parts, and # is an optional number.
     ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on.
     """
     expression = header.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
@@ -121,7 +121,7 @@ def mnemonic_matches(word: str, mnemonic: str) -> bool:
 
 
 def short_form(mnemonic: str) -> str:
-    """Return the capitals of a mnemonic, which are the instrument's reply."""
+    """Return the capitals of a mnemonic, with which the instrument replies."""
     return "".join(letter for letter in mnemonic if not letter.islower())
 
 
@@ -146,14 +146,13 @@ class Unit:
     parameters: tuple[bytes, ...]
     """Raw parameters without surrounding white space; a block keeps its ``#`` header."""
     starts_line: bool
-    """Whether the unit starts a line, so that its header is relative to the root."""
+    """Whether the unit is the first of its line, so that its header is relative to the root."""
 
 
 def block_length(data: bytes, start: int) -> int | None:
     """Return the length of a block that begins at ``start``, or None while it is unknown.
 
-    ``#<d><n><n bytes>`` (IEEE 488.2-1992, 7.7.6). A ``#`` that begins no block of definite length has length
-    one.
+    A block is ``#<d><n><n bytes>`` (IEEE 488.2-1992, 7.7.6). Any other ``#`` counts as one byte.
     """
     if start + 1 >= len(data):
         return None
@@ -203,7 +202,7 @@ def message_end(data: bytes) -> int | None:
 
 
 def units(message: bytes) -> list[Unit]:
-    """Return the units of a complete message without empty ones."""
+    """Return the units of a complete message; empty units are omitted."""
     found: list[Unit] = []
     pieces: list[bytes] = []
     begin = 0
@@ -306,7 +305,7 @@ def _finite(value: float) -> float:
 
 
 def number_and_unit(parameter: bytes) -> tuple[float, str]:
-    """Return 31.0 and ``"DEG"`` for ``31 deg``."""
+    """Return number and unit of a parameter: 31.0 and ``"DEG"`` for ``31 deg``."""
     found = _NUMBER.fullmatch(text(parameter))
     if found is None:
         raise ScpiError(ErrorCode.DATA_TYPE_ERROR)
@@ -363,7 +362,7 @@ USER_MEMORIES = 256
 EDIT_MEMORY = "EMEM"
 _MIDDLE_CODE = 8191
 _POWER_ON_POINTS = 1000
-"""Length of the edit memory after power-on (assumed, as in the AFG3000 series)."""
+"""Number of points of the edit memory after power-on (assumed, as in the AFG3000 series)."""
 
 
 class ArbitraryMemory:
@@ -382,7 +381,7 @@ class ArbitraryMemory:
             raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE) from None
 
     def define(self, points: int) -> None:
-        """Set the edit memory to ``points`` zeros."""
+        """Set the edit memory to ``points`` points at zero volts."""
         self._store(EDIT_MEMORY, _blank(self._checked_length(points)))
 
     def load(self, name: str, data: bytes) -> None:
@@ -406,7 +405,7 @@ class ArbitraryMemory:
         return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
 
     def hold(self, codes: Codes) -> None:
-        """Store codes of any generator in the edit memory."""
+        """Store codes in the edit memory, whatever the range of the generator."""
         self._checked_length(len(codes))
         self._store(EDIT_MEMORY, codes)
 

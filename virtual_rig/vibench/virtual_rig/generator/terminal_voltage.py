@@ -51,7 +51,7 @@ class Rectangle:
     duty: float = 0.5
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean from the share of the range in the high part."""
+        """Return the mean, from the part of the range for which the output is high."""
         end = start + span
         cycles = np.floor(end)
         high = cycles * self.duty + np.minimum(end - cycles, self.duty) - np.minimum(start, self.duty)
@@ -104,7 +104,7 @@ class Table:
         object.__setattr__(self, "_sums", sums)
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean of the staircase, a piecewise linear function of both ends."""
+        """Return the mean of the staircase between two phases."""
         points = len(self.codes)
         begin = start * points
         end = begin + span * points
@@ -129,7 +129,7 @@ NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Noise samples per draw; each block has its own seed."""
 _CONTINUES = 1e-3
-"""A block continues the previous one if its start is this close to the end (in intervals)."""
+"""Largest distance of a block's start from the end of the block that it continues, in intervals."""
 
 
 class Relay(Enum):
@@ -141,7 +141,7 @@ class Relay(Enum):
 
 @dataclass(frozen=True)
 class Burst:
-    """Duration of a burst; outside, the output stays at the level of the start phase."""
+    """Start and end of a burst; outside it, the output stays at the level of the start phase."""
 
     begin_s: float
     end_s: float
@@ -161,7 +161,7 @@ class Signal:
     burst: Burst | None = None
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return every time within (begin, end) at which the signal must be cut."""
+        """Return the times within (begin, end) at which an interval must be divided to compute its mean."""
         times = self.course.breakpoints(begin_s, end_s, interval_s)
         if self.burst is None:
             return times
@@ -191,7 +191,7 @@ class Terminal:
     """One-sided density of the output's own noise (assumed; the data sheet gives none)."""
     seed: int = 0
     clock_offset_s: float = 0.0
-    """Total shift of its clock since switch-on [s]."""
+    """Total shift of the generator's clock since switch-on [s]."""
 
     @property
     def divider(self) -> float:
@@ -228,7 +228,7 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> float:
-        """Return when a command acts that arrives at a rig time: never within the part already rendered."""
+        """Return when a command acts that arrives at ``time_s``: not before the end of the rendered part."""
         return max(time_s, self._end_s, self._since_s[-1])
 
     def own_time(self, time_s: float) -> float:
@@ -305,7 +305,7 @@ class Timeline:
 
 
 def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samples:
-    """Return the interval means of a signal that must be cut within intervals."""
+    """Return the interval means of a signal whose intervals must be divided."""
     times = np.unique(np.concatenate((edges_s, cuts_s)))
     durations = np.diff(times)
     interval = np.searchsorted(edges_s, times[:-1], side="right") - 1
@@ -317,6 +317,6 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     # Coinciding edges give empty intervals without weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # Keep the mean of an uncut interval to the last bit, independent of cuts in others.
+    # The mean of an undivided interval must not depend on divisions of others, not even in the last bit.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

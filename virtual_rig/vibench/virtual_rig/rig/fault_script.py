@@ -29,7 +29,7 @@ from ..world.world import World
 DROPOUT_LEVEL = 0.0
 OVER_RANGE_LEVEL = 1.0
 Heal = Callable[[], None]
-"""Ends one fault."""
+"""Function that ends one fault."""
 # Calls at which a program first accesses the device: creating a task's channels, and starting it.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
@@ -40,9 +40,9 @@ def nothing_to_heal() -> None:
 
 
 class RigFaults:
-    """Faults of a running virtual rig: each method starts one at once and returns what ends it. Thread-safe.
+    """Faults of a running virtual rig: each method starts a fault and returns a function to end it.
 
-    The methods have the names and parameters of scripted faults.
+    The methods have the names and parameters of scripted faults. Thread-safe.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class RigFaults:
         self._heals: list[Heal] = []
 
     def heal(self) -> None:
-        """End every fault."""
+        """End every fault that has not ended."""
         while self._heals:
             self._heals.pop()()
 
@@ -90,7 +90,7 @@ class RigFaults:
         return nothing_to_heal
 
     def stick_output(self) -> Heal:
-        """Weld the generator's output relay: it reports off and stays on."""
+        """Weld the generator's output relay: the output stays on although the generator reports off."""
         self._generator.weld_output_relay()
         return self._until(self._generator.repair_output_relay)
 
@@ -105,7 +105,7 @@ class RigFaults:
         return self._until(lambda: self._world.widen_gaps(0.0))
 
     def drop_laser(self, for_s: float) -> Heal:
-        """Let the sensor of m0 show nothing for a while, like a vibrometer without light."""
+        """Set the output of the m0 sensor to zero for a while, like a vibrometer without light."""
         self._world.disturb_response(for_s, DROPOUT_LEVEL)
         return nothing_to_heal
 
@@ -137,7 +137,7 @@ class RigFaults:
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
-        A fault of one call that reads samples also applies to the other, because drivers may use either.
+        A fault of one call that reads samples applies to all of them, because a driver may use any.
         """
         calls = _READS if call in _READS else (call,)
         return self._in_force(*(Fault(each, code) for each in calls))
@@ -147,7 +147,7 @@ class RigFaults:
         return self._in_force(ServerGone())
 
     def fill_disk(self, refusals: int | None = None) -> Heal:
-        """Let writes of recordings of this process fail as on a full disk: this many, or until healed."""
+        """Make recording writes of this process fail as on a full disk: this many, or until healed."""
         return self._until(self._disk.fill() if refusals is None else self._disk.fill(refusals))
 
     def slow_disk(self, delay_s: float) -> Heal:
@@ -306,7 +306,7 @@ class PlayedFault:
 
 @dataclass
 class FaultPlay:
-    """Plays a script on a rig: each fault at its rig time."""
+    """Player of a script, which starts each fault at its rig time."""
 
     world: World
     rig: RigFaults

@@ -1,4 +1,4 @@
-"""The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
+"""The complete virtual rig: a generator on the USB bus, a DAQ server, and the analogue world between them."""
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -27,7 +27,7 @@ from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, RigF
 
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
-"""Rig time of every disk failure except the first, so that a program that retries sees the disk recover."""
+"""Rig time added by each repeated disk failure [s], so that the fault can end while a program retries."""
 
 
 GENERATORS: Mapping[int, type[AFG1022]] = {0x0699: AFG1022, 0x0957: Keysight33500B}
@@ -38,9 +38,9 @@ class DiskFaults(Enum):
     """Handling of disk faults in a script."""
 
     PLAYED = auto()
-    """This process records, and its disk has the faults."""
+    """This process records; the faults act on its disk."""
     REFUSED = auto()
-    """Another process records, whose disk is not accessible."""
+    """Another process records; its disk cannot be given faults."""
 
 
 class VirtualRig:
@@ -58,8 +58,8 @@ class VirtualRig:
         ``"host:port"`` of the server; port 0 selects a free one. Loopback by default; otherwise every call
         needs `token`.
     quirks
-        Peculiarities of the generator's firmware; a load of 50 ohm that only its front panel can set doubles
-        the voltage at the amplifier.
+        Peculiarities of the generator's firmware. With a load of 50 ohm set at its front panel, the voltage
+        at the amplifier is twice the commanded one.
     scpi_port
         Port of `socket_resource`; 0 selects a free one.
     disk
@@ -83,7 +83,7 @@ class VirtualRig:
         self.token = token_for(address)
         """Token required from other computers; None on loopback."""
         self._pace = _pace(virtual)
-        # Generator and world refer to each other, so the clock is resolved at each call.
+        # Generator and world refer to each other, so the clock looks up ``world`` at each call.
         usb_ids, serial = _address(rig.generator.resource)
         self.generator = GENERATORS[usb_ids[0]](
             lambda: self.world.time_s,
@@ -135,7 +135,7 @@ class VirtualRig:
                 self._running_state.daq.let_pass(duration_s)
 
     def __enter__(self) -> Self:
-        """Switch everything on; after an error, everything is off."""
+        """Switch everything on; if a part fails, switch everything off again."""
         with ExitStack() as starting:
             plug_in(self._usb)
             starting.callback(unplug, self._usb)
@@ -193,7 +193,7 @@ class _Running:
 
 
 def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
-    """Return the simulated real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
+    """Return the simulated controller, a `ScpiDevice` with a `ClosedLoop` as ``cables``; None without one."""
     if rig.controller is None:
         return None
     simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")

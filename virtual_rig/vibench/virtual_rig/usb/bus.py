@@ -1,4 +1,4 @@
-"""A USB bus in memory: what is plugged in here is found by any program that uses pyvisa-py or PyUSB.
+"""A USB bus in memory, whose devices any program that uses pyvisa-py or PyUSB finds.
 
 For a generator in another process, one line before (or after) pyvisa opens its resource manager is enough::
 
@@ -6,7 +6,7 @@ For a generator in another process, one line before (or after) pyvisa opens its 
     usb_bus.plug_in_remote("127.0.0.1:31763")
 
 It needs no libusb. While this module's bus is installed, PyUSB sees it *instead of* the machine's own
-USB devices; only a fresh process sees those again.
+USB devices; only a new process sees the machine's devices again.
 """
 
 import errno
@@ -32,8 +32,8 @@ from vibench.acquisition.rig import TOKEN_KEY, given_token
 
 from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbTmcInstrument
 
-# A USB cable through the network: a device served over gRPC, and its proxy on a bus. Generic methods, bytes
-# in and bytes out; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
+# A USB cable through the network: a device served over gRPC, and its proxy on a bus. Methods take and return
+# bytes; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
 # so that a disconnected cable or a timeout looks the same on both ends.
 
 SERVICE = "vibench.virtual.UsbDevice"
@@ -99,7 +99,7 @@ def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext],
 
 
 class RemoteUsbDevice:
-    """A device in another process; raises InstrumentLost when none is served at the address."""
+    """A device in another process; raises InstrumentLost if no device is served at the address."""
 
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
@@ -269,8 +269,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         alt: int,  # noqa: ARG002 - there is one
         config: int,  # noqa: ARG002 - there is one
     ) -> SimpleNamespace:
-        """Return an endpoint; IndexError past the last."""
-        # Bulk out or bulk in (table 9-13); IndexError for others.
+        """Return the endpoint bulk out or bulk in (table 9-13); IndexError past the last."""
         return SimpleNamespace(
             bLength=_ENDPOINT_BYTES,
             bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
@@ -376,9 +375,9 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
 
 
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
-    """Converts a device's OSError to the errors of PyUSB's own backends.
+    """Context that converts a device's OSError to the errors of PyUSB's own backends.
 
-    Not a generator, because from Python 3.13 on its frame keeps the handle of a session that failed to open.
+    A generator is not used: from Python 3.13 on its frame keeps the handle of a session that failed to open.
     """
 
     def __enter__(self) -> None:
@@ -402,8 +401,8 @@ def _bus(find_library: object = None) -> UsbBus:  # noqa: ARG001 - signature of 
 def install() -> None:
     """Make PyUSB, and thus pyvisa-py, use the virtual bus in this process.
 
-    Without libusb, pyvisa-py omits its USB sessions at its first import; in that case they are registered
-    now. May be called repeatedly; ``plug_in`` does it.
+    Without libusb, pyvisa-py registers no USB sessions at its first import; in that case they are registered
+    now. May be called repeatedly; ``plug_in`` calls it.
     """
     usb.backend.libusb1.get_backend = _bus
     if "pyvisa_py" in sys.modules and "pyvisa_py.usb" not in sys.modules:

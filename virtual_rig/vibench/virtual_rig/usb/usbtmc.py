@@ -1,7 +1,7 @@
 """The USB test-and-measurement class for an instrument: messages in bulk transfers.
 
-Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are USBTMC's unless
-they say USB488. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
+Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are those
+of USBTMC. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
 """
 
 import errno
@@ -56,7 +56,7 @@ class Setup:
 
 VENDOR_ID = 0x0699
 PRODUCT_ID = 0x0353
-"""Shared by AFG1022 and AFG1062."""
+"""USB product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
 """Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
 ALIGNMENT = 4
@@ -79,10 +79,10 @@ class Attributes(IntFlag):
 
 SUCCESS = 1
 TRANSFER_NOT_IN_PROGRESS = 0x81
-"""First byte of the response to a class request (table 16)."""
+"""Values of the first byte of the response to a class request (table 16)."""
 
 _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
-"""USBTMC 1.0 with termination character; USB488 1.0 with 488.2; eight reserved bytes."""
+"""Reply to GET_CAPABILITIES: USBTMC 1.0 with termination character, USB488 1.0 with 488.2, reserved bytes."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +172,8 @@ class UsbTmcInstrument:
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Return the requested reply (3.3), or time out.
 
-        A read without a query queues -420 and times out. A reply that exceeds the timeout remains, with its
-        delay reduced by the timeout.
+        A read without a query queues -420 and times out. A reply that is later than the timeout remains, with
+        its delay reduced by the timeout.
         """
         with self._lock:
             self._check_cable()
@@ -239,7 +239,7 @@ class UsbTmcInstrument:
         return transfer
 
     def abort_bulk_in(self, tag: int) -> bytes:
-        """Abort a transfer for which the host no longer waits; the reply remains."""
+        """Abort a transfer for which the host has stopped waiting; the reply remains."""
         if self._flight.request is None or self._flight.request.tag != tag:
             return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
         self._flight.request = None

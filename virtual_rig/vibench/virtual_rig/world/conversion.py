@@ -16,16 +16,16 @@ from .sensors import IEPE_BIAS_V, NoiseStream
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 from .wiring import Behind, Cable, Coupling, Input
 
-# The converter's anti-alias filter: from means over the world's steps to samples at any lower rate. A
-# windowed sinc (Kaiser window) of linear phase, corrected for the droop of the means, limits the band. It is
-# evaluated at the sample times: for integer ratios with one fixed set of weights, for others with an
-# interpolated row of a table. A sensor's delay shifts the evaluation time, and is exact between grid points.
+# The converter's anti-alias filter computes samples at any lower rate from means over the world's steps. A
+# linear-phase windowed sinc (Kaiser window) limits the band, with a correction of the means' droop. Integer
+# ratios use one fixed set of weights, other ratios interpolate between rows of a table. A sensor's delay
+# shifts the sample times exactly, also between grid points.
 
 GROUP_DELAY_SAMPLES = 40
 """Common delay of all channels, in output samples: typical of a delta-sigma converter."""
 
 _HALF_WIDTH_SAMPLES = 32
-"""With the Kaiser window below: pass band to 0.45, stop band from 0.55 of the sample rate, at -100 dB."""
+"""Half width of the filter: pass band up to 0.45, and -100 dB from 0.55 of the sample rate on."""
 _STOP_BAND_DB = 100.0
 _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
 """Kaiser 1974, as in Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
@@ -42,18 +42,18 @@ _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Largest advance of a channel for which the filter needs no future samples."""
+"""Smallest delay of a channel (an advance) for which the filter needs no future means."""
 
 
 @dataclass(frozen=True)
 class Decimator:
-    """Computes samples of one channel from means over the world's steps."""
+    """Filter that computes samples of one channel from means over the world's steps."""
 
     ratio: float
     """Steps per sample; integers are faster."""
     start_step: int
     delay_steps: float
-    """Delay of the channel's sensor not included in the means."""
+    """Part of the sensor's delay that is not yet included in the means."""
     table: FloatArray
     """Shape (rows, weights): one row for an integer ratio, else one row per fraction of a step, plus one."""
 
@@ -114,9 +114,9 @@ def _half_width_steps(ratio: float) -> int:
 
 
 def _weights(ratio: float, fractions: FloatArray) -> FloatArray:
-    """Return a row of weights, oldest first, for each fraction of a step that a sample follows a grid point.
+    """Return weights, oldest first, one row for each delay of a sample after a grid point [steps].
 
-    All rows at once: a conversion that starts while a run waits for its samples may not take seconds.
+    All rows are computed at once, because a run waits while a conversion starts.
     """
     newest = _half_width_steps(ratio) + 1
     count = ceil(2 * newest / _LANES) * _LANES
@@ -146,15 +146,15 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder, which causes a voltage drop of the excitation."""
+"""Output resistance of generator, divider and decoder, at which an excitation current causes a voltage."""
 COMPLIANCE_V = 19.0
 """Voltage of an open input with excitation."""
 OVER_RANGE = 1.02
-"""Relative level at which the modulator clips; the numbers end at the range."""
+"""Level at which the modulator clips, over the range; counts are limited to the range."""
 
 
 def clip_v(range_v: float) -> float:
-    """Return the voltage at which the modulator of an input of that range clips [V]."""
+    """Return the voltage at which the modulator of an input with this range clips [V]."""
     return range_v * OVER_RANGE
 
 
@@ -177,7 +177,7 @@ class InputStage:
         self._offset_v, self._gain = _operating_point(self.configured, cable)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Return volts at the converter, and whether they clip, from the signals, shape (signals, steps)."""
+        """Return volts at the converter, and whether they clip, for signals of shape (signals, steps)."""
         signal = signals[self.cable.signal]
         match self.configured.coupling:
             case Coupling.AC:
@@ -191,7 +191,7 @@ class InputStage:
 
 
 def _operating_point(configured: Input, cable: Cable) -> tuple[float, float]:
-    """Return the constant volts at the input, and volts at the input per volt of the signal."""
+    """Return the constant voltage at the input, and the gain from signal to input."""
     powered = configured.iepe_current_a >= LEAST_EXCITATION_A
     match cable.behind:
         case Behind.VOLTAGE_SOURCE:
@@ -209,7 +209,7 @@ _MOST_COUNTS = 2.0 ** (CONVERTER_BITS - 1)
 
 
 def volts_per_count(range_v: float) -> float:
-    """Return the quantisation step of an input [V]: its range, plus and minus, in 24 bits."""
+    """Return the quantisation step of a 24-bit input with a range of plus and minus ``range_v`` [V]."""
     return range_v / _MOST_COUNTS
 
 
@@ -261,7 +261,7 @@ class ConverterInput:
 
 
 class SampleQueue:
-    """Samples in order of time, stored until they are taken."""
+    """Queue of samples in order of time."""
 
     def __init__(self, channels: int) -> None:
         self._empty = np.empty((channels, 0))

@@ -1,4 +1,4 @@
-"""Sensors that show the motion of the rig: bandwidth, resonance, noise, drop-outs, full scale."""
+"""Sensors of the rig's motion: bandwidth, resonance, noise, drop-outs, full scale."""
 
 from dataclasses import dataclass
 from zlib import crc32
@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Samples per draw: a compromise between the cost of a generator and of unused samples."""
+"""Samples per draw: a compromise between the number of generators and of unused samples."""
 
 
 class NoiseStream:
@@ -26,7 +26,7 @@ class NoiseStream:
     """
 
     def __init__(self, seed: int, place: str) -> None:
-        """``place`` is the name of the stream; streams of different places are independent."""
+        """Create the stream named ``place``; streams with different names are independent."""
         self._key = SeedSequence([seed, crc32(place.encode())]).generate_state(2, np.uint64)
         self._page_number = -1
         self._page = np.empty(0)
@@ -42,8 +42,8 @@ class NoiseStream:
         return np.asarray(drawn[offset : offset + count])
 
     def generator(self, page_number: int) -> Generator:
-        """Return a random generator for one page, for events."""
-        # The page number is in the third word, so that draws of one page cannot reach the next.
+        """Return a random generator for the events of one page."""
+        # The page number is the third word of the counter, so that draws of one page cannot reach the next.
         return Generator(Philox(key=self._key, counter=np.array([0, 0, page_number, 0], dtype=np.uint64)))
 
     def _samples_of(self, page_number: int) -> NDArray[np.float64]:
@@ -59,7 +59,7 @@ class Disturbance:
 
     first_step: int
     stop_step: int
-    """The first step after it."""
+    """The first step after the disturbance."""
     level: float
     """Share of full scale, -1 to 1."""
 
@@ -67,15 +67,15 @@ class Disturbance:
 class RandomDropouts:
     """Times at which speckle interrupts the laser signal: a Poisson process.
 
-    The decoder then follows noise in place of a carrier. Each drop-out holds an arbitrary level for an
-    exponentially distributed time.
+    The decoder then follows noise instead of the carrier. In a drop-out the output has a random, constant
+    level; its length is exponentially distributed.
     """
 
     MEAN_S = 30.0 / 102_400
     """Mean length, about 0.3 ms; assumed."""
 
     def __init__(self, per_s: float, stream: NoiseStream, grid: TimeGrid = USUAL_GRID) -> None:
-        """``per_s`` is the expected number of dropouts in a second."""
+        """Create drop-outs with an expected number of ``per_s`` per second."""
         self._per_page = per_s * grid.step_s * PAGE
         self._mean_steps = self.MEAN_S * grid.rate_hz
         self._stream = stream
@@ -84,7 +84,7 @@ class RandomDropouts:
         """Return every drop-out that overlaps the steps from ``first`` to before ``stop``."""
         if self._per_page == 0.0:
             return []
-        # None is longer than a page, so only the previous page needs to be searched.
+        # No drop-out is longer than a page, so only the previous page can reach into the first.
         pages = range(max(first // PAGE - 1, 0), stop // PAGE + 1)
         found = [dropout for page in pages for dropout in self._of(page)]
         return [dropout for dropout in found if dropout.stop_step > first and dropout.first_step < stop]
@@ -107,7 +107,7 @@ _FIT_FLOOR = 1e-2
 """Lower end of the fit; below it, the exact gain at zero frequency dominates."""
 _FIT_POINTS = 64
 _ZEROS = 6
-"""Numerator weights fitted."""
+"""Number of fitted numerator weights."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
 
 
 def low_pass_of(sensor: SensorConfig) -> LowPass:
-    """Build the response of a sensor: its bandwidth and its mounted resonance, as far as stated."""
+    """Return the response of a sensor from its bandwidth and mounted resonance, if they are given."""
     poles: tuple[complex, ...] = ()
     if sensor.bandwidth_hz is not None:
         poles += first_order(sensor.bandwidth_hz).poles
@@ -155,8 +155,8 @@ def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
     """Return a low-pass filter for a grid of ``step_s``, initially at rest.
 
     The poles are mapped exactly (z = exp(s T)), so a resonance keeps its frequency even close to the grid's
-    Nyquist frequency; one beyond it is omitted, because it would appear at another frequency. The zeros are
-    the least-squares fit to the analogue response including phase, with exact gain at zero frequency.
+    Nyquist frequency. A resonance beyond it is omitted, as it would appear at another frequency. The zeros
+    are a least-squares fit to the complex analogue response, with exact gain at zero frequency.
     """
     poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
     denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
@@ -168,11 +168,11 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
     target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
     powers = z[:, np.newaxis] ** np.arange(_ZEROS)
-    # The weights sum to the denominator's for unit gain at zero frequency, which eliminates one unknown.
+    # Unit gain at zero frequency makes the sums of both sets of weights equal: one unknown is eliminated.
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
-    weight = (1 / frequency_hz)[:, np.newaxis]  # errors as delays: low frequencies count like high ones
+    weight = (1 / frequency_hz)[:, np.newaxis]  # errors count as delays, equally at all frequencies
     matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
     aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
     weights, *_ = np.linalg.lstsq(matrix, aim)
@@ -189,13 +189,13 @@ LONGEST_DELAY_S = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class SensorParts:
-    """Data to convert a section of motion to sensor volts."""
+    """Data to convert the motion over some steps to sensor volts."""
 
     filter: RecursiveFilter
     noise: FloatArray
     """In units of the motion, shape (steps,)."""
     instead: FloatArray
-    """Values in place of the motion where finite, in its units; empty without any."""
+    """Values that replace the motion except where they are NaN, in its units; empty if there are none."""
     full_scale: float
     """In units of the motion."""
     full_scale_v: float
@@ -217,8 +217,8 @@ class SensorParts:
 class MotionSensor:
     """A sensor in front of an input: vibrometer, accelerometer, displacement probe or force cell.
 
-    Order: motion, bandwidth or resonance, white noise, drop-outs, volts, clipping at full scale. Delay beyond
-    that of the bandwidth is a plain delay (``delay_steps``), which the converter's filter applies exactly.
+    The motion passes bandwidth or resonance, white noise, drop-outs, conversion to volts and clipping at full
+    scale, in this order. The converter's filter applies the rest of the sensor's delay (``delay_steps``).
     """
 
     def __init__(
@@ -230,7 +230,7 @@ class MotionSensor:
         grid: TimeGrid = USUAL_GRID,
         dropouts: RandomDropouts | None = None,
     ) -> None:
-        """``noise_rms``: of the mean over a step, in the SI unit of the channel."""
+        """Create a sensor; ``noise_rms`` is the rms noise of a mean over a step, in the channel's SI unit."""
         if config.delay_s > LONGEST_DELAY_S:
             raise ConfigurationError(
                 f"delay_s = {config.delay_s} s of the {config.model} ({role.value}): the virtual rig can "
@@ -248,11 +248,11 @@ class MotionSensor:
         self._demanded: list[Disturbance] = []
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """Show a level instead of the motion for some steps: a drop-out or an over-range on demand."""
+        """Output a level instead of the motion for some steps: a drop-out or an over-range on demand."""
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return the conversion data of the motion for the next steps, without bias."""
+        """Return the data to convert the motion over the next steps; the IEPE bias is not included."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
         dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
         disturbed = dropouts + self._demanded
@@ -266,7 +266,7 @@ class MotionSensor:
         return SensorParts(self._filter, noise, instead, self._full_scale, self._full_scale_v)
 
     def volts(self, values: FloatArray, first_step: int) -> FloatArray:
-        """Output volts for the means of a motion over the next steps, shape (steps,)."""
+        """Return the output for the means of a motion over the next steps, shape (steps,) [V]."""
         volts = np.empty(len(values))
         parts = self.parts(first_step, len(values))
         native_engine().call("show", parts.showing(np.ascontiguousarray(values), volts))

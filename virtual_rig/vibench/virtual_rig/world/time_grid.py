@@ -22,9 +22,9 @@ class TimeGrid:
     Rig time is counted by the converter's clock, so that samples always lie at integer numbers of steps.
     Physical time differs by the clock's error, and the equations of motion use the physical step.
 
-    The usual grid has twice the highest usual sample rate: integer ratios give every rate of an NI 9234, its
-    anti-alias filter has room for its transition band, and a step (9.8 us) is short compared with the
-    specimen's shortest period (2 ms). Contacts, which are shorter, are resolved within a step.
+    The usual grid has twice the highest usual sample rate. Integer ratios give every rate of an NI 9234, the
+    transition band of its anti-alias filter fits below the Nyquist frequency, and a step (9.8 us) is short
+    compared with the specimen's shortest period (2 ms). Shorter contacts are resolved within a step.
     """
 
     rate_hz: float = USUAL_GRID_RATE_HZ
@@ -35,11 +35,11 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """Return the physical length of a step for a clock that is fast by this amount [s]."""
+        """Return the physical length of a step if the converter's clock is fast by this amount [s]."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:
-        """Return the rms on the grid of white noise with a given rms in ``FULL_BAND_HZ``."""
+        """Return the rms per step of white noise that has the given rms in ``FULL_BAND_HZ``."""
         return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
 
     def step_at(self, time_s: float) -> int:
@@ -59,10 +59,10 @@ FloatArray = NDArray[np.float64]
 
 
 class RecursiveFilter:
-    """A rational filter in steps (direct form II, transposed), initially at rest."""
+    """A recursive digital filter (direct form II, transposed), initially at rest."""
 
     def __init__(self, numerator: ArrayLike, denominator: ArrayLike) -> None:
-        """Take the weights of the present value first; the denominator begins with 1."""
+        """Create a filter; the first coefficients are for the present value, in the denominator 1."""
         weights = [np.asarray(each, dtype=np.float64) for each in (numerator, denominator)]
         order = max(len(each) for each in weights)
         self.numerator, self.denominator = (np.pad(each, (0, order - len(each))) for each in weights)

@@ -12,7 +12,7 @@ _USUAL_OUTPUT = f"{SECOND_DEVICE}/ao0"
 
 
 class Signal(IntEnum):
-    """Row of the world's signals; rows of other sensors follow, in the order of the configuration."""
+    """Rows of the world's signals; rows of further sensors follow in the order of the configuration."""
 
     DRIVE = 0
     AMPLIFIER = 1
@@ -32,7 +32,7 @@ class Input:
     """Configuration of one converter input in a task."""
 
     physical_channel: str
-    """``"cDAQ1Mod1/ai0"``: name of the input at the converter, which the wiring maps to a signal."""
+    """Name of the input at the converter (``"cDAQ1Mod1/ai0"``), which the wiring maps to a signal."""
     range_v: float
     """Full scale, plus and minus [V]."""
     coupling: Coupling
@@ -55,7 +55,7 @@ class Cable:
     behind: Behind
     signal: int = Signal.DRIVE
     attenuation: float = 1.0
-    """Volts at the source per volt at the input."""
+    """Volts at the source per volt at the input of the converter."""
     delay_steps: float = 0.0
 
 
@@ -63,7 +63,7 @@ OPEN_INPUT = Cable(Behind.NOTHING)
 
 
 def signal_rows(rig: Rig) -> dict[Role, int]:
-    """Row of the world's signals by role, of every sensor and wire that a rig has."""
+    """Return the row of the world's signals for each role of a rig."""
     fixed = (Role.DRIVE_VOLTAGE, Role.AMPLIFIER_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
     return {role: row for row, role in enumerate((*fixed, *rig.sensors))}
 
@@ -74,7 +74,7 @@ def amplifier_input(rig: Rig) -> str:
 
 
 def cables_of(rig: Rig, delay_steps: Mapping[Role, float]) -> dict[str, Cable]:
-    """Every connected input by its physical name, ``"cDAQ1Mod1/ai0"``; delays of the sensors by role."""
+    """Return the cable of each connected input by its name, such as ``"cDAQ1Mod1/ai0"``."""
     rows = signal_rows(rig)
     return {
         f"{device}/{channel.physical}": Cable(

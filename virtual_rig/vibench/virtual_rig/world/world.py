@@ -40,8 +40,8 @@ from .wiring import OPEN_INPUT, Cable, Input, Signal, amplifier_input, cables_of
 class AnalogueOutput:
     """A queue of samples, played at their own rate on the world's grid; zero when it is empty.
 
-    The voltage is exact on average over every step, at any rate. A converter with an interpolating output
-    filter would have weaker images than this zero-order hold.
+    The mean voltage over each step is exact at any sample rate. Real converters with an interpolation filter
+    have weaker images than this zero-order hold.
     """
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
@@ -54,7 +54,7 @@ class AnalogueOutput:
     def queue(self, volts: FloatArray, sample_rate_hz: float, now_step: int) -> None:
         """Append samples; they start now if none is left to play.
 
-        A different rate also applies to the samples left to play.
+        If the rate differs, samples that are left to play also change to the new rate.
         """
         left = self.unplayed(now_step)
         if left == 0:
@@ -93,11 +93,11 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""Tolerance in samples for a sample that ends on a step."""
+"""Tolerance in samples, for samples that end on a step."""
 
 
 class EventSchedule:
-    """Actions by due step; those of one step keep their order."""
+    """Actions sorted by due step; actions of the same step keep their order."""
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
         self._grid = grid
@@ -114,32 +114,32 @@ class EventSchedule:
             heapq.heappop(self._due)[2]()
 
     def stop_before(self, step: int) -> int:
-        """Return how far the world may be computed towards ``step`` before the next action."""
+        """Return the step up to which the world may be computed: ``step``, or that of the next action."""
         return min(step, self._due[0][0]) if self._due else step
 
 
 LOWEST_RATE_HZ = 500.0
-"""Lowest rate of a conversion, whose filter needs a tenth of a second of history."""
+"""Lowest rate of a conversion; its filter needs a tenth of a second of history."""
 HIGHEST_RATE_HZ = 250e3
-"""Highest rate of a conversion; above the world's own rate it interpolates."""
+"""Highest rate of a conversion; above the grid's rate, samples are interpolated."""
 
 _STRETCH_STEPS = 8192
-"""Steps per block: long enough to amortise calls, short enough for the cache."""
+"""Steps per block: enough to amortise the cost of a call, few enough for the processor's cache."""
 
 
 class TerminalVoltage(Protocol):
-    """The generator at the amplifier's input."""
+    """The generator's voltage at the amplifier's input."""
 
     def render(self, start_s: float, interval_s: float, count: int) -> FloatArray:
         """Return the mean terminal voltage over each of ``count`` intervals [V]; calls go forward in time."""
 
 
 class ClosedLoop(Protocol):
-    """A simulated instrument that computes the amplifier voltage from its samples."""
+    """A simulated instrument that computes an amplifier voltage from its sensor samples."""
 
     @property
     def is_on(self) -> bool:
-        """Whether it plays or delayed voltages remain; otherwise the world omits it."""
+        """Whether it plays or delayed voltages remain; otherwise the world does not call `move`."""
 
     def move(
         self,
@@ -153,8 +153,8 @@ class ClosedLoop(Protocol):
     ) -> int:
         """Advance the shaker from a step of the world with the loop closed; return the number of steps.
 
-        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0. ``signals`` contains the other
-        drive of the amplifier on entry, and all signals on return.
+        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0. On entry ``signals`` contains the
+        amplifier input from other sources; on return it contains all signals.
         """
 
 
@@ -162,8 +162,8 @@ class World:
     """The simulated rig; its time advances only on request.
 
     Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
-    for bit for all block sizes. Thread-safe; `time_s` never waits, so an instrument may read it while it is
-    being rendered.
+    for bit, whatever the block sizes. Thread-safe; `time_s` takes no lock, so an instrument may read it while
+    it is rendered.
     """
 
     def __init__(
@@ -173,7 +173,7 @@ class World:
         specimen: Specimen | None = None,
         loop: ClosedLoop | None = None,
     ) -> None:
-        """``specimen`` is by default that of the rig; ``loop`` is a controller beside the generator."""
+        """Create a world; ``specimen`` replaces the rig's, ``loop`` is a controller beside the generator."""
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
@@ -224,9 +224,9 @@ class World:
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Start a conversion now.
 
-        Rates from 500 Hz to 250 kHz are possible, and up to half the grid's rate on a coarser grid; integer
-        ratios are faster. All inputs share a delay of 40 samples (at most the grid's rate counted), as behind
-        a delta-sigma converter. Raises ConfigurationError for other rates.
+        Rates from 500 Hz to 250 kHz are possible, on a coarser grid up to half its rate; integer ratios are
+        faster. All inputs share the delay of a delta-sigma converter: 40 samples, or 40 grid steps if longer.
+        Raises ConfigurationError for other rates.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
@@ -276,7 +276,7 @@ class World:
         self.set_amplifier_gain_db(self._gain_db)
 
     def widen_gaps(self, by_m: float) -> None:
-        """Increase both gaps by this distance, relative to the initial ones [m]."""
+        """Set both gaps to their initial size plus ``by_m`` [m]."""
         began = self._specimen
         lower, upper = began.gaps_m
         with self._turn:
@@ -295,7 +295,7 @@ class World:
         self._plug(physical_channel, self._plan.get(physical_channel, OPEN_INPUT))
 
     def disconnect(self, physical_channel: str) -> None:
-        """Disconnect an input: it shows zero, or its own excitation."""
+        """Disconnect an input; it then measures zero, or the voltage of its own excitation."""
         self._plug(physical_channel, OPEN_INPUT)
 
     def reverse(self, physical_channel: str) -> None:
@@ -387,7 +387,7 @@ class World:
             self._truth.append(motion.ends)
 
     def _means(self, role: Role, ends: FloatArray) -> FloatArray:
-        """Means over steps of what a sensor measures, from the states at their ends, shape (steps,)."""
+        """Return a sensor's quantity as means over steps, from the states at their ends, shape (steps,)."""
         h, column = self.plant.step_s, dict(zip(MOTION_COLUMNS, ends.T, strict=True))
         place, velocity = (column[name] for name in _STATES[role.place])
         match role.quantity:
@@ -396,7 +396,7 @@ class World:
             case "velocity":
                 means = np.diff(place) / h
             case "displacement":
-                # The mean of a cubic through both ends (Hermite).
+                # Mean of the Hermite cubic through both ends.
                 means = 0.5 * (place[:-1] + place[1:]) - h / 12 * np.diff(velocity)
             case _:
                 pull = self._specimen.stiffnesses[0] * (column["x"] - place)
@@ -414,18 +414,18 @@ class World:
 
 
 _LOOP_ROLES = (Role.BASE_ACCELERATION, Role.M0_VELOCITY)
-"""Channels whose means the engine computes itself, which a controller can sample."""
+"""Channels that a controller can sample, because the native engine computes their means."""
 _STATES = {
     "base": ("base_displacement", "base_velocity"),
     "m0": ("x", "vx"),
     "m1": ("y", "vy"),
     "m2": ("z", "vz"),
 }
-"""Columns of displacement and velocity, by the place of a channel."""
+"""Columns of displacement and velocity for each place of a sensor."""
 
 
 def _sensors_of(rig: Rig, virtual: VirtualConfig, grid: TimeGrid) -> Iterator[tuple[Role, MotionSensor]]:
-    """Simulate every sensor that a rig describes; those of ``sensors`` have the noise that they state."""
+    """Yield the simulation of each sensor of a rig, with the configured noise."""
     noise = partial(NoiseStream, virtual.seed)
     per_rthz = np.sqrt(grid.rate_hz / 2)
     rms = grid.rms_per_step(virtual.accelerometer_noise_m_per_s2)
@@ -446,7 +446,7 @@ def _history_steps(grid: TimeGrid) -> int:
 
 
 def virtual_section(rig: Rig) -> VirtualConfig:
-    """Return how the rig's instruments are simulated; ConfigurationError for real ones."""
+    """Return the rig's [virtual] section; raises ConfigurationError if the instruments are real."""
     if rig.virtual is None:
         raise ConfigurationError(
             f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and none was "
