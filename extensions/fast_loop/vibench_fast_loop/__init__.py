@@ -6,7 +6,7 @@ with its controller, analysis, figure and form, the drive that plays it, and the
 A controller samples base and m0, and sets the amplifier voltage after a latency. `plant` models one control
 step of table, specimen and delayed voltages. `law` designs the linear law (a Kalman filter and feedback of
 its estimate) that damps the specimen, and computes whether a periodic motion is stable under it.
-`open_loop_multiplier` estimates stability without feedback from samples of a perturbed motion. The law is
-independent of the harmonics of the drive: if the base moves as a sine, the held motion is one of the specimen
-alone, for any law. SI units.
+`open_loop_multiplier` estimates stability without feedback from samples of a perturbed motion. If the
+harmonics of the drive make the base move as a sine, the held motion is one of the specimen alone, whatever
+the law. SI units.
 """

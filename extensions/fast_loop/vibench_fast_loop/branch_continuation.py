@@ -14,7 +14,7 @@ from vibench.acquisition.rig import Rig
 _NO_TRIES = 12
 """Most cycles of settling and measuring per point."""
 _BEFORE = 60
-"""Periods before the perturbations that are evaluated: to find their size, and as a lead-in."""
+"""Periods played before the evaluated perturbations, to find their size and as a lead-in."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -86,7 +86,7 @@ class BranchContinuation(AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The base level."""
+        """Base level of the branch, the only one."""
         return (self.base_level,)
 
     def segment(self, number: int, frequency_hz: float) -> Segment:

@@ -1,4 +1,4 @@
-"""Plays settings of a fast loop, and measures base and m0 until both are known well enough."""
+"""Player of a fast loop's settings, which measures base and m0 until their standard errors are small."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
 """Largest standard errors at the end of a measurement: of the base's fundamental and harmonics, as parts of
 the tolerance, and of m0 relative to itself."""
 _ROUGHLY = 0.15
-"""Largest standard error of the base, as a part of its distance from the level, far from it."""
+"""Far from the level, the largest standard error of the base as a part of its distance from the level."""
 _DRIFT = 3.0
 """The first half has not settled if it differs from the second by more than this many standard errors."""
 _REMEMBERED = 0.8
-"""Weight of the scatter of earlier measurements, because the few blocks of one may agree by chance."""
+"""Weight of the scatter of earlier measurements; the few blocks of one alone may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +51,13 @@ class LoopLook:
 
     @property
     def ratio_u(self) -> float:
-        """Standard error of its real and imaginary part."""
+        """Standard error of real and imaginary part of the ratio."""
         shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
         return float(abs(self.ratio) * np.hypot(*shares))
 
 
 class BranchPlayer:
-    """Plays settings and measures the response of base and m0."""
+    """Player of settings, which measures the response of base and m0."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan
@@ -71,7 +71,7 @@ class BranchPlayer:
         """Sum of squares of block deviations in earlier measurements, and their degrees of freedom."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
-        """Return the program of the controller."""
+        """Return the controller's program for a setting."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
@@ -141,7 +141,7 @@ def _settled_part(seen: Coefficients) -> Coefficients:
 
 
 def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
-    """Return whether the errors of a measurement are small enough for its purpose."""
+    """Return whether the standard errors are small enough for the distance from the level."""
     share = look.base_u[: plan.harmonics] / level_m
     wrong = abs(abs(look.base_m[0]) / level_m - 1)
     return bool(

@@ -10,17 +10,17 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""Smallest change of the unknowns from which the derivative is updated."""
+"""Smallest change of the unknowns after which the derivative is updated."""
 _DOUBTED = 0.05
 """Assumed standard error of the derivative, against which the measurement noise is weighted."""
 _REFERENCE_STEP = 0.15
 """Relative change of the first coefficient that counts as one step."""
 _RATIO_STEP = 1.0
-"""Change of m0 over base that counts as one step."""
+"""Change of the ratio of m0 to base that counts as one step."""
 _RATIO = 2
-"""Rows for m0 over base, after the residual of the base."""
+"""Number of rows for the ratio of m0 to base, which follow the base's residual."""
 _NEW = 0.3
-"""Smallest share of a step after which a point counts as new."""
+"""Part of a step by which a point must advance to count as new."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
 """Smallest distance of two points that define a direction: in steps (the effect of the tolerance is less) and
 in standard errors."""
@@ -38,7 +38,7 @@ class LoopSetting:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoint:
-    """A setting and its measured response, as numbers of the equations."""
+    """A setting as unknowns of the equations, and its measured response as residual and ratio."""
 
     unknowns: Vector
     residual: Vector
@@ -50,7 +50,7 @@ class MeasuredPoint:
 
     @property
     def place(self) -> Vector:
-        """Coordinates of the arc: frequency and ratio, in steps."""
+        """Coordinates in which the arc length is measured: frequency and ratio, in steps."""
         return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
 
 
@@ -67,10 +67,10 @@ class PredictedPoint:
 class BranchSolver:
     """Newton's method with a derivative updated from measurements (Broyden, Math. Comp. 19 (1965) 577).
 
-    Equations: the base's fundamental has its amplitude and each harmonic is zero, all over that amplitude.
-    Unknowns are frequency and coefficients, one more than equations. The arc length uses frequency and ratio
-    of m0 to base, because at a fold with low damping the coefficients hardly change while the phase of m0
-    turns by 180 degrees.
+    The equations require the given amplitude of the base's fundamental and zero for each harmonic. Unknowns
+    are frequency and coefficients, one more than equations. The arc length uses frequency and ratio of m0 to
+    base, because at a fold with low damping the coefficients hardly change while the phase of m0 turns by 180
+    degrees.
 
     Parameters
     ----------

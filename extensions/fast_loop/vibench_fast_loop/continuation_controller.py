@@ -1,4 +1,4 @@
-"""Follows a branch with a fast loop: prediction along the arc, correction until the base is a sine.
+"""Controller that follows a branch: it predicts along the arc, and corrects until the base is a sine.
 
 Small perturbations of the drive show whether the motion would be stable without feedback.
 """
@@ -56,18 +56,18 @@ _GROWTH, _EASY = 1.5, 3
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Variations of the unknowns: the first two in steps, harmonics over the level."""
 _BELOW = 5.0
-"""Start of the first coefficient below the model's value, in steps."""
+"""Distance of the first coefficient's start below the model's value, in steps."""
 _ABOVE = 8.0
-"""Start above the model's value, in steps: a factor of three."""
+"""Distance of its start above the model's value, in steps: a factor of three."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Largest decrease, in steps, and largest base harmonics over the level at which it continues, because a
-motion with impacts is easily lost."""
+"""Largest decrease of the first coefficient per try [steps], and largest base harmonics over the level for a
+decrease. Both are small because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
 """Bounds on the change of the base level per step of the first coefficient during the increase."""
 _TOLD = 0.01
 """Smallest change in steps from which the slope is computed."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Parts of the tolerance that a point must meet when it is found, because a fold moves with the level."""
+"""Parts of the tolerance for fundamental and harmonics of a point; small, as folds move with the level."""
 _BEND_HZ = 0.05
 
 
@@ -150,7 +150,7 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
             unknowns[1] -= min(max(wrong / slope, -most), most)
     if abs(wrong) > _NEAR:
         return None
-    # Level and harmonics interact, and converge slowly if the derivative stems from joint changes only.
+    # Level and harmonics interact. They converge slowly if all unknowns were always changed together.
     yield from _probe(player, solver, seen, len(seen.unknowns))
     return (yield from _correct(player, solver, replace(predicted, unknowns=seen.unknowns)))
 
@@ -158,8 +158,8 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
 def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
     """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
-    The derivatives of frequency and first coefficient change most. Those of the harmonics come from joint
-    changes, and can make the equations near a fold unsolvable.
+    The derivatives by frequency and first coefficient change most. Those by the harmonics are learnt from
+    joint changes, and can make the equations unsolvable near a fold.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -228,13 +228,13 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 _EACH = 5
 """Periods per change: short compared with the growth, long compared with the upper modes."""
 _LEAD, _TRIAL = 3, 8
-"""Changes before those that are evaluated, and changes of the trial that finds their size."""
+"""Number of changes before the evaluated ones, and in the trial that finds their size."""
 _CHANGED = (0, 2)
 """Perturbed coefficients: the first, and the third, at which the specimen also drives the table."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
 """Size of the trial's change, and largest size, over the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion differs from the one before beyond this share and this many standard errors."""
+"""A motion has changed if it differs by more than this share and this number of standard errors."""
 _NEVER = 1e-9
 
 
@@ -243,7 +243,7 @@ def perturbed_stability(
 ) -> Controller[BranchStabilityNote]:
     """Play small changes of the drive, then the same with opposite sign; measure the motion before and after.
 
-    A trial sets their size to the plan's limit for the changes of base and m0.
+    A trial finds the size for which base and m0 change by the plan's limit.
     """
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz

@@ -1,4 +1,4 @@
-"""The law of a rig's fast loop, the calibration of its coefficients, and its predicted hold of a branch."""
+"""The law of a rig's fast loop, the calibration of its coefficients, and a prediction whether it holds."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class FastLoop:
 
     @property
     def feedback(self) -> LoopFeedback:
-        """The law in volts, as a controller uses it."""
+        """The law with sensor voltages as input, as a controller uses it."""
         units = np.array(_units_per_volt(self.rig))
         return LoopFeedback(
             step=_rows(self.law.step),
@@ -162,20 +162,20 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Number of motions of a branch to check; stable ones too, because a late law may destabilise them."""
+"""Number of motions to check along a branch; also stable ones, which a delayed law may destabilise."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods to try: the fewest with a whole number of samples within this tolerance."""
+"""Numbers of periods to try, and tolerance: the smallest with a whole number of samples is used."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Samples per period for the slope of the spring; more with stops."""
 _PART_S = 1e-6
-"""Part of a sample for which the slope of stops is evaluated; a contact lasts a hundred parts."""
+"""Longest part of a sample with one value for the stops' slope [s]; a contact lasts a hundred parts."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels, over the required one, that lead to a motion with impacts."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """Effect of a law on the motions of a branch, from its start on."""
+    """How far, and how well, a law holds the motions of a branch from its start on."""
 
     multiplier: float
     """Largest multiplier over a period with the law."""

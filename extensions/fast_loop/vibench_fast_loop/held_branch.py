@@ -41,7 +41,7 @@ from vibench.sim import (
 )
 
 _LEAST = 3
-"""Fewest points for a turn of the frequency."""
+"""Fewest points in which a turn of the frequency can be found."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class HeldBranch(Labelled):
 
 
 def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
-    """Return the points that a fast loop noted; empty without any."""
+    """Return the points in a fast loop's notes; empty if there are none."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
     told = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
     asked = [told.get(each.point) for each in points]

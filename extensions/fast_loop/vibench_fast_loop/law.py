@@ -23,7 +23,7 @@ class LawWeights:
     """Weights of the design: sizes of motion, voltage and noise."""
 
     relative_m: float = 3e-5
-    """Motion of p that is weighted like a tenth of a volt of control."""
+    """Motion of p that costs as much as a tenth of a volt of control [m]."""
     push_n: float = 3e-3
     """Unknown force between m1 and m2 assumed by the filter, rms over a step [N]."""
     volt: float = 1e-2
@@ -71,7 +71,7 @@ def design_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> Linea
 
 
 def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
-    """Return a law of two gains with the lowest cost of `design_law`, for a controller that takes no other.
+    """Return the law of two gains with the lowest cost of `design_law`, for controllers that allow no other.
 
     ``u = -(kp s + kd d)`` of one sample s and its rate of change behind a low-pass ``d += a ((s - before) /
     step - d)``, ``a = step / (tau + step)``. The gains and tau minimise the expected cost (W. S. Levine and
@@ -209,7 +209,7 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 
 
 def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
-    """Return matrices for the sections of a step: plant, memory of the law, and the voltage common to all."""
+    """Return the matrices of a step's sections; the state is plant, memory of the law, and voltage."""
     own, memory = plant.size, len(law.step)
     answer = np.hstack([law.direct @ plant.shown, law.output])
     (first, of_first), *others = plant.stretches(parts)

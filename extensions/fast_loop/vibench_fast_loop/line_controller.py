@@ -1,4 +1,4 @@
-"""A real-time controller with lines of JSON over a socket (`vibench_fast_loop.protocol`)."""
+"""Driver of a real-time controller that exchanges JSON lines over a socket (`vibench_fast_loop.protocol`)."""
 
 import json
 from typing import Self, TypeVar
@@ -14,10 +14,10 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import LoopFacts, LoopProgram, LoopReport, LoopRequest
 
 _PART = 0.01
-"""Largest relative deviation of a rate from the configuration."""
+"""Largest relative deviation of rate, limit and watchdog time from the configuration."""
 _LEAVING_S = 0.1
 _LONGEST_LINE = 1_000_000
-"""Bytes; a faulty controller may never stop."""
+"""Longest answer that is read [bytes], because a faulty controller may never end its line."""
 Answer = TypeVar("Answer", bound=BaseModel)
 
 
@@ -102,7 +102,7 @@ class LineController:
             if isinstance(told, dict) and "refused" in told:
                 raise InstrumentError(f"the real-time controller at {where} refused: {told['refused']}")
             return kind.model_validate_json(line)
-        except (ValueError, RecursionError) as error:  # pydantic's are ValueErrors
+        except (ValueError, RecursionError) as error:  # pydantic raises a ValueError
             raise InstrumentError(
                 f"the program at {where} is not a controller of loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or give the name of its driver"

@@ -18,8 +18,8 @@ deviation to its conjugate. Multipliers: exp(T eig A). Both harmonics must be pe
 the specimen also drives the table at three times the frequency, and b3 would otherwise follow from z.
 
 Sensor noise in z and b biases least squares towards stability. Therefore the changes are played twice, the
-second time with opposite sign, and each half is the instrument of the other (T. Soderstrom, Automatica 43
-(2007) 939). Their noises are independent, and even effects, above all the curvature of the branch, cancel.
+second time with opposite sign, and each half is the instrumental variable of the other (T. Soderstrom,
+Automatica 43 (2007) 939). Their noises are independent; even effects such as the branch's curvature cancel.
 
 Not detected: growth with alternating sign (a multiplier near -1), and the second harmonic of the base in
 motions without the symmetry of two equal stops.
@@ -58,7 +58,7 @@ class PerturbedMotion:
     period: float
     """Period of the drive [samples]."""
     first: int
-    """First sample of the changes; the end of their second half precedes it."""
+    """First sample of the changes; the last changes of the second half are also played before it."""
     periods: int
     """Periods of the changes; the same number follows with opposite sign."""
 

@@ -101,10 +101,10 @@ class SampledPlant:
         return np.array([1e-6, 1e-3, 1e-2, *specimen, 1e-3, 1e-6, *[1e-2] * self.waiting])
 
     def stretches(self, parts: int = 1) -> tuple[tuple[Table, Vector], ...]:
-        """Return the transitions between the middles of a step's parts, ends included, one more than parts.
+        """Return the transitions from a step's start to its end, divided at the middle of each part.
 
-        Each is a state transition, (n, n), and the effect of the new voltage, (n,). The spring between m1 and
-        m2 acts between them (Strang splitting).
+        Each is a state transition, (n, n), and the effect of the new voltage, (n,). The stops' force acts at
+        the divisions (Strang splitting).
         """
         step, size = self.timing.step_s, self.size
         sampled = np.eye(size)
@@ -135,7 +135,7 @@ class SampledPlant:
         return rows
 
     def _stretch(self, start_s: float, stop_s: float) -> tuple[Table, Vector]:
-        """Return the transition of a part of a step, under the oldest voltage and then the next."""
+        """Return the transition of a part of a step, with the oldest delayed voltage and then the next."""
         late_s = self.timing.latency_s - max(self.waiting - 1, 0) * self.timing.step_s
         change_s = min(max(late_s, start_s), stop_s)
         matrix, newest = np.eye(self.size), np.zeros(self.size)

@@ -1,4 +1,4 @@
-"""Messages between a host and a real-time controller: programs down, Fourier coefficients back.
+"""Messages between a host, which sends programs, and a controller, which returns Fourier coefficients.
 
 Version 1 of the protocol. Each message is one line of JSON, answered by one line; the host always begins.
 ``{"vibench_loop": 1, "ask": "hello" | "play" | "report" | "silence", ...}``; docs/feedback.md has the rest.

@@ -1,4 +1,4 @@
-"""The simulated real-time controller: a law and a Fourier series, sample by sample, and lines of JSON.
+"""Simulated real-time controller: plays a Fourier series and a law, and answers lines of JSON.
 
 It implements version 1 of `vibench_fast_loop.protocol`. Its watchdog counts its own samples and ramps down by
 itself when no host has sent a request for too long. Samples are means over a control step, and voltages are

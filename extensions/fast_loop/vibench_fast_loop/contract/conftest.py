@@ -1,4 +1,4 @@
-"""Uses bench and options of vibench's contract tests."""
+"""Fixtures and options of vibench's contract tests, which the tests of this folder use too."""
 
 from vibench.acquisition.contract.conftest import bench, pytest_collection_modifyitems, rig
 

@@ -100,7 +100,7 @@ def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
     _, blocks = listened(bench, 0.8)
     of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
     gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
-    # The memory holds the previous sample, and the law averages both: a proportional-derivative form.
+    # The law averages this sample and the previous one, its memory: a proportional-derivative law.
     into = (1.0, 0.0) if of_base else (0.0, 1.0)
     direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
     law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
