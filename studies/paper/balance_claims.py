@@ -15,7 +15,7 @@ _AGREES = 0.1
 """Relative difference that counts as agreement; the paper's criterion of similarity (its eq. 6) is looser."""
 _MOST, _MAJORITY = 0.8, 0.5
 _SMOOTH_PROMINENCE = 1.1
-"""Smallest prominence of a peak of a curve without chaos."""
+"""Smallest prominence of a peak in a curve without chaos."""
 _GRID_HZ, _ROUGH_HZ = 5.0, 10.0
 _BENT = "The force of n = 5 acts at every p, so that a resonance at which p nears the gap is bent upwards."
 

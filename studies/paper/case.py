@@ -1,4 +1,4 @@
-"""A case: one choice for everything that the paper leaves open, and the alternatives to test."""
+"""A case: one value for each option that the paper leaves open, and the alternatives to test."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation at which continuous models have the force of the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Size of other starts: displacements over the gap; velocities over those at this frequency [Hz]."""
+"""Displacements of starts other than rest, over the gap; velocities are those at this frequency [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -78,7 +78,7 @@ class Case(FigureOptions):
             raise InvalidRequest(f"the sum cannot be {self.sum_model}: {error}") from error
 
     def fitted(self, model: str) -> str:
-        """Return a model with the fit of this case."""
+        """Return a model's name, with the indentation of the fit if this case changes it."""
         return model if self.fit_m == FIT_M or not model.startswith("power:") else f"{model}:{self.fit_m:g}"
 
     def specimen(self, contact: str = "hertz") -> Specimen:

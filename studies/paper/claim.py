@@ -85,7 +85,7 @@ class Claim:
     tried: tuple[Alternative, ...]
     """Alternatives to test in this order if the claim fails under the defaults."""
     remark: str
-    """Comment for a failed claim; without numbers, which the page measures."""
+    """Comment on a failed claim, without numbers, because the page gives the measured ones."""
     draws: int
     """Number of starts: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool

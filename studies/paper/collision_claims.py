@@ -13,12 +13,12 @@ from .responses import Flags, Responses
 _HIGHER_M = 7e-6
 """The second amplitude of Fig. 5."""
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_S = 150.0, 350.0, 200.0
-"""Sweep of section 5."""
+"""Sweep of the paper's section 5."""
 _SAMPLED_HZ = 8192.0
 """Sample rate of the drive, over 20 samples per cycle, so that its spline is accurate to 1e-4."""
 _AMPLITUDE_AT_HZ = 266.0
 _SWEEP_COLLIDES_HZ = (240.0, 290.0)
-"""Section 5: "about"."""
+"""Ends of the colliding region; section 5 of the paper says "about"."""
 _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
 """Tolerances of a sweep, and of a region on a grid of 5 Hz."""
 

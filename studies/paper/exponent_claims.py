@@ -10,7 +10,7 @@ from .options import AMPLITUDES_M
 from .reading import CONTINUOUS, MODERATE_M, PIECE_WISE, SECOND_REGION_HZ, STRONG_M, WEAK_M, Reading, Values
 
 SEVERE_PER_S = 100.0
-"""Section 3.1: "more than 100"."""
+"""Exponent that counts as severe; section 3.1 of the paper says "more than 100"."""
 NEAR_ZERO_PER_S = 10.0
 """A tenth of `SEVERE_PER_S`; zero cannot be expected, as free motion decays at a few per second."""
 _AROUND_HZ = 15.0

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _MODEL = "power:5"
 _PLACES = 60
-"""Frequencies with closed-form first-order solutions, each of which starts a branch."""
+"""Number of frequencies at which closed-form first-order solutions start a branch."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:

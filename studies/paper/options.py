@@ -13,9 +13,9 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
 LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
-"""More than fifteen times critical damping in the paper's third mode."""
+"""Largest damping time, more than fifteen times critical damping in the paper's third mode."""
 _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
-"""A thousandth of the weakest drive, and two hundred times the strongest."""
+"""Limits of the gap: a thousandth of the weakest drive, and two hundred times the strongest."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 

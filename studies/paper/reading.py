@@ -49,7 +49,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Reading:
-    """The simulation under one case."""
+    """Results of the simulation under one case."""
 
     evidence: Evidence
     case: Case

@@ -89,7 +89,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")
         top.set_ylim(0, asked)
         top.set_ylabel(f"claims that hold, of {asked}")
-        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # first, as margins depend on the scale
+        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # before plotting: margins depend on it
         for values, label, colour, marker in (
             (weak, "1 µm: near zero in the paper", report.LEVELS[0], "o"),
             (moderate, "5 µm: above 100 in the paper", report.SIMULATED, "s"),

@@ -17,7 +17,7 @@ FIRST, SECOND = "response_i", "response_ii"
 _READ_OFF = 0.05
 """Tolerance: the rates change by some per cent with the frequency grid, which the paper does not give."""
 _HIGH_RATE = 0.8
-"""Section 4: "more than 80 %"."""
+"""High similarity rate; section 4 of the paper says "more than 80 %"."""
 _CURVE_POINTS = 200
 _DRAWS = 4
 """Starts: the rates depend on the chaotic motion of every model, which differs from start to start."""

@@ -127,7 +127,7 @@ def _scales(drives: Sequence[Harmonic]) -> Reals:
 
 
 def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
-    """Return changes relative to the larger of two states, by component."""
+    """Return the largest change of any component, relative to the larger of two states."""
     beside = np.maximum(np.maximum(np.abs(one), np.abs(other)), floor)
     return np.asarray(np.max(np.abs(change) / beside, axis=0))
 
