@@ -30,7 +30,7 @@ DROPOUT_LEVEL = 0.0
 OVER_RANGE_LEVEL = 1.0
 Heal = Callable[[], None]
 """Function that ends one fault."""
-# Calls at which a program first accesses the device: creating a task's channels, and starting it.
+# Calls at which a program first accesses the device: setting a task's clock, and starting it.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 

@@ -2,8 +2,8 @@
 
 For a generator in another process, one line before (or after) pyvisa opens its resource manager is enough::
 
-    from vibench.virtual_rig.usb import usb_bus
-    usb_bus.plug_in_remote("127.0.0.1:31763")
+    from vibench.virtual_rig import plug_in_remote
+    plug_in_remote("127.0.0.1:31763")
 
 It needs no libusb. While this module's bus is installed, PyUSB sees it *instead of* the machine's own
 USB devices; only a new process sees the machine's devices again.

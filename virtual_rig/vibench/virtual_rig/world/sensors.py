@@ -257,7 +257,7 @@ class MotionSensor:
         dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
         disturbed = dropouts + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
-        # Insert the disturbances into ``values``, which start at ``first_step``, in place.
+        # ``instead`` starts at ``first_step``.
         for disturbance in disturbed:
             begin = max(disturbance.first_step - first_step, 0)
             stop = max(disturbance.stop_step - first_step, 0)
