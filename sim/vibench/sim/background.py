@@ -159,8 +159,8 @@ class Pool:
         for worker in tuple(self.workers):
             self._take(worker)
             if worker.job is not None and monotonic() > worker.job.end_s:
-                said = f"it took more than {worker.job.longest_s / 60:.0f} minutes and was given up"
-                self._lose(worker, TimeoutError(said))
+                reason = f"it took more than {worker.job.longest_s / 60:.0f} minutes and was given up"
+                self._lose(worker, TimeoutError(reason))
         self._hand_out()
 
     def close(self) -> None:
@@ -270,8 +270,8 @@ class Worker:
                     self.messages.put(self._connection.recv())
                     self._arrived.set()
         finally:
-            said = "the process that worked on it has ended: it was killed, or memory was short"
-            self.messages.put(("end", ChildProcessError(said)))
+            reason = "the process that worked on it has ended: it was killed, or memory was short"
+            self.messages.put(("end", ChildProcessError(reason)))
             self._arrived.set()
 
 

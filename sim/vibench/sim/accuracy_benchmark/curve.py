@@ -96,10 +96,10 @@ def _methods(scene: Scene) -> Iterator[tuple[str, Callable[[], Answer | None]]]:
 def _solved(
     scene: Scene, level: Accuracy, duration: Callable[[], FixedDuration | AutomaticDuration]
 ) -> Answer | None:
-    asked = Scene(
+    variant = Scene(
         scene.specimen, scene.drive, accuracy=level, duration=duration(), start=scene.start, budget_s=0.0
     )
-    found = solve_scene(asked)
+    found = solve_scene(variant)
     return None if found.error_estimate is None else (_responses(found), found.error_estimate)
 
 

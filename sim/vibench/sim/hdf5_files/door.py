@@ -87,8 +87,8 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
                 _require_dataset(item, size_bytes)
     except BaseException as error:
         file.close()
-        if said := system_error(error):
-            raise OSError(errno.EIO, said) from error
+        if reason := system_error(error):
+            raise OSError(errno.EIO, reason) from error
         if isinstance(error, UNREADABLE) and not isinstance(error, UnsafeHdf5):
             raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
         raise

@@ -402,16 +402,16 @@ class Map(GridPlan):
 
         Raises ValueError when a scene of these numbers is not allowed.
         """
-        said = self._numbers(place)
-        frequency_hz = said["frequency_hz"]
-        drive = Harmonic(frequency_hz, said["amplitude_m"], phase_rad)
+        numbers = self._numbers(place)
+        frequency_hz = numbers["frequency_hz"]
+        drive = Harmonic(frequency_hz, numbers["amplitude_m"], phase_rad)
         specimen = _specimen(
             self.specimen,
             self.model,
-            said["damping_time_s"],
-            said["gap_m"],
-            (said["k0_n_per_m"], said["k1_n_per_m"], said["k2_n_per_m"]),
-            said["hertz_stiffness"],
+            numbers["damping_time_s"],
+            numbers["gap_m"],
+            (numbers["k0_n_per_m"], numbers["k1_n_per_m"], numbers["k2_n_per_m"]),
+            numbers["hertz_stiffness"],
         )
         observe = (*self.observe, *((Observable.POINCARE,) if len(self.varied) == 1 else ()))
         return Scene(
@@ -420,7 +420,7 @@ class Map(GridPlan):
             observe=observe,
             accuracy=self.accuracy,
             duration=AutomaticDuration(self.window_periods / frequency_hz, self.periods / frequency_hz),
-            start=start or self._start(place, said, specimen, drive),
+            start=start or self._start(place, numbers, specimen, drive),
             budget_s=0.0 if self.target is None else BUDGET_S,
             target=self.target,
         )
@@ -430,7 +430,7 @@ class Map(GridPlan):
         return float(self._numbers(place)["frequency_hz"])
 
     def _start(
-        self, place: tuple[int, ...], said: Mapping[str, float], specimen: Specimen, drive: Harmonic
+        self, place: tuple[int, ...], numbers: Mapping[str, float], specimen: Specimen, drive: Harmonic
     ) -> Given | Rest:
         """Return the start of a point that does not continue another."""
         if place[-2] >= max(1, len(self.chain)):
@@ -438,14 +438,14 @@ class Map(GridPlan):
             return Given(state_of(random_state(specimen, drive, drawn)), RANDOM)
         if self.chain:
             return Rest()
-        return Given(state_of(np.array([said[each.field] for each in START])))
+        return Given(state_of(np.array([numbers[each.field] for each in START])))
 
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
         """Return the value of every quantity at a place of the grid."""
-        said = {each.field: getattr(self, each.field) for each in QUANTITIES}
+        numbers = {each.field: getattr(self, each.field) for each in QUANTITIES}
         for quantity, index in zip(self.varied, (place[-1], place[0]), strict=False):
-            said[quantity.field] = _values(self.range_of(quantity))[index]
-        return said
+            numbers[quantity.field] = _values(self.range_of(quantity))[index]
+        return numbers
 
 
 @lru_cache(maxsize=64)
@@ -463,13 +463,13 @@ def _specimen(
     hertz_stiffness: float | None,
 ) -> Specimen:
     """Build a specimen once for all points that share it."""
-    said: dict[str, object] = {}
+    changes: dict[str, object] = {}
     if any(each is not None for each in stiffnesses):
         k0, k1, k2 = (
             own if new is None else new for own, new in zip(described.stiffnesses, stiffnesses, strict=True)
         )
         triple: Triple = (k0, k1, k2)
-        said |= {"stiffnesses_n_per_m": triple, "single_frequencies_hz": None}
+        changes |= {"stiffnesses_n_per_m": triple, "single_frequencies_hz": None}
     if hertz_stiffness is not None:
-        said["hertz_stiffness"] = hertz_stiffness
-    return described.model_copy(update=said).specimen(model, damping_time_s, gap_m)
+        changes["hertz_stiffness"] = hertz_stiffness
+    return described.model_copy(update=changes).specimen(model, damping_time_s, gap_m)

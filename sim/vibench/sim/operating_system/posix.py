@@ -162,10 +162,10 @@ def _start_by_ps(pid: int) -> str | None:
         return None
     except PermissionError:
         return ""
-    told = subprocess.run(  # noqa: S603 - a number, and a program by its full path
+    result = subprocess.run(  # noqa: S603 - a number, and a program by its full path
         ["/bin/ps", "-o", "lstart=", "-p", str(pid)],
         capture_output=True,
         text=True,
         check=False,
     )
-    return "".join(filter(str.isalnum, told.stdout))
+    return "".join(filter(str.isalnum, result.stdout))

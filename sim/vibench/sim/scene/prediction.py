@@ -123,12 +123,12 @@ class TargetReport:
         reached = _percent(self.error)
         if self.is_met:
             return f"{reached} reached in {_seconds(self.time_s)}"
-        said = f"{reached} after {_seconds(self.time_s)}"
+        sentence = f"{reached} after {_seconds(self.time_s)}"
         wanted = _percent(self.wanted_error or 0.0)
         if self.needed_s is None:
-            return f"{said}; the time for {wanted} is not known"
+            return f"{sentence}; the time for {wanted} is not known"
         about, low, high = (_short(each) for each in self.needed_s)
-        return f"{said}; {wanted} needs about {about} s ({low} to {high})"
+        return f"{sentence}; {wanted} needs about {about} s ({low} to {high})"
 
 
 def _percent(error: float) -> str:

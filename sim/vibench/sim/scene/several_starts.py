@@ -131,7 +131,7 @@ class SeveralStarts:
         self,
         scene: Scene,
         begin: FollowedRun,
-        asked: ReachedMotion,
+        requested: ReachedMotion,
         pace: Pace,
         draw: Draw,
         follow: Follow,
@@ -147,7 +147,7 @@ class SeveralStarts:
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]
         self._under_way: list[StatesAlone] = []
-        self._reached = [asked]
+        self._reached = [requested]
 
     @property
     def reached(self) -> tuple[ReachedMotion, ...]:
@@ -184,8 +184,8 @@ class SeveralStarts:
 
     def follow(self) -> None:
         """Follow as many starts as the budget allows, as long as needed, and observe them."""
-        asked, budget_s = self._reached[0].run, self._draw.budget_s
-        each_s = asked.cost_s * min(1.0, self._first_s / asked.time_s)
+        run, budget_s = self._reached[0].run, self._draw.budget_s
+        each_s = run.cost_s * min(1.0, self._first_s / run.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
         spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
@@ -363,7 +363,7 @@ def ensemble_of(
     """
     reached, escape = several.reached, several.escape
     groups = motions_among(reached)
-    asked = next(group for group in groups if any(each is reached[0] for each in group))
+    requested = next(group for group in groups if any(each is reached[0] for each in group))
     groups = sorted(groups, key=len, reverse=True)
     kinds = [lasting(kind_among(group, forgetting_s), escape) for group in groups]
     counts = counts_of(kinds, [len(group) for group in groups])
@@ -382,7 +382,7 @@ def ensemble_of(
             )
             for group, kind, share in zip(groups, kinds, shares, strict=True)
         ),
-        asked=next(place for place, group in enumerate(groups) if group is asked),
+        asked=next(place for place, group in enumerate(groups) if group is requested),
         unseen_share=wilson_share(pending, len(reached)).high,
         escape=escape,
         scatter=_deviation([each.responses_m[0] for each in reached]),
@@ -467,7 +467,7 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
 def ensemble_beside(
     scene: Scene,
     begin: FollowedRun,
-    asked: ReachedMotion,
+    requested: ReachedMotion,
     pace: Pace,
     error_of: ErrorOf,
     follow: Follow,
@@ -480,8 +480,8 @@ def ensemble_beside(
     if draw is None and Observable.SCATTER in scene.observe:
         draw = Draw(clear=FEWEST)
     elif draw is None:
-        draw = Draw(budget_s=max(scene.budget_s - asked.run.cost_s, ALONE * scene.budget_s))
-    several = SeveralStarts(scene, begin, asked, pace, draw, follow)
+        draw = Draw(budget_s=max(scene.budget_s - requested.run.cost_s, ALONE * scene.budget_s))
+    several = SeveralStarts(scene, begin, requested, pace, draw, follow)
     several.follow()
     if len(several.reached) == 1:
         return None

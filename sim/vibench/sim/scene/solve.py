@@ -314,15 +314,15 @@ class _Begun:
             case FixedDuration():
                 self.course = FixedCourse(self.run, pace, scene.duration)
             case AutomaticDuration(window_s=window_s, longest_s=longest_s):
-                is_judged = question is Question.ANSWER
+                is_answer = question is Question.ANSWER
                 self.course = SettlingCourse(
                     self.run,
                     pace,
                     window_s,
                     min(longest_s, MOST_STATES / scene.drive.frequency_hz),
                     # Following chaos uses a part of the budget; other starts use the rest.
-                    alone_s=ALONE * scene.budget_s if is_judged else math.inf,
-                    by_itself_s=math.inf if is_judged else 0.0,
+                    alone_s=ALONE * scene.budget_s if is_answer else math.inf,
+                    by_itself_s=math.inf if is_answer else 0.0,
                 )
 
     def answer(self, follow: Follow) -> ScenePrediction:
@@ -347,7 +347,7 @@ class _Begun:
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
         """Follow other starts, as many as the scene's budget or ``draw`` allows."""
-        asked = ReachedMotion(
+        requested = ReachedMotion(
             self.run,
             seen.motion,
             None if seen.repeats is None else seen.repeats.period,
@@ -356,8 +356,8 @@ class _Begun:
             seen.wandered_until_s,
             growth_of(seen.path),
         )
-        error_of = _error_of(self._scene.accuracy, asked, errors, self._pace)
-        return ensemble_beside(self._scene, self._begin, asked, self._pace, error_of, follow, draw)
+        error_of = _error_of(self._scene.accuracy, requested, errors, self._pace)
+        return ensemble_beside(self._scene, self._begin, requested, self._pace, error_of, follow, draw)
 
     def _found(
         self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
@@ -415,11 +415,11 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
 
 
-def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
+def _error_of(accuracy: Accuracy, requested: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
     """Return the function that estimates the error of the responses of a motion."""
 
     def error_of(reached: ReachedMotion) -> float | None:
-        if reached is asked:
+        if reached is requested:
             return finite_or_none(float(np.max(errors.stated)))
         if reached.period is None:
             return None if reached.scatter is None else reached.scatter.between_runs

@@ -107,9 +107,9 @@ ContactWord = Annotated[str, AfterValidator(_known_law)]
 """A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
 
 
-def _infinity(said: object) -> object:
+def _infinity(value: object) -> object:
     """Read the word for an infinite gap, because JSON has no infinite numbers."""
-    return math.inf if said in ("inf", "Infinity") else said
+    return math.inf if value in ("inf", "Infinity") else value
 
 
 Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_infinity)]
@@ -157,36 +157,38 @@ class SpecimenDescription(_Described):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_its_base(cls, said: object, info: ValidationInfo) -> object:
+    def _from_its_base(cls, value: object, info: ValidationInfo) -> object:
         """Complete a table from the specimen that it names; a name alone means that specimen."""
         folder: Path | None = (info.context or {}).get(FOLDER)
-        match said:
+        match value:
             case str():
-                return _complete({BASE: said}, folder)
+                return _complete({BASE: value}, folder)
             case Mapping():
-                return _complete({**cls._meant, **said}, folder)
+                return _complete({**cls._meant, **value}, folder)
             case _:
-                return said
+                return value
 
     @field_validator("gap_m", mode="wrap")
     @classmethod
-    def _one_clearance_or_two(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+    def _one_clearance_or_two(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
         try:
-            return handler(said)
+            return handler(value)
         except ValidationError as error:
             raise ValueError("it must be a number above 0 [m], or [lower, upper]") from error
 
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
-    def _number_or_bodies(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+    def _number_or_bodies(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
         """Report the error in the given bodies; pydantic would first report that it is not a number."""
         try:
-            return handler(said)
+            return handler(value)
         except ValidationError as error:
             fault = max(error.errors(), key=lambda each: len(each["loc"]))
             within = ".".join(str(part) for part in fault["loc"][1:])
-            said = f"{within} is missing" if fault["type"] == "missing" else fault_in_words(fault)
-            raise ValueError(f"{within}: {said}" if within and within not in said else said) from error
+            message = f"{within} is missing" if fault["type"] == "missing" else fault_in_words(fault)
+            raise ValueError(
+                f"{within}: {message}" if within and within not in message else message
+            ) from error
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
@@ -198,9 +200,9 @@ class SpecimenDescription(_Described):
     @model_validator(mode="after")
     def _alternatives_exclude(self) -> Self:
         for pair in ALTERNATIVES:
-            said = [key for key in pair if getattr(self, key) is not None]
-            if len(said) != 1:
-                have = "both are" if said else "neither is"
+            keys = [key for key in pair if getattr(self, key) is not None]
+            if len(keys) != 1:
+                have = "both are" if keys else "neither is"
                 raise ValueError(f"{' and '.join(pair)} say the same, and {have} given; give one of them")
         unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
         if unknown:
@@ -332,14 +334,14 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 def _of_this_version(path: Path) -> dict[str, Any]:
     """Read a file and check its format version, if it states one."""
-    said = toml_table(path)
-    written = said.pop(FORMAT, VERSION)
+    table = toml_table(path)
+    written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
         raise ValueError(
             f"{path}: {FORMAT} = {reprlib.repr(written)} is not a version that this vibench reads, "
             f"{VERSION}; a later vibench wrote it: install that one"
         )
-    return said
+    return table
 
 
 @cache
@@ -352,19 +354,19 @@ def _shipped_texts() -> Mapping[str, str]:
     }
 
 
-def _merge(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
     """Replace the given values; remove `about`, and the alternative and the source of each given key."""
-    replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
-    replaced |= {"about"} if said else set()
+    replaced = {key for pair in ALTERNATIVES if table.keys() & pair for key in pair} | table.keys()
+    replaced |= {"about"} if table else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
-    _warn_of_changes(base, {**kept, **said}, said)
-    old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
+    _warn_of_changes(base, {**kept, **table}, table)
+    old, new = base.get(SOURCES, {}), table.get(SOURCES, {})
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
-        return {**kept, **said}
-    return {**kept, **said, SOURCES: {**{key: old[key] for key in old if key not in replaced}, **new}}
+        return {**kept, **table}
+    return {**kept, **table, SOURCES: {**{key: old[key] for key in old if key not in replaced}, **new}}
 
 
-def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Mapping[str, Any]) -> None:
+def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], table: Mapping[str, Any]) -> None:
     """Warn of springs and dampers that change because they are computed from given values."""
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
@@ -373,7 +375,7 @@ def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Map
         return
     for name, (kept, direct) in zip(("stiffnesses", "dampings"), ALTERNATIVES, strict=True):
         old, new = getattr(before, name), getattr(now, name)
-        if not (said.keys() & {kept, direct} or np.allclose(old, new, rtol=1e-4, atol=0.0)):
+        if not (table.keys() & {kept, direct} or np.allclose(old, new, rtol=1e-4, atol=0.0)):
             warnings.warn(
                 f"{made['name']}: {name} changed from {_join(old)} to {_join(new)}, because {kept} was "
                 f"kept; give {direct} = {_join(old)} to keep them, or {kept} = {made[kept]} to confirm "
@@ -391,16 +393,16 @@ def _complaint(specimen: str, error: ValidationError) -> str:
     """Describe the first fault: key, given value, and allowed values."""
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
-    said = fault_in_words(first)
+    message = fault_in_words(first)
     match first["type"]:
         case "missing":
             fault = f"{key} is missing"
         case "extra_forbidden":
             fault = f"{first['loc'][-1]} is not a key of a specimen; there are {', '.join(sorted(_KEYS))}"
         case _ if key:
-            fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
+            fault = f"{key} = {reprlib.repr(first['input'])}: {message}"
         case _:
-            return said if specimen in said else f"{specimen}: {said}"
+            return message if specimen in message else f"{specimen}: {message}"
     return f"{specimen} describes no specimen: {fault}"
 
 

@@ -69,5 +69,5 @@ def fault_in_words(fault: Mapping[str, Any]) -> str:
         One of the ``errors()`` of a pydantic ``ValidationError``.
     """
     plain = _IN_WORDS_OF_TOML.get(fault["type"])
-    said = str(fault["msg"]) if plain is None else plain.format(**fault.get("ctx", {}))
-    return _ENUM_MEMBER.sub(r"\1", said.removeprefix("Value error, "))
+    text = str(fault["msg"]) if plain is None else plain.format(**fault.get("ctx", {}))
+    return _ENUM_MEMBER.sub(r"\1", text.removeprefix("Value error, "))

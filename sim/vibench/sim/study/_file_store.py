@@ -286,13 +286,13 @@ class FileStore:
         )
 
 
-def _require_same(path: Path, kept: layout.GridPlan, asked: layout.GridPlan) -> None:
-    differing = asked.differences(kept)
+def _require_same(path: Path, kept: layout.GridPlan, requested: layout.GridPlan) -> None:
+    differing = requested.differences(kept)
     if differing:
         raise StudyError(
-            f"{path} holds another {asked.called}: "
-            f"{', '.join(_difference(name, kept, asked) for name in differing)}."
-            f" Nothing was changed; ask for the same {asked.called}, or choose another file."
+            f"{path} holds another {requested.called}: "
+            f"{', '.join(_difference(name, kept, requested) for name in differing)}."
+            f" Nothing was changed; ask for the same {requested.called}, or choose another file."
         )
 
 
@@ -300,9 +300,9 @@ SHOWN = 60
 """Characters of a value that a message shows."""
 
 
-def _difference(name: str, kept: layout.GridPlan, asked: layout.GridPlan) -> str:
+def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) -> str:
     """Return how one field of two plans differs; for long lists, the first difference."""
-    there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
+    there, here = (plan.model_dump(mode="json")[name] for plan in (kept, requested))
     match there, here:
         case [*some], [*others]:
             index = next(

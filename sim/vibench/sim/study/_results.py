@@ -112,9 +112,9 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
     except OSError as error:
-        if said := system_error(error):
+        if reason := system_error(error):
             raise StudyError(
-                f"{path} could not be read ({said}). The file may be intact: check the disk, and try again."
+                f"{path} could not be read ({reason}). The file may be intact: check the disk, and try again."
             ) from error
         raise StudyError(
             f"{path} is not a readable HDF5 file ({error}); give the path of a {kind.called}'s file."
@@ -292,9 +292,9 @@ def _index(axis: StudyAxis, value: Value) -> int:
     raise InvalidStudy(f"{value!r} is no {axis.name} here; there are {shown}{more}.")
 
 
-def _is_same(here: Value, asked: Value) -> bool:
-    match here, asked:
+def _is_same(here: Value, requested: Value) -> bool:
+    match here, requested:
         case float(), float():
-            return abs(here - asked) <= SAME * abs(here)
+            return abs(here - requested) <= SAME * abs(here)
         case _:
-            return here == asked
+            return here == requested

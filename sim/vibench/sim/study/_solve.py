@@ -118,10 +118,10 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
     """Return the stored result of scene ``number`` that ended in ``error``."""
     match error:
         case ValueError():
-            said = str(error)
+            message = str(error)
         case _:
-            said = f"{type(error).__name__}: {error}"
-    return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
+            message = f"{type(error).__name__}: {error}"
+    return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5

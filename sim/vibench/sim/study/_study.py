@@ -131,23 +131,23 @@ StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.S
 """Observables with one number per point."""
 
 
-def _own_law(said: dict[str, Any]) -> tuple[str, ...]:
-    return (_described_specimen(said).contact,)
+def _own_law(values: dict[str, Any]) -> tuple[str, ...]:
+    return (_described_specimen(values).contact,)
 
 
-def _own_damping(said: dict[str, Any]) -> tuple[float, ...] | None:
-    own_s = _described_specimen(said).damping_time_s
+def _own_damping(values: dict[str, Any]) -> tuple[float, ...] | None:
+    own_s = _described_specimen(values).damping_time_s
     return None if own_s is None else (own_s,)
 
 
-def _own_gap(said: dict[str, Any]) -> tuple[float, ...] | None:
-    own_m = _described_specimen(said).gap_m
+def _own_gap(values: dict[str, Any]) -> tuple[float, ...] | None:
+    own_m = _described_specimen(values).gap_m
     return (own_m,) if isinstance(own_m, float) else None
 
 
-def _described_specimen(said: dict[str, Any]) -> SpecimenTable:
+def _described_specimen(values: dict[str, Any]) -> SpecimenTable:
     """Return the specimen of a study that is being read; the default one if that was not valid."""
-    found: SpecimenTable = said.get("specimen") or usual_specimen()
+    found: SpecimenTable = values.get("specimen") or usual_specimen()
     return found
 
 
