@@ -79,12 +79,12 @@ class ModelForm(QWidget):
     def content(self) -> dict[str, Any]:
         """Return the content as a file would hold it; omit empty fields, except where None has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
-        said = {
+        values = {
             name: value
             for name, value in given.items()
             if value is not None or _may_be_emptied(self.model.model_fields[name])
         }
-        return {**self._fixed, **said}
+        return {**self._fixed, **values}
 
     def show_content(self, content: Mapping[str, Any]) -> None:
         """Show content from a file; missing fields show the plan's defaults."""
@@ -100,7 +100,7 @@ class ModelForm(QWidget):
 
         A complaint about several fields together is attributed to the field changed last.
         """
-        said: list[str] = []
+        sentences: list[str] = []
         for name, row in self._rows.items():
             inner = {
                 _after_kind(row.editor, loc[1:]): text
@@ -108,17 +108,17 @@ class ModelForm(QWidget):
                 if loc and loc[0] == name
             }
             if isinstance(row.editor, GroupEditor):
-                said += row.editor.complain(inner)
+                sentences += row.editor.complain(inner)
                 continue
             text = row.editor.complaint or "; ".join(inner.values())
             text = f"{row.facts.label_with_unit}: {_sentence(text, row.facts)}" if text else ""
             row.complaint.setText(text)
             row.complaint.setVisible(bool(text))
-            said += [text] if text else []
+            sentences += [text] if text else []
         placed = {*self._rows}
         about = f"{self.edited}: " if self.edited else ""
-        said += [about + text for loc, text in complaints.items() if not loc or loc[0] not in placed]
-        return tuple(said)
+        sentences += [about + text for loc, text in complaints.items() if not loc or loc[0] not in placed]
+        return tuple(sentences)
 
     @property
     def is_read(self) -> bool:

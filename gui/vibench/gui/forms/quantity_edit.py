@@ -120,7 +120,7 @@ class QuantityEdit(QAbstractSpinBox):
         self._value: float | int | None = None
         self.complaint = ""
         """Why the text cannot be read; empty when it can."""
-        self._asked_about: float | int | None = None
+        self._value_to_confirm: float | int | None = None
         """A value to be confirmed by a second Return."""
         self._is_confirmed = False
         self.setKeyboardTracking(False)
@@ -134,7 +134,7 @@ class QuantityEdit(QAbstractSpinBox):
 
     def set_value(self, value: float | int | None) -> None:
         """Set the number."""
-        self._value, self.complaint, self._asked_about = value, "", None
+        self._value, self.complaint, self._value_to_confirm = value, "", None
         text = "" if value is None else quantity_text(value, self._unit)
         self._shown_unit = unit_of(text, self._unit)
         in_unit = f"in {UNITS.in_field(self._unit)}" if self._unit else ""
@@ -195,9 +195,9 @@ class QuantityEdit(QAbstractSpinBox):
         try:
             value = self._read(text)
         except ConfigurationError as error:
-            self.complaint, self._asked_about = str(error), None
+            self.complaint, self._value_to_confirm = str(error), None
         else:
-            if self._is_far(value) and not (self._is_confirmed and value == self._asked_about):
+            if self._is_far(value) and not (self._is_confirmed and value == self._value_to_confirm):
                 self._ask_about(value)
             else:
                 self.set_value(value)
@@ -213,7 +213,7 @@ class QuantityEdit(QAbstractSpinBox):
     def _ask_about(self, value: float | int | None) -> None:
         assert value is not None
         assert self._value is not None
-        self._asked_about = value
+        self._value_to_confirm = value
         self.complaint = (
             f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last value, "
             f"{quantity_text(self._value, self._unit)}; press Return again to accept it, or type another"

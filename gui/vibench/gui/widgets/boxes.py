@@ -220,25 +220,25 @@ class TimedBar(ProgressBar):
         self.setAccessibleName(name)
         self._pieces = pieces
         self._begun_s = 0.0
-        self._asked = 0
+        self._total = 0
         self.show_done(0, 0)
 
     def begin(self) -> None:
         """Restart the clock."""
         self._begun_s = monotonic()
 
-    def show_done(self, done: int, asked: int) -> None:
-        """Show the number of finished pieces; ``asked`` is 0 when nothing was started."""
-        if asked and not self._asked:
+    def show_done(self, done: int, total: int) -> None:
+        """Show the number of finished pieces; ``total`` is 0 when nothing was started."""
+        if total and not self._total:
             self.begin()
-        self._asked = asked
-        self.setMaximum(max(asked, 1))
+        self._total = total
+        self.setMaximum(max(total, 1))
         self.setValue(done)
-        if not asked:
+        if not total:
             self.setFormat(f"no {self._pieces} yet")
             return
         elapsed_s = monotonic() - self._begun_s
         left = ""
-        if 0 < done < asked and elapsed_s > LEAST_S:
-            left = f", {clock(elapsed_s * (asked - done) / done)} left"
-        self.setFormat(f"{done} of {asked} {self._pieces}{left}")
+        if 0 < done < total and elapsed_s > LEAST_S:
+            left = f", {clock(elapsed_s * (total - done) / done)} left"
+        self.setFormat(f"{done} of {total} {self._pieces}{left}")

@@ -40,9 +40,9 @@ def _lines(cells: Iterable[Cell]) -> str:
     return "\n".join("\t".join(texts) for texts in rows.values())
 
 
-def _offered(table: QTableView, text: str, said: Callable[[], str]) -> QAction:
+def _offered(table: QTableView, text: str, clipboard_text: Callable[[], str]) -> QAction:
     action = QAction(text, table)
-    action.triggered.connect(lambda: QGuiApplication.clipboard().setText(said()))
+    action.triggered.connect(lambda: QGuiApplication.clipboard().setText(clipboard_text()))
     table.addAction(action)
     return action
 

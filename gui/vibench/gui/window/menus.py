@@ -164,10 +164,10 @@ def show_manual(parent: QWidget) -> Reader:
 def installation_text() -> str:
     """Return the output of `vibench doctor`."""
     command = [sys.executable, "-m", "vibench.cli", "doctor"]
-    told = subprocess.run(  # noqa: S603 - this interpreter, and our own package
+    result = subprocess.run(  # noqa: S603 - this interpreter, and our own package
         command, capture_output=True, text=True, check=False, timeout=LONGEST_S
     )
-    return told.stdout or told.stderr
+    return result.stdout or result.stderr
 
 
 def show_about(parent: QWidget, context: AppContext) -> Reader:

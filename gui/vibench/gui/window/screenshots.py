@@ -134,13 +134,13 @@ def _fill(window: Window) -> None:
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
     # Compute one after another, so that the displayed computing times are realistic.
-    for view, asked in (
+    for view, content in (
         (simulation, {}),
         (maps, MAP),
         (simulation.branches, BRANCHES),
         (simulation.chain, CHAIN),
     ):
-        view.form.form.show_content({**view.form.form.content(), **asked})
+        view.form.form.show_content({**view.form.form.content(), **content})
         view.begin()
         _wait(lambda view=view: not view.simulator.is_busy)  # type: ignore[misc]
     window.context.comparison_requested.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))

@@ -74,11 +74,11 @@ class AnalysisPanel(QGroupBox):
         """Return the options; None while they are not valid."""
         return self.form.value
 
-    def show_progress(self, done: int, asked: int) -> None:
+    def show_progress(self, done: int, total: int) -> None:
         """Show how many recordings are analysed; the bar is hidden when all are."""
-        self._bar.show_done(done, asked)
+        self._bar.show_done(done, total)
         for widget in (self._bar, self._cancel):
-            widget.setVisible(done < asked)
+            widget.setVisible(done < total)
 
     def _validate(self) -> None:
         self._again.setEnabled(self.form.value is not None)
@@ -103,7 +103,7 @@ class ComparePage(Page):
         )
         self._recordings: dict[Path, ComparedRecording | None] = {}
         self._jobs: list[Job] = []
-        self._asked = 0
+        self._total = 0
         self._build()
         self.curves.changed.connect(self._draw)
         self.pair_box.changed.connect(self._draw)
@@ -139,7 +139,7 @@ class ComparePage(Page):
             return
         for path in paths:
             self._recordings.setdefault(path, None)
-            self._asked += 1
+            self._total += 1
             self._jobs.append(
                 self.context.background.ask(
                     compare_recording,
@@ -167,7 +167,7 @@ class ComparePage(Page):
         for job in self._jobs:
             job.drop()
         self._jobs.clear()
-        self._asked = 0
+        self._total = 0
         self._say_progress()
 
     def export_to(self, path: Path) -> None:
@@ -183,8 +183,8 @@ class ComparePage(Page):
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
             del self._recordings[found.path]
-            said = copy_sentence(others[first], str(others[first].path), found)
-            self.context.say(Notice(NoticeKind.WARNING, f"{found.path} {said}.", "It is shown once."))
+            text = copy_sentence(others[first], str(others[first].path), found)
+            self.context.say(Notice(NoticeKind.WARNING, f"{found.path} {text}.", "It is shown once."))
             self._end_job()
             return
         self._recordings[found.path] = found
@@ -206,8 +206,8 @@ class ComparePage(Page):
 
     def _say_progress(self) -> None:
         if not self._jobs:
-            self._asked = 0
-        self.panel.show_progress(self._asked - len(self._jobs), self._asked)
+            self._total = 0
+        self.panel.show_progress(self._total - len(self._jobs), self._total)
 
     def _exported(self, path: Path) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {path}"))

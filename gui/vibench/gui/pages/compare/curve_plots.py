@@ -356,8 +356,10 @@ def _caution(curve: Curve, reference: Curve) -> str:
     levels = (curve.level_m, reference.level_m)
     if levels[0] == levels[1]:
         return ""
-    said = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
-    return f". ⚠ Levels of the base: {said[0]} and {said[1]}; with contact, the response depends on the level"
+    texts = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
+    return (
+        f". ⚠ Levels of the base: {texts[0]} and {texts[1]}; with contact, the response depends on the level"
+    )
 
 
 _NOBODY = "– nothing –"

@@ -251,8 +251,8 @@ class FilesPage(Page):
         if os.path.isdir(folder):  # noqa: PTH112
             self._go_to(folder)
         else:
-            said = f"{folder} is not a folder.", "The list is unchanged.", "Type or choose another folder."
-            self.context.say(Notice(NoticeKind.WARNING, *said))
+            texts = f"{folder} is not a folder.", "The list is unchanged.", "Type or choose another folder."
+            self.context.say(Notice(NoticeKind.WARNING, *texts))
             self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:

@@ -65,7 +65,7 @@ class HiddenMotionView(QWidget):
         self.find_numbers.toggled.connect(lambda _is_on: self._ask())
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
-        self._asked: HiddenViewRequest | None = None
+        self._request: HiddenViewRequest | None = None
         self._of: HiddenViewRequest | None = None
         """Inputs of the displayed picture; None without a picture."""
         self._latest_request = LatestRequest(
@@ -83,7 +83,7 @@ class HiddenMotionView(QWidget):
     @property
     def displayed_results(self) -> DisplayedResult:
         """The picture, with visible range and options as inputs."""
-        return DisplayedResult(self.plot, self._of, self._asked)
+        return DisplayedResult(self.plot, self._of, self._request)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
         """Select another recording or none; the hint is shown until a picture exists."""
@@ -112,9 +112,9 @@ class HiddenMotionView(QWidget):
         self.caption.setText("working it out…")
         numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
         specimen = self.specimen.currentData()
-        self._asked = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
-        self.plot.setEnabled(self._of in (None, self._asked))
-        self._latest_request.ask(self._asked)
+        self._request = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
+        self.plot.setEnabled(self._of in (None, self._request))
+        self._latest_request.ask(self._request)
 
     def _choose_specimen(self, place: int) -> None:
         """Select another specimen; the last entry opens a file dialog and adds the chosen file."""
@@ -127,7 +127,7 @@ class HiddenMotionView(QWidget):
 
     def _show(self, found: HiddenView) -> None:
         self._of = found.request
-        self.plot.setEnabled(self._of == self._asked)
+        self.plot.setEnabled(self._of == self._request)
         self.plot.with_hint("")
         self.tracked.setData(found.time_s, found.p, connect="finite")
         self.free.setData(found.time_s, found.free_p, connect="finite")
@@ -185,7 +185,7 @@ class SpectrogramView(QWidget):
         self._theme = theme
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None
-        self._asked: SpectrogramRequest | None = None
+        self._request: SpectrogramRequest | None = None
         self._of: SpectrogramRequest | None = None
         self._latest_request = LatestRequest(
             background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
@@ -219,13 +219,13 @@ class SpectrogramView(QWidget):
     @property
     def displayed_results(self) -> DisplayedResult:
         """The picture, with the selected options as inputs."""
-        return DisplayedResult(self.plot, self._of, self._asked)
+        return DisplayedResult(self.plot, self._of, self._request)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
         """Select another recording or none; the hint is shown until a picture exists."""
         self._recording = recording
         self._latest_request.drop()
-        self._asked = self._of = None
+        self._request = self._of = None
         for image in self._images.values():
             image.clear(hint)
         roles = () if recording is None else recording.roles
@@ -268,7 +268,7 @@ class SpectrogramView(QWidget):
         if not self.isVisible() or recording is None or not high_s > low_s or self.channel.count() == 0:
             return
         rate_hz = recording.sample_rate_hz
-        asked = SpectrogramRequest(
+        request = SpectrogramRequest(
             path=Path(recording.path),
             role=str(self.channel.currentData()),
             start=int(low_s * rate_hz),
@@ -277,14 +277,14 @@ class SpectrogramView(QWidget):
             spacing=self._spacing,
             resolution_hz=self.line_width.currentData(),
         )
-        self._asked = asked
-        self.plot.setEnabled(self._of in (None, asked))
+        self._request = request
+        self.plot.setEnabled(self._of in (None, request))
         self.caption.setText("working it out…")
-        self._latest_request.ask(asked)
+        self._latest_request.ask(request)
 
     def _show(self, found: DensityPicture) -> None:
         self._of = found.request
-        self.plot.setEnabled(self._of == self._asked)
+        self.plot.setEnabled(self._of == self._request)
         self._images[found.request.spacing].show_picture(found)
         self.caption.setText(
             f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "

@@ -200,7 +200,7 @@ class MapsPage(Page):
         self.motion = MotionView(context.theme)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.picture: MapPicture | None = None
-        self._asked: MapRequest | None = None
+        self._request: MapRequest | None = None
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
         self._motion_of: MotionRequest | None = None
@@ -226,7 +226,7 @@ class MapsPage(Page):
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
         """The map and the motion, with their requests as inputs."""
         return (
-            DisplayedResult(self.map, self._asked, self.form.value),
+            DisplayedResult(self.map, self._request, self.form.value),
             DisplayedResult(self.motion, self._motion_of, self._motion_wanted),
         )
 
@@ -258,7 +258,7 @@ class MapsPage(Page):
         request = self.form.value
         if request is None:
             return
-        self._asked, self.picture = request, None
+        self._request, self.picture = request, None
         self.map.clear()
         self._validate()
         self.simulator.begin(request)
@@ -266,8 +266,8 @@ class MapsPage(Page):
 
     def begin_in_sight(self) -> None:
         """Compute the visible part with as many points as the whole map."""
-        asked = self.form.value
-        if asked is None:
+        request = self.form.value
+        if request is None:
             return
         (left, right), (low, high) = self.map.in_sight
         edges = {"start_hz": max(left, 1e-3), "stop_hz": right, "lowest_m": low, "highest_m": high}
@@ -285,8 +285,8 @@ class MapsPage(Page):
         if self.form.value is None or frequency_hz <= 0.0:
             return
         self._point = (frequency_hz, amplitude_m)
-        asked = self._motion_wanted
-        assert asked is not None
+        request = self._motion_wanted
+        assert request is not None
         self.map.mark(frequency_hz, amplitude_m)
         self.motion.caption.setText("Following the motion…")
         self._open.setEnabled(True)
@@ -294,7 +294,7 @@ class MapsPage(Page):
         if self._job is not None:
             self._job.drop()
         self._job = self.context.background.ask(
-            settled_motion, partial(self._show_motion, asked), self._fail, asked
+            settled_motion, partial(self._show_motion, request), self._fail, request
         )
 
     def add_recordings(self, paths: object) -> None:
@@ -322,8 +322,8 @@ class MapsPage(Page):
         )
         self._show_text("It broke off.")
 
-    def _show_motion(self, asked: MotionRequest, motion: SettledMotion) -> None:
-        self._motion_of = asked
+    def _show_motion(self, request: MotionRequest, motion: SettledMotion) -> None:
+        self._motion_of = request
         self.motion.show_motion(motion)
         self._validate()
 
@@ -346,7 +346,7 @@ class MapsPage(Page):
             button.setEnabled(wanted is not None)
         if wanted is not None and self.picture is None:
             self.map.show_range((wanted.start_hz, wanted.stop_hz), (wanted.lowest_m, wanted.highest_m))
-        self.map.setEnabled(self._asked in (None, wanted))
+        self.map.setEnabled(self._request in (None, wanted))
         self.motion.setEnabled(self._motion_of in (None, self._motion_wanted))
 
     def _recolour(self, *_: object) -> None:

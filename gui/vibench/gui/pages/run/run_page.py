@@ -464,8 +464,8 @@ class RunPage(Page):
         self._ended = path
         status = self.context.bridge.status
         rows = () if status is None else status.rows
-        told = next((outcome_text(row.state, row.reason) for row in rows if row.file == str(path)), "")
-        self.summary.setText(f"Last run: {path.name}, {told}")
+        outcome = next((outcome_text(row.state, row.reason) for row in rows if row.file == str(path)), "")
+        self.summary.setText(f"Last run: {path.name}, {outcome}")
         self.look_button.show()
 
     def _show_channels(self) -> None:

@@ -97,8 +97,8 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     @property
     def displayed_results(self) -> DisplayedResult:
         """The plots, with the request as input."""
-        asked = None if self._course is None else self._course.request
-        return DisplayedResult(self.picture.widget, asked, self.form.value)
+        request = None if self._course is None else self._course.request
+        return DisplayedResult(self.picture.widget, request, self.form.value)
 
     def refresh(self) -> None:
         """Draw the pieces received since the last tick."""
@@ -165,8 +165,8 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _validate(self) -> None:
         self._begin.setEnabled(self.form.value is not None)
-        asked = None if self._course is None else self._course.request
-        self.picture.widget.setEnabled(self.form.value is not None and asked in (None, self.form.value))
+        request = None if self._course is None else self._course.request
+        self.picture.widget.setEnabled(self.form.value is not None and request in (None, self.form.value))
 
     def _hand_to_compare(self) -> None:
         if self.answer is not None:

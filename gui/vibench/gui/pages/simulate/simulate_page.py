@@ -137,12 +137,12 @@ class SimulatePage(Page):
     def _end(self) -> None:
         self._is_stale = True
         troubles = () if self.progress is None else self.progress.troubles
-        said = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
+        text = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
         forgotten = 0 if self.progress is None else self.progress.forgotten
         self._say_progress(
-            f"{said} At {forgotten} points the motion depends sensitively on the start."
+            f"{text} At {forgotten} points the motion depends sensitively on the start."
             if forgotten
-            else said
+            else text
         )
         if troubles:
             self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
@@ -164,8 +164,8 @@ class SimulatePage(Page):
 
     def _say_progress(self, text: str) -> None:
         is_busy = self.simulator.is_busy
-        done, asked = (0, 0) if self.progress is None else (self.progress.done, self.progress.asked)
-        self._bar.show_done(done, asked)
+        done, total = (0, 0) if self.progress is None else (self.progress.done, self.progress.asked)
+        self._bar.show_done(done, total)
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
         self._compare.setEnabled(self.progress is not None and bool(self.progress.curves()))

@@ -332,7 +332,7 @@ class TestPage(Page):
         self._refusal = ""
         self._history: History[Measurement] = History()
         self._of: Asked = None
-        self._asked: Asked = None
+        self._requested_inputs: Asked = None
         self._summary_of: Asked = None
         self._predicted_of: Asked = None
         self._tests: tuple[NamedTest, ...] = ()
@@ -413,20 +413,20 @@ class TestPage(Page):
             self.context.settings.keep_text(SettingKey.TEST, toml_text(measurement))
 
     def _changed(self) -> None:
-        measurement, asked = self.form.value, self._inputs
+        measurement, inputs = self.form.value, self._inputs
         seen = self.context.selection.prediction
         self.context.selection.choose_measurement(measurement)
         if measurement is not None:
             self._history.note(measurement)
-            if asked == self._asked:
+            if inputs == self._requested_inputs:
                 # Only name or notes changed, so the prediction stays valid.
                 if seen is not None:
                     self.context.selection.keep_prediction(seen)
                 return
         self._preview, self._refusal = None, ""
         # Mark the old prediction as outdated until the new one arrives.
-        self._asked = self._summary_of = asked
-        measurement, rig = asked
+        self._requested_inputs = self._summary_of = inputs
+        measurement, rig = inputs
         for each in (self.limits, self.plots, self.prediction, self.prediction_note):
             each.setEnabled(False)
         if measurement is None or rig is None:
@@ -442,7 +442,7 @@ class TestPage(Page):
 
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
-        self._of = self._summary_of = self._asked
+        self._of = self._summary_of = self._requested_inputs
         self.summary.setText(summary_text(seen, self._refusal))
         for each in (self.limits, self.plots):
             each.setEnabled(True)
@@ -455,7 +455,7 @@ class TestPage(Page):
     def _predicted(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
         self.context.selection.keep_prediction(seen)
-        self._predicted_of = self._asked
+        self._predicted_of = self._requested_inputs
         self._refusal = prediction.refusal
         if self._preview is not None:
             self.summary.setText(summary_text(self._preview, self._refusal))
@@ -468,18 +468,18 @@ class TestPage(Page):
             f"Simulated ({seen.model}), {seen.approach.value}, base amplitude {seen.base_text} from "
             f"{seen.basis}. {collides}"
         )
-        told = [each.sentence for each in prediction.expected]
+        sentences = [each.sentence for each in prediction.expected]
         known = [each.sentence for each in prediction.expected if each.scatter is not None]
-        text = f"Will be known: {known[0]} …" if known and told[1:] else "".join(told[:1])
+        text = f"Will be known: {known[0]} …" if known and sentences[1:] else "".join(sentences[:1])
         if prediction.recorded_s is not None:
             text = f"Will record for about {prediction.recorded_s:.3g} s, until known. {text}"
         self.expectation.setText(text)
-        self.expectation.setToolTip("\n".join(told))
+        self.expectation.setToolTip("\n".join(sentences))
 
     def _prediction_failed(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
         self.prediction_note.setEnabled(True)
-        self._predicted_of = self._asked
+        self._predicted_of = self._requested_inputs
         self.prediction_note.setText(f"No prediction: {error}")
         self.expectation.setText("")
 
